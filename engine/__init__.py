@@ -1,0 +1,35 @@
+"""wanderlast's engine: loads that move on structures that bend, thousands of variants at once.
+
+>>> import engine
+>>> study = engine.Study(kind="passage", title="nothing yet")
+>>> study.gravity
+9.80665
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from engine.plan import Plan, make_plan
+    from engine.run import run
+    from engine.scene import Study, load
+
+_HOMES = {
+    "Study": "engine.scene",
+    "load": "engine.scene",
+    "run": "engine.run",
+    "Plan": "engine.plan",
+    "make_plan": "engine.plan",
+}
+__all__ = ["Plan", "Study", "load", "make_plan", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    """Names are imported when they are first used, so that importing the engine costs nothing."""
+    if name in _HOMES:
+        found = getattr(import_module(_HOMES[name]), name)
+        globals()[name] = found
+        return found
+    raise AttributeError(f"module 'engine' has no attribute {name!r}")

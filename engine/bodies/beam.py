@@ -1,0 +1,135 @@
+"""A uniform Euler-Bernoulli beam as the user describes it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from itertools import product
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, Strict, Tag, model_validator
+
+from engine.checks import Check, on_body
+from engine.spec import LIST, NUMBER, TABLE, WORD, Auto, Spec, by_amount_form, by_form, one_of
+from engine.units import (
+    Area,
+    Damping,
+    Density,
+    Dimensionless,
+    Length,
+    Pressure,
+    Rate,
+    RotationalStiffness,
+    SecondMoment,
+    Stiffness,
+    Time,
+    fault,
+)
+
+MAX_MODES = 64
+END_WORDS = ("pinned", "clamped", "free")
+
+
+class Body(Spec):
+    """Base of all bodies: a track of some length along which loads ride."""
+
+    @abstractmethod
+    def checks(self, here: str) -> list[Check]:
+        """Conditions between the numbers of this body at the dotted key `here`."""
+
+
+class Spring(Spec):
+    """Springs and a damper to ground at a place of the beam (m): N/m, N m/rad, N s/m, not all zero."""
+
+    at: Length = Field(ge=0)
+    stiffness: Stiffness = Field(default=0.0, ge=0)
+    rotational: RotationalStiffness = Field(default=0.0, ge=0)
+    damping: Damping = Field(default=0.0, ge=0)
+
+
+class Rayleigh(Spec):
+    """Damping a M + b K, a in 1/s and b in s: mode k has the ratio a/(2 omega_k) + b omega_k/2."""
+
+    rayleigh: Annotated[tuple[Annotated[Rate, Field(ge=0)], Annotated[Time, Field(ge=0)]], Strict(False)]
+
+
+Ratio = Annotated[Dimensionless, Field(ge=0, lt=1)]
+Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
+DampingRatio = Annotated[
+    Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
+]
+Ends = Annotated[str, AfterValidator(one_of(*("-".join(ends) for ends in product(END_WORDS, repeat=2))))]
+Springs = Annotated[tuple[Spring, ...], Strict(False), Field(min_length=1, max_length=100)]
+Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
+Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
+
+
+class Beam(Body):
+    """A uniform beam. SI units; `supports` names both ends or lists springs, between which all is free.
+
+    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. own_weight: gravity acts on the beam
+    too, and deflections count from the unstressed state. fibre_distance: of the extreme fibre, for stress.
+
+    >>> bed = Beam(kind="beam", length="15 m", area=0.01, second_moment=8.33e-6, youngs_modulus="210 GPa",
+    ...            density=7850, supports="pinned-pinned", damping_ratio=0.02)
+    >>> bed.bending_stiffness, bed.mass, bed.ends
+    (1749300.0, 1177.5, ('pinned', 'pinned'))
+    """
+
+    kind: Literal["beam"]
+    length: Length = Field(gt=0)
+    area: Area = Field(gt=0)
+    second_moment: SecondMoment = Field(gt=0)
+    youngs_modulus: Pressure = Field(gt=0)
+    density: Density = Field(gt=0)
+    supports: Supports
+    damping_ratio: DampingRatio = 0.0
+    modes: Modes = "auto"
+    own_weight: bool = False
+    fibre_distance: Length | None = Field(default=None, gt=0)
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E I, N m2."""
+        return self.youngs_modulus * self.second_moment
+
+    @property
+    def mass_per_length(self) -> float:
+        """rho A, kg/m."""
+        return self.density * self.area
+
+    @property
+    def mass(self) -> float:
+        """Of the whole beam, kg."""
+        return self.mass_per_length * self.length
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """How the ends at 0 and at the length are held; both free on springs."""
+        left, right = self.supports.split("-") if isinstance(self.supports, str) else ("free", "free")
+        return left, right
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """Springs to ground; none where the ends are named."""
+        return () if isinstance(self.supports, str) else self.supports
+
+    @model_validator(mode="after")
+    def _list_of_ratios(self) -> Beam:
+        if isinstance(self.damping_ratio, tuple) and self.modes == "auto":
+            raise fault("a list of damping ratios needs modes as a number", expected=f"modes = 1 to {MAX_MODES}")
+        return self
+
+    def checks(self, here: str) -> list[Check]:
+        checks = []
+        for index in range(len(self.springs)):
+            spring = f"{here}.supports.{index}"
+            parts = tuple(f"{spring}.{key}" for key in ("stiffness", "rotational", "damping"))
+            checks.append(on_body(f"{spring}.at", (f"{spring}.at", f"{here}.length"), "a support off the beam"))
+            checks.append(
+                Check(spring, parts, lambda k, r, c: k + r + c > 0, "a support that holds nothing", "one of them > 0")
+            )
+        if isinstance(self.damping_ratio, tuple):
+            count = len(self.damping_ratio)
+            what = f"more modes than the {count} damping ratios"
+            checks.append(Check(f"{here}.modes", (f"{here}.modes",), lambda n: n <= count, what, f"at most {count}"))
+        return checks

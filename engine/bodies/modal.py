@@ -1,0 +1,91 @@
+"""What the time march knows of a body: its modes, its statics and its dampers, never its mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class Shapes(Protocol):
+    """Mode shapes along the track of a body."""
+
+    def rows(self, s: ArrayLike, derivative: int) -> Array:
+        """d^j phi_k / ds^j at the stations `s` (S,), as (S, N); unit modal mass."""
+
+
+class Statics(Protocol):
+    """Static flexibility of a body along its track (elastic part only, see `ModalBody.influence`)."""
+
+    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S)."""
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
+        """The same for pairs: `x` and `s` are broadcast against each other."""
+
+    def own_weight_deflection(self, x: ArrayLike, derivative: int) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) under the body's own weight, per unit gravity."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModalBody:
+    """A body in modal coordinates with unit modal mass; SI units, w positive along gravity.
+
+    length              of the track, m
+    mass                of the whole body, kg
+    omega               (N,) rad/s, ascending; exactly 0.0 for rigid-body modes
+    participation       (N,) integral of phi_k over the body's mass, kg^(1/2): the modal force of its own
+                        weight is gravity times this
+    wave_number         (N,) 1/m, of each mode (N pi/L for a pinned beam), for the alias rule of moving loads
+    bending_stiffness   E I, N m^2: moment = -E I w'' (positive when it sags), shear = dM/ds = -E I w'''
+    dampers             (at, coefficient) pairs, m and N s/m: discrete dampers, which become ties to ground
+    shapes, statics     where the functions of place come from
+    """
+
+    length: float
+    mass: float
+    omega: Array
+    participation: Array
+    wave_number: Array
+    bending_stiffness: float
+    dampers: tuple[tuple[float, float], ...]
+    shapes: Shapes
+    statics: Statics
+
+    @property
+    def rigid_modes(self) -> int:
+        """Number of modes without stiffness (they come first)."""
+        return int(np.count_nonzero(self.omega == 0.0))
+
+    def shape(self, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j phi_k / ds^j, j = 0..3, at the stations `s` (S,) inside [0, length]; (S, N), kg^(-1/2) m^(-j).
+
+        Where a derivative jumps (at a spring) it is the limit from the right, at `length` from the left.
+        A row does not depend, bit for bit, on which other stations are asked for.
+        Raises BadInput for a station off the body or another derivative.
+        """
+        return self.shapes.rows(s, derivative)
+
+    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the static deflection at `x` (X,) per unit force at `s` (S,); (X, S), m^(1-j)/N.
+
+        The sum of phi_k(x) phi_k(s)/omega_k^2 over *all* elastic modes. For a body with rigid-body modes this
+        is the inertia relief: the force is balanced by the body's rigid acceleration and the result is
+        orthogonal to the rigid-body modes. Jumps and errors as in `shape`.
+        """
+        return self.statics.influence(x, s, derivative)
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """`influence` for pairs of places, broadcast against each other (sensors under a carriage: x = s)."""
+        return self.statics.influence_at(x, s, derivative)
+
+    def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) under own weight, per unit gravity; m^(1-j) / (m/s^2).
+
+        Raises BadInput for a body with rigid-body modes, which no static state can carry.
+        """
+        return self.statics.own_weight_deflection(x, derivative)

@@ -1,0 +1,248 @@
+"""Modes of a uniform Euler-Bernoulli beam on any set of pinned, clamped or elastic restraints.
+
+Hierarchical finite elements between the restraints, with the *curvature* as unknown. With q_n the orthonormal
+Legendre polynomials of an element, w'' = sum c_n q_n, w = z_0 + z_1 x + (w'' integrated twice), so that
+
+    strain energy   1/2 (|c|^2 + |t|^2),   t_j = sqrt(k_j) r_j[w] for every elastic restraint: the identity,
+    mass            1/2 |G (z, c)|^2,      G = coefficients of w in the same polynomials (a banded closed form).
+
+Rigid restraints and the compatibility of the t_j are linear constraints; with (z, c) = E y their solution that
+keeps the strain energy |y|^2, the singular values of G E are 1/omega and its left singular vectors are the
+modes of unit mass. No number is squared, and a Jacobi singular value decomposition keeps the relative accuracy of
+every frequency, from soft springs to the highest mode. All dimensionless: L = EI = rho A = 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from engine.bodies.beam_statics import Restraint, rigid_body_modes
+from engine.bodies.modal import Array
+
+_BLOCK = 256  # rows per matrix product: with blocks of one size a row's bits do not depend on the other rows
+_CHUNK = 16 * _BLOCK  # stations at a time: the polynomials stay in the cache
+_LAST_BIT = 1e-17
+
+
+@dataclass(frozen=True, eq=False)
+class UnitModes:
+    """Modes of the dimensionless beam: N modes on elements between `nodes` (E + 1,), in Legendre polynomials P_m.
+
+    omega (N,); integral (N,) of each shape; tables[j][e] (P_e, N): coefficients of the j-th derivative of
+    the shapes on element e.
+    """
+
+    nodes: Array
+    omega: Array
+    integral: Array
+    tables: tuple[tuple[Array, ...], ...]
+
+    def rows(self, x: Array, derivative: int) -> Array:
+        """d^j phi/dx^j at x (S,) in [0, 1], as (S, N); at an inner node from the right."""
+        result = np.empty((len(x), len(self.omega)))
+        element = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.nodes) - 2)
+        for e, table in enumerate(self.tables[derivative]):
+            here = np.flatnonzero(element == e)
+            if len(here):
+                left, right = self.nodes[e], self.nodes[e + 1]
+                local = np.clip((2.0 * x[here] - left - right) / (right - left), -1.0, 1.0)
+                result[here] = _series(local, table)
+        return result
+
+
+def _series(local: Array, table: Array) -> Array:
+    """Legendre series `table` (P, N) at `local` (S,) in [-1, 1], as (S, N)."""
+    count = len(local)
+    padded = np.zeros(-(-count // _BLOCK) * _BLOCK)
+    padded[:count] = local
+    result = np.empty((len(padded), table.shape[1]))
+    for start in range(0, len(padded), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        basis = _legendre(padded[part], len(table))
+        stacked = basis.reshape(len(table), -1, _BLOCK).transpose(1, 2, 0)
+        result[part] = np.matmul(stacked, table).reshape(-1, table.shape[1])
+    return result[:count]
+
+
+def _legendre(x: Array, terms: int) -> Array:
+    """P_0 to P_(terms - 1) at x (S,), as (terms, S)."""
+    basis = np.ones((terms, len(x)))
+    basis[1] = x
+    for n in range(1, terms - 1):
+        basis[n + 1] = ((2 * n + 1) / (n + 1)) * x * basis[n] - (n / (n + 1)) * basis[n - 1]
+    return basis
+
+
+@lru_cache(maxsize=64)
+def unit_modes(restraints: tuple[Restraint, ...], modes: int) -> UnitModes:
+    """Modes of the dimensionless beam; cached, as the lanes of a study often share them."""
+    space = _CurvatureSpace.between(restraints, modes)
+    rigid_lines = rigid_body_modes(restraints)
+    rigid = space.deflection[:, :2] @ rigid_lines.T
+    embedding = _embedding(space, restraints)
+    factor = space.deflection @ embedding
+    factor -= rigid @ (rigid.T @ factor)
+    held = min(modes, len(rigid_lines))
+    periods, left, right = _jacobi_svd(factor)
+    omega = np.concatenate([np.zeros(held), 1.0 / periods[: modes - held]])
+    shapes = np.hstack([rigid[:, :held], left[:, : modes - held]])
+    curvature = np.zeros((space.size, modes))
+    curvature[:, held:] = embedding[2:] @ _stresses(factor, shapes[:, held:], right, omega[held:]) * omega[held:]
+    sign = _orientation(space.tables(shapes, 2), space.nodes, modes)
+    return space.modes(omega, shapes * sign, curvature * sign)
+
+
+@dataclass(frozen=True, eq=False)
+class _CurvatureSpace:
+    """Trial functions (z_0, z_1, c): a line plus a curvature of `terms[e]` Legendre polynomials on element e.
+
+    deflection, slope: coefficients of w and w' in the elements' orthonormal polynomials, two and one more per
+    element than the curvature; node_value, node_slope (E + 1, 2 + size): w and w' at the nodes.
+    """
+
+    nodes: Array
+    terms: tuple[int, ...]
+    deflection: Array
+    slope: Array
+    node_value: Array
+    node_slope: Array
+
+    @classmethod
+    def between(cls, restraints: Sequence[Restraint], modes: int) -> _CurvatureSpace:
+        """Elements between the restraints, fine enough for `modes` modes at the accuracy of float64."""
+        nodes = np.unique([0.0, 1.0, *(one.at for one in restraints)])
+        highest = math.pi * (modes + len(restraints) + 1)  # each restraint raises a mode by one place at most
+        terms = tuple(_terms(0.5 * highest * h) for h in np.diff(nodes))
+        size = sum(terms)
+        value, slope = np.eye(2, 2 + size)
+        values, slopes, deflections, rotations = [value], [slope], [], []
+        start = 2
+        for h, p in zip(np.diff(nodes), terms, strict=True):
+            once = 0.5 * h * _integral(p)
+            rotation, deflection = np.zeros((p + 1, 2 + size)), np.zeros((p + 2, 2 + size))
+            rotation[:, start : start + p] = once
+            rotation[0] += math.sqrt(h) * slope
+            deflection[:, start : start + p] = 0.5 * h * _integral(p + 1) @ once
+            deflection[0] += math.sqrt(h) * (value + 0.5 * h * slope)
+            deflection[1] += math.sqrt(h / 12.0) * h * slope
+            value = value + math.sqrt(h) * rotation[0]
+            slope = slope.copy()
+            slope[start] += math.sqrt(h)
+            values.append(value)
+            slopes.append(slope)
+            deflections.append(deflection)
+            rotations.append(rotation)
+            start += p
+        return cls(nodes, terms, np.vstack(deflections), np.vstack(rotations), np.array(values), np.array(slopes))
+
+    @property
+    def size(self) -> int:
+        """Number of curvature coefficients."""
+        return sum(self.terms)
+
+    def tables(self, coefficients: Array, more: int) -> tuple[Array, ...]:
+        """Coefficients in orthonormal polynomials, `more` per element than the curvature's, as series of P_m."""
+        found, start = [], 0
+        for h, p in zip(np.diff(self.nodes), self.terms, strict=True):
+            norms = np.sqrt((2.0 * np.arange(p + more) + 1.0) / h)
+            found.append(coefficients[start : start + p + more] * norms[:, None])
+            start += p + more
+        return tuple(found)
+
+    def modes(self, omega: Array, shapes: Array, curvature: Array) -> UnitModes:
+        """Tables of all derivatives, each from the coefficients that hold it best (no differentiation of w)."""
+        lines = np.linalg.lstsq(self.deflection[:, :2], shapes - self.deflection[:, 2:] @ curvature, rcond=None)[0]
+        slope = self.slope @ np.vstack([lines, curvature])
+        widths = np.diff(self.nodes)
+        bending = self.tables(curvature, 0)
+        shear = tuple(
+            np.polynomial.legendre.legder(table) * (2.0 / h) for table, h in zip(bending, widths, strict=True)
+        )
+        deflection = self.tables(shapes, 2)
+        integral = sum(table[0] * h for table, h in zip(deflection, widths, strict=True))
+        return UnitModes(self.nodes, omega, np.asarray(integral), (deflection, self.tables(slope, 1), bending, shear))
+
+
+def _terms(wave: float) -> int:
+    """Legendre terms on [-1, 1] that hold exp(i wave x) to the last bit: wave^n/(2n+1)!! bounds the next ones."""
+    n, bound = 0, 1.0
+    while n < wave or bound > _LAST_BIT:
+        n += 1
+        bound *= wave / (2 * n + 1)
+    return max(n, 5)
+
+
+def _integral(p: int) -> Array:
+    """(p + 1, p): integral from -1 of orthonormal Legendre polynomials on [-1, 1], in the same polynomials."""
+    n = np.arange(p)
+    up = 1.0 / np.sqrt((2.0 * n + 1.0) * (2.0 * n + 3.0))
+    matrix = np.zeros((p + 1, p))
+    matrix[n + 1, n] = up
+    matrix[n[1:] - 1, n[1:]] = -up[:-1]
+    matrix[0, 0] = 1.0
+    return matrix
+
+
+def _embedding(space: _CurvatureSpace, restraints: Sequence[Restraint]) -> Array:
+    """(z, c) = E y with strain energy |y|^2/2 for the curvature and all elastic restraints, none for rigid motion.
+
+    Restraints: sqrt(d) t - R_c c = R_z z. As many as fix the lines z (stiff ones first) are solved for z; the
+    others constrain (t, c), and an orthonormal basis of what they leave keeps the energy.
+    """
+    from scipy.linalg import qr  # here, as scipy is not needed to import the engine
+
+    kinds = (space.node_value, space.node_slope)
+    rows = [kinds[one.order][np.searchsorted(space.nodes, one.at)] for one in restraints]
+    functionals = np.array(rows).reshape(len(rows), 2 + space.size)
+    on_lines = functionals[:, :2]
+    compliance = np.array([one.compliance for one in restraints])
+    soft = np.flatnonzero(compliance > 0.0)
+    stress = np.zeros((len(rows), len(soft) + space.size))
+    stress[soft, np.arange(len(soft))] = np.sqrt(compliance[soft])
+    stress[:, len(soft) :] = -functionals[:, 2:]
+
+    rank = 2 - len(rigid_body_modes(restraints))
+    weight = 1.0 / np.sqrt(compliance + 0.01)  # the beam's own compliance, 1/48 and less
+    order = qr((on_lines * weight[:, None]).T, mode="r", pivoting=True)[1] if rank else np.arange(len(rows))
+    base, others = order[:rank], order[rank:]
+    lines = np.linalg.pinv(on_lines[base]) @ stress[base] if rank else np.zeros((2, stress.shape[1]))
+    embedding = np.vstack([lines, np.eye(space.size, stress.shape[1], k=len(soft))])
+    if not len(others):
+        return embedding
+    constraints = stress[others] - on_lines[others] @ lines
+    basis = qr(constraints.T)[0]
+    return np.asarray(embedding @ basis[:, len(others) :])
+
+
+def _jacobi_svd(matrix: Array) -> tuple[Array, Array, Array]:
+    """Singular values (descending) and vectors with high relative accuracy, whatever the scale of the columns."""
+    from scipy.linalg.lapack import dgejsv
+
+    values, left, right, work, _, info = dgejsv(matrix, joba=0, jobu=0, jobv=0, jobr=0, jobp=0)
+    if info != 0:
+        raise ArithmeticError(f"modes of a beam: dgejsv did not converge (info {info})")
+    return values * (work[0] / work[1]), left, right
+
+
+def _stresses(factor: Array, shapes: Array, right: Array, omega: Array) -> Array:
+    """Right singular vectors, each entry from the source that rounds it less.
+
+    The decomposition rounds all entries alike; factor^T shapes omega rounds in proportion to the column, which
+    keeps the high polynomials of the low modes clean (the third derivative multiplies them by their degree squared).
+    """
+    projected = (factor.T @ shapes) * omega
+    rounding = np.linalg.norm(factor, axis=0)[:, None] * omega
+    return np.where(rounding < 1.0, projected, right[:, : len(omega)])
+
+
+def _orientation(tables: tuple[Array, ...], nodes: Array, modes: int) -> Array:
+    """+1 or -1 per mode: the first place that reaches half of the largest value becomes positive."""
+    sketch = UnitModes(nodes, np.zeros(modes), np.zeros(modes), (tables,))
+    values = sketch.rows(np.linspace(0.0, 1.0, 16 * modes + 1), 0)
+    first = np.argmax(np.abs(values) >= 0.5 * np.abs(values).max(axis=0), axis=0)
+    return np.where(values[first, np.arange(modes)] < 0.0, -1.0, 1.0)

@@ -1,0 +1,41 @@
+"""Conditions between several numbers of a study, written once for one value and for whole columns of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+Verdict = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A condition on some numbers of a study.
+
+    where: dotted key that an error names. needs: dotted keys of the numbers that decide.
+    holds: takes those numbers in this order, as floats or arrays that broadcast; True where the condition is met.
+    """
+
+    where: str
+    needs: tuple[str, ...]
+    holds: Callable[..., Any]
+    what: str
+    expected: str
+
+    def met(self, values: Mapping[str, Any]) -> Verdict:
+        """Verdict for values by dotted key, of their broadcast shape."""
+        return np.asarray(self.holds(*(values[key] for key in self.needs)), dtype=bool)
+
+    def received(self, values: Mapping[str, Any]) -> str:
+        """The deciding numbers in words, for an error."""
+        return ", ".join(f"{key} = {values[key]:.10g}" for key in self.needs[:6])
+
+
+def on_body(where: str, needs: tuple[str, str], what: str) -> Check:
+    """A place on a body: needs names the place and the body's length."""
+    return Check(where, needs, lambda at, length: (at >= 0) & (at <= length), what, "0 to the body's length")

@@ -1,0 +1,252 @@
+"""A study file as text and as plain data: TOML that is safe to look at, or a refusal that names the place."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from stat import S_ISREG
+from typing import Any, NoReturn
+
+import numpy as np
+
+from results_schema.errors import BadInput
+
+MAX_BYTES = 1_000_000
+MAX_DEPTH = 32
+MAX_INTEGER = 2**63 - 1
+FLOAT_DIGITS = 1000
+INTEGER_DIGITS = 4300  # Python itself refuses to read decimal integers that are longer
+
+# A key of a hundred parts or more. TOML allows it, the reader takes quadratic time and memory for it.
+_LONG_KEY = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""",
+)
+_PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the data came from: the file's name as the user gave it ("" for keywords), its text and SHA-256."""
+
+    name: str
+    text: str
+    sha256: str
+
+    def where(self, key: str = "", line: int | None = None) -> str:
+        """The place of a fault in words.
+
+        >>> Source("bed.toml", "", "").where("body.bed.length", line=7)
+        'bed.toml, line 7: body.bed.length'
+        """
+        place = ", ".join(part for part in (self.name, f"line {line}" if line else "") if part)
+        return printable(": ".join(part for part in (place, key) if part), 400)
+
+
+@dataclass(frozen=True)
+class Document:
+    """Plain data (dict, list, str, bool, int within 64 bits, finite float, dates) with its source."""
+
+    data: dict[str, Any]
+    source: Source
+
+
+class _Overflow(str):
+    """The text of a float that is not finite; kept as text until the key is known."""
+
+
+def read_document(path_or_text: str | Path) -> Document:
+    """Read a TOML file, or TOML text if the argument is a string with a line break.
+
+    Raises BadInput (faults 1, 4, 5) for a file that cannot be read, is larger than 1 MB or is not UTF-8, for TOML
+    errors with their line, and for numbers that are not finite or beyond 64 bits with their key.
+    """
+    if isinstance(path_or_text, str) and "\n" in path_or_text:
+        name, raw = "", path_or_text.encode("utf-8", "surrogatepass")
+    else:
+        name, raw = str(path_or_text), _file_bytes(path_or_text)
+    source = Source(name, _text(name, raw), hashlib.sha256(raw).hexdigest())
+    return Document(_plain_table(_parsed(source), source), source)
+
+
+def document_of(data: Mapping[str, Any], name: str = "") -> Document:
+    """The document of data given from Python; its text is the data written as TOML.
+
+    numpy numbers and arrays become plain ones.
+
+    >>> document_of({"gravity": 9.81, "body": {"bed": {"length": np.float64(15)}}}).source.text
+    'gravity = 9.81\\n\\n[body.bed]\\nlength = 15.0\\n'
+    """
+    plain = _plain_table(data, Source(name, "", ""))
+    text = write_document(plain)
+    return Document(plain, Source(name, text, hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()))
+
+
+def write_document(data: Mapping[str, Any]) -> str:
+    """TOML text of plain data; reading it gives the same data."""
+    blocks = [_block(header, table) for header, table in _tables("", data)]
+    return "\n".join(block for block in blocks if block)
+
+
+def printable(text: str, limit: int) -> str:
+    """Text on one line of bounded length; control characters, which a terminal would obey, as escapes."""
+    text = text if len(text) <= limit else f"{text[: limit - 3]}..."
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shortened(value: object, limit: int = 60) -> str:
+    """A value as the user would have written it, on one line of bounded length."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        text = f"[{', '.join(shortened(item) for item in value[:8])}{', ...' if len(value) > 8 else ''}]"
+    else:
+        text = _literal(value) if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
+    return printable(text, limit)
+
+
+def _file_bytes(path: str | Path) -> bytes:
+    name = str(path)
+    try:
+        if not S_ISREG(Path(path).stat().st_mode):
+            raise BadInput("this is not a file", where=name, expected="a study file (TOML)")
+        with open(path, "rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise BadInput(f"the study file cannot be read: {reason}", where=shortened(name, 200)) from None
+    if len(raw) > MAX_BYTES:
+        size = f"{Path(path).stat().st_size} bytes"
+        raise BadInput("the file is too large", where=name, expected=f"at most {MAX_BYTES} bytes", received=size)
+    return raw
+
+
+def _text(name: str, raw: bytes) -> str:
+    if len(raw) > MAX_BYTES:
+        raise BadInput("the text is too large", where=name, expected=f"at most {MAX_BYTES} bytes")
+    source = Source(name, "", "")
+    if raw.startswith(b"\xef\xbb\xbf"):
+        raise BadInput(
+            "the file begins with a byte-order mark",
+            where=source.where(line=1),
+            remedy='save it as "UTF-8 without BOM"',
+        )
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise BadInput(
+            "this is not text",
+            where=source.where(line=line),
+            expected="TOML in UTF-8",
+            received=f"byte 0x{raw[error.start]:02x}",
+        ) from None
+
+
+def _parsed(source: Source) -> dict[str, Any]:
+    """The file's tables; numbers that are not finite as `_Overflow`."""
+    if long_key := _LONG_KEY.search(source.text):
+        _refuse_nesting(source, source.text.count("\n", 0, long_key.start()) + 1)
+    try:
+        return _tables_of(source.text)
+    except RecursionError:
+        _refuse_nesting(source, None)
+    except tomllib.TOMLDecodeError as error:
+        place = _PLACE.search(str(error))
+        lines = source.text.count("\n") + 1
+        line = int(place[1]) if place and place[1] else lines
+        raise BadInput(
+            f"not valid TOML: {_PLACE.sub('', str(error))}",
+            where=source.where(line=line),
+            received=shortened(source.text.split("\n")[line - 1].strip()),
+        ) from None
+
+
+def _refuse_nesting(source: Source, line: int | None) -> NoReturn:
+    raise BadInput("nested too deeply", where=source.where(line=line), expected=f"at most {MAX_DEPTH} levels")
+
+
+def _tables_of(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text, parse_float=_float_or_text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError:  # an integer that Python refuses to read: one beyond 64 bits stands in, and is refused by key
+        shorter = re.sub(rf"\d[\d_]{{{INTEGER_DIGITS - 1},}}", "9" * 40, text)
+        return tomllib.loads(shorter, parse_float=_float_or_text)
+
+
+def _float_or_text(text: str) -> float | _Overflow:
+    value = float(text)
+    return value if math.isfinite(value) and len(text) <= FLOAT_DIGITS else _Overflow(text)
+
+
+def _plain_table(data: Mapping[str, Any], source: Source) -> dict[str, Any]:
+    return {key: _plain(value, (key,), source) for key, value in data.items() if value is not None}
+
+
+def _plain(value: Any, keys: tuple[str, ...], source: Source) -> Any:
+    """A copy made of Python's own types; BadInput with the dotted key for numbers that no study can mean.
+
+    Keys with None, which only Python can give, are left out: they stand for the default.
+    """
+    if len(keys) > MAX_DEPTH:
+        _refuse_nesting(source, None)
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(item, (*keys, str(key)), source) for key, item in value.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(item, (*keys, str(index)), source) for index, item in enumerate(value)]
+    if isinstance(value, _Overflow) or (isinstance(value, float) and not math.isfinite(value)):
+        _refuse_number(value, "a finite number", keys, source)
+    if isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
+        _refuse_number(value, "an integer within 64 bits", keys, source)
+    return value
+
+
+def _refuse_number(value: str | float, expected: str, keys: Sequence[str], source: Source) -> NoReturn:
+    token = re.escape(value[:FLOAT_DIGITS]) if isinstance(value, str) else r"\d[\d_]{18,}"
+    found = [match.start() for match in re.finditer(rf"(?<![\w.]){token}(?![\w.])", source.text)]
+    line = source.text.count("\n", 0, found[0]) + 1 if len(found) == 1 else None
+    huge = isinstance(value, int) and value.bit_length() > 128
+    received = printable(value, 60) if isinstance(value, str) else "more than 128 bits" if huge else str(value)
+    raise BadInput("no usable number", where=source.where(".".join(keys), line), expected=expected, received=received)
+
+
+def _tables(header: str, table: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    yield header, table
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _tables(f"{header}.{_key(key)}" if header else _key(key), value)
+
+
+def _block(header: str, table: Mapping[str, Any]) -> str:
+    own = [f"{_key(key)} = {_literal(value)}\n" for key, value in table.items() if not isinstance(value, Mapping)]
+    needed = own or not table  # an empty table is still a table
+    return "".join([f"[{header}]\n" if header and needed else "", *own])
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _quoted(key)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, list):
+        return f"[{', '.join(_literal(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(key)} = {_literal(item)}" for key, item in value.items()) + "}"
+    return repr(value) if isinstance(value, int | float) else str(value)

@@ -1,0 +1,61 @@
+"""Which stations of a run are sampled: for a study's reduction, and for the histories that are kept."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.plan import Bucket, Plan
+from engine.settings import Every
+from engine.timeline import Segment, Timeline
+
+Counts = NDArray[np.int64]
+
+CYCLE_STATIONS = 200  # of a kept history over the last cycle
+WHOLE_STATIONS = 401  # of a kept history over a whole run
+
+
+def counts_shown(plan: Plan, bucket: Bucket) -> Counts:
+    """Stations of the kept histories by their count, ascending and distinct.
+
+    Over a cycle phase 0 is in and phase 1 is not; over a whole run both ends are.
+    """
+    first, last = bucket.tables.timeline.window
+    wanted = plan.study.output.histories
+    if wanted == "none":
+        return np.zeros(0, dtype=np.int64)
+    if isinstance(wanted, Every):
+        return np.arange(first, last + 1, wanted.every)
+    if wanted == "all":
+        return np.arange(first, last + 1)
+    if plan.window == "last-cycle":
+        steps = last - first
+        return np.unique(first + np.rint(np.arange(CYCLE_STATIONS) * (steps / CYCLE_STATIONS)).astype(np.int64))
+    return np.unique(np.rint(np.linspace(first, last, WHOLE_STATIONS)).astype(np.int64))
+
+
+def stations_shown(plan: Plan) -> int:
+    """The most stations that any kept history has."""
+    if plan.shown.size == 0:
+        return 0
+    return max(counts_shown(plan, bucket).size for bucket in plan.buckets)
+
+
+def counts_reduced(timeline: Timeline, stations: int) -> Counts:
+    """Equidistant stations of the last cycle (the last one left out), at least ``stations`` where there are so many.
+
+    Every 2^j-th step, so that out and back meet at equal places.
+    """
+    first, last = timeline.window
+    steps, stride = last - first, 1
+    while steps % (4 * stride) == 0 and steps // (2 * stride) >= stations:
+        stride *= 2
+    return np.arange(first, last, stride)
+
+
+def rows_sampled(segment: Segment, counts: Counts) -> Counts:
+    """(stations,) the row of a history that each station of a segment fills, or -1."""
+    found = np.full(segment.steps + 1, -1, dtype=np.int64)
+    low, high = np.searchsorted(counts, [segment.first, segment.first + segment.steps + 1])
+    found[counts[low:high] - segment.first] = np.arange(low, high)
+    return found

@@ -1,0 +1,125 @@
+"""What travels into the kernels: NamedTuples of float64 arrays, one row per meaning.
+
+Times are counted in steps: a velocity is a displacement per step, an acceleration one per step squared, so the
+step itself never appears in the inner loop. Variants are marched in lanes: every array of theirs is cut into blocks
+of ``LANES``, the block its first axis and the lane its last, so that no index in a loop over lanes is computed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+#: Lanes of variants marched together: two 512-bit or four 256-bit vectors.
+LANES = 16
+
+# columns of Ties.rows
+FORCE, CLOSED, RATE, CURVE = 0, 1, 2, 3
+
+
+class Ties(NamedTuple):
+    """The contacts along one segment: row n belongs to station n, station 0 is where the segment starts.
+
+    rows:  (stations, modes, ties, 4): p, w, A, B of mechanics section 2; the tie's force enters the modes through
+           p, and its kinematics read  P.q'' + A.q' + B.q  in step units, of which w = P + gamma A + beta B is the
+           implicit part.
+    drive: (stations, ties): the same kinematics of the track's own unevenness (per unit gravity where it is the
+           body's sag).
+    """
+
+    rows: FloatArray
+    drive: FloatArray
+
+
+class Lanes(NamedTuple):
+    """What differs from variant to variant.
+
+    stiffness (blocks, modes, LANES): (omega h)^2;  damping (blocks, modes, LANES): 2 zeta omega h;
+    gain (blocks, ties, LANES): m (kg), or c h for a damper;  load (blocks, ties, LANES): the tie's dead load times
+    h^2;  gravity, step (blocks, LANES): m/s^2, and h in s.
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    gain: FloatArray
+    load: FloatArray
+    gravity: FloatArray
+    step: FloatArray
+
+
+class State(NamedTuple):
+    """Modal displacement, velocity and acceleration, each (blocks, modes, LANES), in SI units; updated in place."""
+
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+
+
+class Watch(NamedTuple):
+    """Which sums of the modal coordinates are observed at every step, and how they make signals.
+
+    Channels are ordered by what they multiply: displacement, velocity, acceleration. A row array has one station
+    (a fixed sensor) or as many as the segment (a sensor under a carriage). Channel 0 is a displacement channel.
+
+    on_q, on_v, on_a (1 or stations, modes, channels);  signal (channels): which signal a channel adds to;
+    order (channels): the power of 1/h that makes it SI;  static (stations, signals, ties): deflection per unit
+    force that the kept modes miss;  offset (stations, signals): per unit gravity, in step units of offset_order
+    (signals), the power of 1/h that makes it SI;
+    counted (stations, signals): whether the station enters extremes and sums.
+    """
+
+    on_q: FloatArray
+    on_v: FloatArray
+    on_a: FloatArray
+    signal: IntArray
+    order: IntArray
+    static: FloatArray
+    offset: FloatArray
+    offset_order: IntArray
+    counted: BoolArray
+
+
+class Record(NamedTuple):
+    """What is kept of the signals; updated in place.
+
+    marks (blocks, signals, MARKS, LANES): the columns named below; counts are -1 where there is none.
+    sample (stations): row of ``history`` that a station fills, or -1.
+    history (blocks, rows, sensors, LANES): of the first signals, as many as it has room for; NaN where a signal
+    does not count.
+    """
+
+    marks: FloatArray
+    sample: IntArray
+    history: FloatArray
+
+
+# columns of Record.marks: extremes and the counts of the stations where they occur, the first count with a negative
+# value, the sum of squares, the magnitude beyond which a variant has diverged, the first count where it had
+LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, BELOW_AT, SQUARES, BOUND, DIVERGED_AT = 0, 1, 2, 3, 4, 5, 6, 7
+MARKS = 8
+
+
+class Blow(NamedTuple):
+    """An impulse on the body: ties that arrive or reverse at one instant, and all that are in contact then.
+
+    shape, slope (ties, modes): phi and phi' where each touches;  sag_slope (ties): slope of the body's own sag per
+    unit gravity;  arrives (ties): 1 for a carriage that has just come;  mass (blocks, ties, LANES): kg;
+    speed (blocks, ties, LANES): m/s.
+    """
+
+    shape: FloatArray
+    slope: FloatArray
+    sag_slope: FloatArray
+    arrives: FloatArray
+    mass: FloatArray
+    speed: FloatArray
+
+
+class Newmark(NamedTuple):
+    """Coefficients of Newmark's family (1959)."""
+
+    beta: float
+    gamma: float

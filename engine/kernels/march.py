@@ -1,0 +1,259 @@
+"""The march: implicit steps of every lane along one segment, one fused pass over the modes per step.
+
+Derivation (mechanics section 2), in step units: with predictors u*, v* and D = 1/(1 + gamma c + beta k),
+c_k* = (c v* + k u*) D, an equation of mode k gives  a_k = p_k D_k F - c_k*.  Put into the tie's kinematics
+G = P.a + A.(v* + gamma a) + B.(u* + beta a) this is  G = w.(D p) F - (w.c* - A.v* - B.u*),  and with
+F = load - gain (G + drive):
+
+    F = (load + gain (w.c* - A.v* - B.u* - drive)) / (1 + gain w.(D p))        one tie; r ties: an r x r system
+
+The pass over the modes corrects step n, observes it, predicts step n + 1 and gathers the sums of its tie equation.
+"""
+
+import numpy as np
+
+from engine.kernels.jit import kernel, piece
+from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE
+from engine.kernels.record import (
+    A_NOW,
+    CD,
+    FACTOR,
+    FIELDS,
+    GAIN,
+    GRAVITY,
+    KD,
+    LOAD,
+    Q_NOW,
+    RATE_0,
+    RATE_1,
+    RATE_2,
+    SUM,
+    TIE,
+    V_NOW,
+    C,
+    D,
+    U,
+    V,
+    copy_marks,
+    keep,
+    observe,
+)
+
+
+@piece
+def load_block(work, b, lanes, state, newmark, block):
+    """Coefficients of the step, and the predictors of the first one, of one block of lanes."""
+    beta, gamma = newmark.beta, newmark.gamma
+    for j in range(LANES):
+        h = lanes.step[block, j]
+        b[GRAVITY, j] = lanes.gravity[block, j]
+        b[RATE_0, j] = 1.0
+        b[RATE_1, j] = 1.0 / h
+        b[RATE_2, j] = 1.0 / (h * h)
+    for k in range(lanes.stiffness.shape[1]):
+        for j in range(LANES):
+            h = lanes.step[block, j]
+            c = lanes.damping[block, k, j]
+            s = lanes.stiffness[block, k, j]
+            d = 1.0 / (1.0 + gamma * c + beta * s)
+            a = state.a[block, k, j] * h * h
+            v = state.v[block, k, j] * h
+            u = state.q[block, k, j] + v + (0.5 - beta) * a
+            v += (1.0 - gamma) * a
+            work[k, D, j] = d
+            work[k, CD, j] = c * d
+            work[k, KD, j] = s * d
+            work[k, U, j] = u
+            work[k, V, j] = v
+            work[k, C, j] = c * d * v + s * d * u
+
+
+@piece
+def store_mode(work, b, force, state, newmark, block, k):
+    """Corrected state of mode k in SI units; ``force`` (lanes) is the sum of p F of the step just solved."""
+    for j in range(LANES):
+        a = work[k, D, j] * force[j] - work[k, C, j]
+        state.q[block, k, j] = work[k, U, j] + newmark.beta * a
+        state.v[block, k, j] = (work[k, V, j] + newmark.gamma * a) * b[RATE_1, j]
+        state.a[block, k, j] = a * b[RATE_2, j]
+
+
+@piece
+def advance(work, k, j, a, newmark):
+    """Correct one mode in one lane with its acceleration and predict the next step; returns q, v, u*, v*, c*."""
+    q = work[k, U, j] + newmark.beta * a
+    v = work[k, V, j] + newmark.gamma * a
+    v_next = v + (1.0 - newmark.gamma) * a
+    q_next = q + v + (0.5 - newmark.beta) * a
+    c = work[k, CD, j] * v_next + work[k, KD, j] * q_next
+    work[k, U, j] = q_next
+    work[k, V, j] = v_next
+    work[k, C, j] = c
+    return q, v, q_next, v_next, c
+
+
+@kernel
+def march_one(ties, lanes, state, watch, record, newmark, count):
+    """March one segment with a single tie.
+
+    Shapes as in ``layout``; ``count`` is the number of the scene's stations before this segment's station 0. The
+    state and the record are updated in place.
+    """
+    rows = ties.rows
+    stations, modes = rows.shape[0], rows.shape[1]
+    rates = watch.on_v.shape[1] + watch.on_a.shape[1]
+    # allocated here and not in a piece: only so does the compiler know their strides
+    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    b = np.zeros((TIE + 1, LANES))
+    y = np.empty((watch.offset.shape[1], LANES))
+    marks = np.empty((watch.offset.shape[1], MARKS, LANES))
+    force = np.empty(LANES)
+    for block in range(lanes.step.shape[0]):
+        load_block(work, b, lanes, state, newmark, block)
+        copy_marks(marks, record.marks[block])
+        history = record.history[block]
+        for j in range(LANES):
+            b[GAIN, j] = lanes.gain[block, 0, j]
+            b[LOAD, j] = lanes.load[block, 0, j]
+            b[SUM, j] = 0.0
+            b[FACTOR, j] = 0.0
+        for k in range(modes):
+            p, w, rate, curve = rows[1, k, 0, FORCE], rows[1, k, 0, CLOSED], rows[1, k, 0, RATE], rows[1, k, 0, CURVE]
+            for j in range(LANES):
+                b[SUM, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
+                b[FACTOR, j] += w * p * work[k, D, j]
+        for n in range(1, stations):
+            drive = ties.drive[n, 0]
+            for j in range(LANES):
+                b[TIE, j] = (b[LOAD, j] + b[GAIN, j] * (b[SUM, j] - drive * b[GRAVITY, j])) / (
+                    1.0 + b[GAIN, j] * b[FACTOR, j]
+                )
+                b[SUM, j] = 0.0
+                b[FACTOR, j] = 0.0
+            if n == stations - 1:
+                for k in range(modes):
+                    for j in range(LANES):
+                        force[j] = rows[n, k, 0, FORCE] * b[TIE, j]
+                    store_mode(work, b, force, state, newmark, block, k)
+            m = min(n + 1, stations - 1)
+            for k in range(modes):
+                p_now = rows[n, k, 0, FORCE]
+                p, w, rate, curve = rows[m, k, 0, FORCE], rows[m, k, 0, CLOSED], rows[m, k, 0, RATE], rows[m, k, 0, CURVE]
+                wp = w * p
+                if rates == 0:
+                    for j in range(LANES):
+                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
+                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        work[k, Q_NOW, j] = q
+                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
+                        b[FACTOR, j] += wp * work[k, D, j]
+                else:
+                    for j in range(LANES):
+                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
+                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        work[k, Q_NOW, j] = q
+                        work[k, V_NOW, j] = v
+                        work[k, A_NOW, j] = a
+                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
+                        b[FACTOR, j] += wp * work[k, D, j]
+            observe(y, work, b, watch, n)
+            keep(y, marks, history, watch, record.sample[n], n, float(count + n))
+        copy_marks(record.marks[block], marks)
+
+
+@piece
+def gather_ties(sums, factor, work, rows, n, k):
+    """Add mode k to the sums of every tie's equation at station n."""
+    for r in range(rows.shape[2]):
+        w, rate, curve = rows[n, k, r, CLOSED], rows[n, k, r, RATE], rows[n, k, r, CURVE]
+        for j in range(LANES):
+            sums[r, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
+        for s in range(rows.shape[2]):
+            wp = w * rows[n, k, s, FORCE]
+            for j in range(LANES):
+                factor[r, s, j] += wp * work[k, D, j]
+
+
+@piece
+def close_ties(b, sums, factor, ties, lanes, block, n):
+    """Solve (I + gain w.(D p)) F = load + gain (sum - drive) of one block and clear the sums.
+
+    Gauss without pivoting: the matrix is the identity plus a product that is positive wherever the march is stable.
+    """
+    count = sums.shape[0]
+    for r in range(count):
+        drive = ties.drive[n, r]
+        for j in range(LANES):
+            gain = lanes.gain[block, r, j]
+            b[TIE + r, j] = lanes.load[block, r, j] + gain * (sums[r, j] - drive * b[GRAVITY, j])
+            sums[r, j] = 0.0
+            for s in range(count):
+                factor[r, s, j] *= gain
+            factor[r, r, j] += 1.0
+    for r in range(count):
+        for s in range(r + 1, count):
+            for j in range(LANES):
+                ratio = factor[s, r, j] / factor[r, r, j]
+                b[TIE + s, j] -= ratio * b[TIE + r, j]
+                for t in range(r + 1, count):
+                    factor[s, t, j] -= ratio * factor[r, t, j]
+    for r in range(count - 1, -1, -1):
+        for s in range(r + 1, count):
+            for j in range(LANES):
+                b[TIE + r, j] -= factor[r, s, j] * b[TIE + s, j]
+        for j in range(LANES):
+            b[TIE + r, j] /= factor[r, r, j]
+    factor[:] = 0.0
+
+
+@piece
+def force_on_mode(force, b, rows, n, k):
+    """force = sum over the ties of p F of mode k at station n."""
+    for j in range(LANES):
+        force[j] = 0.0
+    for r in range(rows.shape[2]):
+        p = rows[n, k, r, FORCE]
+        for j in range(LANES):
+            force[j] += p * b[TIE + r, j]
+
+
+@kernel
+def march_many(ties, lanes, state, watch, record, newmark, count):
+    """March one segment with any number of ties; otherwise as ``march_one``."""
+    rows = ties.rows
+    stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
+    # allocated here and not in a piece: only so does the compiler know their strides
+    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    b = np.zeros((TIE + many, LANES))
+    y = np.empty((watch.offset.shape[1], LANES))
+    marks = np.empty((watch.offset.shape[1], MARKS, LANES))
+    force = np.empty(LANES)
+    sums = np.zeros((many, LANES))
+    factor = np.zeros((many, many, LANES))
+    for block in range(lanes.step.shape[0]):
+        load_block(work, b, lanes, state, newmark, block)
+        copy_marks(marks, record.marks[block])
+        history = record.history[block]
+        sums[:] = 0.0
+        factor[:] = 0.0
+        for k in range(modes):
+            gather_ties(sums, factor, work, rows, 1, k)
+        for n in range(1, stations):
+            close_ties(b, sums, factor, ties, lanes, block, n)
+            if n == stations - 1:
+                for k in range(modes):
+                    force_on_mode(force, b, rows, n, k)
+                    store_mode(work, b, force, state, newmark, block, k)
+            m = min(n + 1, stations - 1)
+            for k in range(modes):
+                force_on_mode(force, b, rows, n, k)
+                for j in range(LANES):
+                    a = work[k, D, j] * force[j] - work[k, C, j]
+                    q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                    work[k, Q_NOW, j] = q
+                    work[k, V_NOW, j] = v
+                    work[k, A_NOW, j] = a
+                gather_ties(sums, factor, work, rows, m, k)
+            observe(y, work, b, watch, n)
+            keep(y, marks, history, watch, record.sample[n], n, float(count + n))
+        copy_marks(record.marks[block], marks)

@@ -1,0 +1,97 @@
+"""Pieces of the march that observe the modes, make signals of them and keep extremes, sums and samples.
+
+Extremes are judged by forms like ``old if x <= old else x``, which let a NaN through instead of swallowing it.
+"""
+
+import numpy as np
+
+from engine.kernels.jit import piece
+from engine.kernels.layout import (
+    BELOW_AT,
+    BOUND,
+    DIVERGED_AT,
+    LANES,
+    LARGEST,
+    LARGEST_AT,
+    MARKS,
+    SMALLEST,
+    SMALLEST_AT,
+    SQUARES,
+)
+
+# rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
+SUM, FACTOR, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, TIE = range(9)
+# fields of the per-mode work array
+U, V, C, D, CD, KD, Q_NOW, V_NOW, A_NOW = range(9)
+FIELDS = 9
+
+
+@piece
+def add_modes(y, work, b, row, field, order):
+    """y += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours."""
+    for k in range(0, work.shape[0], 4):
+        r0, r1, r2, r3 = row[k], row[k + 1], row[k + 2], row[k + 3]
+        for j in range(LANES):
+            y[j] += b[RATE_0 + order, j] * (
+                (r0 * work[k, field, j] + r1 * work[k + 1, field, j])
+                + (r2 * work[k + 2, field, j] + r3 * work[k + 3, field, j])
+            )
+
+
+@piece
+def observe(y, work, b, watch, n):
+    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force."""
+    for i in range(y.shape[0]):
+        offset, order = watch.offset[n, i], watch.offset_order[i]
+        for j in range(LANES):
+            y[i, j] = offset * b[GRAVITY, j] * b[RATE_0 + order, j]
+        for r in range(watch.static.shape[2]):
+            missed = watch.static[n, i, r]
+            if missed != 0.0:
+                for j in range(LANES):
+                    y[i, j] += missed * (b[TIE + r, j] * b[RATE_2, j])
+    of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
+    for c in range(of_q):
+        row = watch.on_q[n if watch.on_q.shape[0] > 1 else 0, c]
+        add_modes(y[watch.signal[c]], work, b, row, Q_NOW, watch.order[c])
+    for c in range(of_v):
+        row = watch.on_v[n if watch.on_v.shape[0] > 1 else 0, c]
+        add_modes(y[watch.signal[of_q + c]], work, b, row, V_NOW, watch.order[of_q + c])
+    for c in range(of_a):
+        row = watch.on_a[n if watch.on_a.shape[0] > 1 else 0, c]
+        add_modes(y[watch.signal[of_q + of_v + c]], work, b, row, A_NOW, watch.order[of_q + of_v + c])
+
+
+@piece
+def copy_marks(to, of):
+    """Copy the marks of one block; the march works on an array of its own, whose layout the compiler knows."""
+    for i in range(of.shape[0]):
+        for f in range(MARKS):
+            for j in range(LANES):
+                to[i, f, j] = of[i, f, j]
+
+
+@piece
+def keep(y, marks, history, watch, sample, n, now):
+    """Update extremes, sums and samples of every signal with station n; ``now`` counts stations of the scene."""
+    for i in range(y.shape[0]):
+        if watch.counted[n, i]:
+            news = 0
+            for j in range(LANES):
+                x = y[i, j]
+                news |= 0 if (x <= marks[i, LARGEST, j]) & (x >= marks[i, SMALLEST, j]) else 1
+                marks[i, SQUARES, j] += x * x
+            if news != 0:
+                for j in range(LANES):
+                    x, high, low = y[i, j], marks[i, LARGEST, j], marks[i, SMALLEST, j]
+                    high_at, low_at, below_at = marks[i, LARGEST_AT, j], marks[i, SMALLEST_AT, j], marks[i, BELOW_AT, j]
+                    bad_at, bound = marks[i, DIVERGED_AT, j], marks[i, BOUND, j]
+                    marks[i, LARGEST, j] = high if x <= high else x
+                    marks[i, LARGEST_AT, j] = high_at if x <= high else now
+                    marks[i, SMALLEST, j] = low if x >= low else x
+                    marks[i, SMALLEST_AT, j] = low_at if x >= low else now
+                    marks[i, BELOW_AT, j] = now if (x < 0.0) & (below_at < 0.0) else below_at
+                    marks[i, DIVERGED_AT, j] = bad_at if (abs(x) <= bound) | (bad_at >= 0.0) else now
+        if sample >= 0 and i < history.shape[1]:
+            for j in range(LANES):
+                history[sample, i, j] = y[i, j] if watch.counted[n, i] else np.nan

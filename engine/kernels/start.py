@@ -1,0 +1,136 @@
+"""What happens at one instant: consistent accelerations, impulses, and the observation of a segment's first station.
+
+These run once per segment, so they are written lane by lane for reading, not for pace.
+"""
+
+import numpy as np
+
+from engine.kernels.jit import kernel, piece
+from engine.kernels.layout import CURVE, FORCE, LANES, RATE
+from engine.kernels.record import A_NOW, FIELDS, GRAVITY, Q_NOW, RATE_0, RATE_1, RATE_2, TIE, V_NOW, keep, observe
+
+
+@piece
+def solve_in_place(matrix, x):
+    """Gauss with partial pivoting of a small dense system, the solution left in x."""
+    count = x.shape[0]
+    for r in range(count):
+        pivot = r
+        for s in range(r + 1, count):
+            if abs(matrix[s, r]) > abs(matrix[pivot, r]):
+                pivot = s
+        for t in range(count):
+            matrix[r, t], matrix[pivot, t] = matrix[pivot, t], matrix[r, t]
+        x[r], x[pivot] = x[pivot], x[r]
+        for s in range(r + 1, count):
+            ratio = matrix[s, r] / matrix[r, r]
+            for t in range(r, count):
+                matrix[s, t] -= ratio * matrix[r, t]
+            x[s] -= ratio * x[r]
+    for r in range(count - 1, -1, -1):
+        for s in range(r + 1, count):
+            x[r] -= matrix[r, s] * x[s]
+        x[r] /= matrix[r, r]
+
+
+@piece
+def tie_row(rows, k, r):
+    """P, A, B of mode k in tie r at station 0; P is what w holds there, for no step is implicit at an instant."""
+    return rows[0, k, r, 1], rows[0, k, r, RATE], rows[0, k, r, CURVE]
+
+
+@kernel
+def settle(ties, lanes, state):
+    """Accelerations that satisfy the equations of motion at station 0, for the given displacements and velocities.
+
+    The row w of station 0 holds P alone. F = load - gain (P.a + A.v + B.u + drive), a = p F - c v - k u.
+    """
+    rows = ties.rows
+    modes, many = rows.shape[1], rows.shape[2]
+    matrix = np.empty((many, many))
+    force = np.empty(many)
+    for block in range(lanes.step.shape[0]):
+        for j in range(LANES):
+            h = lanes.step[block, j]
+            for r in range(many):
+                gain = lanes.gain[block, r, j]
+                total = -ties.drive[0, r] * lanes.gravity[block, j]
+                for s in range(many):
+                    matrix[r, s] = 0.0
+                for k in range(modes):
+                    inertial, rate, curve = tie_row(rows, k, r)
+                    u, v = state.q[block, k, j], state.v[block, k, j] * h
+                    elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
+                    total += inertial * elastic - rate * v - curve * u
+                    for s in range(many):
+                        matrix[r, s] += gain * inertial * rows[0, k, s, FORCE]
+                matrix[r, r] += 1.0
+                force[r] = lanes.load[block, r, j] + gain * total
+            solve_in_place(matrix, force)
+            for k in range(modes):
+                u, v = state.q[block, k, j], state.v[block, k, j] * h
+                a = -lanes.damping[block, k, j] * v - lanes.stiffness[block, k, j] * u
+                for r in range(many):
+                    a += rows[0, k, r, FORCE] * force[r]
+                state.a[block, k, j] = a / (h * h)
+
+
+@kernel
+def strike(blow, gravity, state):
+    """Impulses of ties: dq' = -(I + m phi phi^T)^-1 m phi jump (mechanics section 5), all ties at once.
+
+    The jump of tie r is the velocity that its contact point has and the carriage has not: ``arrives`` phi.q' +
+    ``speed`` (phi'.q + g sag'), speed in m/s being that of an arriving carriage or the change of a reversing one.
+    """
+    many, modes = blow.shape.shape
+    matrix = np.empty((many, many))
+    impulse = np.empty(many)
+    for block in range(gravity.shape[0]):
+        for j in range(LANES):
+            for r in range(many):
+                rate, slope = 0.0, blow.sag_slope[r] * gravity[block, j]
+                for k in range(modes):
+                    rate += blow.shape[r, k] * state.v[block, k, j]
+                    slope += blow.slope[r, k] * state.q[block, k, j]
+                for s in range(many):
+                    matrix[r, s] = 0.0
+                    for k in range(modes):
+                        matrix[r, s] += blow.mass[block, r, j] * blow.shape[r, k] * blow.shape[s, k]
+                matrix[r, r] += 1.0
+                impulse[r] = -blow.mass[block, r, j] * (blow.arrives[r] * rate + blow.speed[block, r, j] * slope)
+            solve_in_place(matrix, impulse)
+            for k in range(modes):
+                for r in range(many):
+                    state.v[block, k, j] += blow.shape[r, k] * impulse[r]
+
+
+@kernel
+def watch_start(ties, lanes, state, watch, record, count):
+    """Observe station 0 of a segment: extremes and samples, but not the sums of squares."""
+    rows = ties.rows
+    modes, many = rows.shape[1], rows.shape[2]
+    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    b = np.zeros((TIE + many, LANES))
+    y = np.empty((watch.offset.shape[1], LANES))
+    for block in range(lanes.step.shape[0]):
+        marks = record.marks[block]
+        squares = marks[:, 5].copy()
+        for j in range(LANES):
+            h = lanes.step[block, j]
+            b[GRAVITY, j] = lanes.gravity[block, j]
+            b[RATE_0, j] = 1.0
+            b[RATE_1, j] = 1.0 / h
+            b[RATE_2, j] = 1.0 / (h * h)
+            for k in range(modes):
+                work[k, Q_NOW, j] = state.q[block, k, j]
+                work[k, V_NOW, j] = state.v[block, k, j] * h
+                work[k, A_NOW, j] = state.a[block, k, j] * h * h
+            for r in range(many):
+                motion = ties.drive[0, r] * lanes.gravity[block, j]
+                for k in range(modes):
+                    inertial, rate, curve = tie_row(rows, k, r)
+                    motion += inertial * work[k, A_NOW, j] + rate * work[k, V_NOW, j] + curve * work[k, Q_NOW, j]
+                b[TIE + r, j] = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
+        observe(y, work, b, watch, 0)
+        keep(y, marks, record.history[block], watch, record.sample[0], 0, float(count))
+        marks[:, 5] = squares

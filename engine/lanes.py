@@ -1,0 +1,159 @@
+"""What differs from variant to variant without changing the scene's shape: mass, force, pace, damping, gravity.
+
+Every other swept number changes the scene itself, and the plan groups by it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.beam import Rayleigh
+from engine.kernels.layout import LANES, Lanes
+from engine.model import SceneModel
+from engine.scene import Study
+
+Array = NDArray[np.float64]
+
+#: Keys of numbers that a lane may have to itself.
+LANE_KEYS = re.compile(
+    r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?|carriage\.\w+\.(mass|force|delay|headway)"
+    r"|carriage\.\w+\.motion\.(speed|frequency)"
+)
+_DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
+
+
+@dataclass(frozen=True, eq=False)
+class LaneValues:
+    """Numbers of a study for some variants: swept columns (V,) by dotted key, the study's own value elsewhere."""
+
+    study: Study
+    columns: Mapping[str, Array]
+    size: int
+
+    def of(self, path: str) -> Array:
+        """(V,) values at a dotted key."""
+        found = self.columns.get(path)
+        if found is None:
+            value = self.study.value(path)
+            return np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
+        return found
+
+    def time_scale(self, carriage: str) -> Array:
+        """(V,) seconds per unit of a carriage's own tau."""
+        motion = self.study.carriage[carriage].motion
+        pace = next((key for key in ("speed", "frequency") if hasattr(motion, key)), None)
+        if pace is None:
+            return np.full(self.size, motion.time_scale)
+        return motion.time_scale * getattr(motion, pace) / self.of(f"carriage.{carriage}.motion.{pace}")
+
+    def start_time(self, carriage: str) -> Array:
+        """(V,) seconds after time 0 at which a carriage sets off."""
+        spec = self.study.carriage[carriage]
+        if spec.headway is None:
+            return self.of(f"carriage.{carriage}.delay")
+        return self.of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
+
+    def timing(self) -> dict[str, tuple[Array, Array]]:
+        """Per carriage pace and delay (V,) relative to the first one's time scale, rounded so that they group."""
+        first = self.time_scale(next(iter(self.study.carriage)))
+        return {
+            name: (rounded(first / self.time_scale(name)), rounded(self.start_time(name) / first))
+            for name in self.study.carriage
+        }
+
+    def moving_mass(self, carriage: str) -> Array:
+        """(V,) kg."""
+        inertial = self.study.carriage[carriage].inertial
+        return self.of(f"carriage.{carriage}.mass") if inertial else np.zeros(self.size)
+
+    def weight(self, carriage: str) -> Array:
+        """(V,) N along gravity."""
+        if self.study.carriage[carriage].inertial:
+            return self.of(f"carriage.{carriage}.mass") * self.of("gravity")
+        return self.of(f"carriage.{carriage}.force")
+
+    def damping_rates(self, body: str, omega: Array) -> Array:
+        """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
+        key = f"body.{body}.damping_ratio"
+        spec = getattr(self.study.body[body], "damping_ratio")
+        if isinstance(spec, Rayleigh):
+            return self.of(f"{key}.rayleigh.0") + self.of(f"{key}.rayleigh.1") * omega[:, None] ** 2
+        if isinstance(spec, tuple):
+            return np.stack([2.0 * self.of(f"{key}.{k}") * w for k, w in enumerate(omega)])
+        return 2.0 * self.of(key) * omega[:, None]
+
+
+def rounded(values: Array) -> Array:
+    """Values rounded to 40 binary digits."""
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.rint(mantissa * _DIGITS) / _DIGITS, exponent)
+
+
+def padded(variants: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Variants filled up to whole blocks by repeating the last one."""
+    return np.pad(variants, (0, -variants.size % LANES), mode="edge")
+
+
+def to_blocks(values: Array) -> Array:
+    """(..., V) as (V/LANES, ..., LANES)."""
+    cut = values.reshape(*values.shape[:-1], -1, LANES)
+    return np.ascontiguousarray(np.moveaxis(cut, -2, 0))
+
+
+def from_blocks(blocks: Array, size: int) -> Array:
+    """(blocks, ..., LANES) as (..., size)."""
+    joined = np.moveaxis(blocks, 0, -2)
+    return joined.reshape(*joined.shape[:-2], blocks.shape[0] * blocks.shape[-1])[..., :size]
+
+
+@dataclass(frozen=True, eq=False)
+class LaneTable:
+    """Numbers of whole blocks of variants of one scene, in SI units.
+
+    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mass, weight (blocks, ties, LANES): of the carriages, zero
+    for dampers and, mass, for carriages whose inertia does not act;  damper (ties,): N s/m;
+    time_scale, gravity (blocks, LANES).
+    """
+
+    omega: Array
+    rates: Array
+    mass: Array
+    weight: Array
+    damper: Array
+    time_scale: Array
+    gravity: Array
+
+    def steps_of(self, step: Array) -> Lanes:
+        """The kernels' lanes for a step h (blocks, LANES) in s."""
+        h = step[:, None, :]
+        return Lanes(
+            stiffness=(self.omega[:, None] * h) ** 2,
+            damping=self.rates * h,
+            gain=self.mass + self.damper[:, None] * h,
+            load=self.weight * h**2,
+            gravity=self.gravity,
+            step=step,
+        )
+
+
+def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
+    """The lanes of some variants, whose number must be a multiple of LANES."""
+    rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
+    none = np.zeros(values.size)
+    masses = [none if c.inertia == "force" else values.moving_mass(c.name) for c in model.carriages]
+    weights = [values.weight(c.name) for c in model.carriages]
+    dampers = [none] * len(model.dampers)
+    return LaneTable(
+        omega=model.omega,
+        rates=to_blocks(np.concatenate(rates)),
+        mass=to_blocks(np.stack(masses + dampers)),
+        weight=to_blocks(np.stack(weights + dampers)),
+        damper=np.array([0.0] * len(model.carriages) + [damper.coefficient for damper in model.dampers]),
+        time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
+        gravity=to_blocks(values.of("gravity")),
+    )

@@ -1,0 +1,166 @@
+"""One chunk of variants from start to end: initial state, segment after segment, what was observed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.histories import rows_sampled
+from engine.kernels.layout import (
+    BELOW_AT,
+    BOUND,
+    DIVERGED_AT,
+    LANES,
+    LARGEST,
+    LARGEST_AT,
+    MARKS,
+    SMALLEST,
+    SMALLEST_AT,
+    Record,
+    State,
+    Watch,
+)
+from engine.kernels.march import march_many, march_one
+from engine.kernels.start import settle, strike, watch_start
+from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table
+from engine.model import SceneModel
+from engine.signals import Sensor
+from engine.tables import SceneTables
+from engine.timeline import Segment
+from engine.track import tabulate_blow
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+DIVERGED = 1e6  # times its static value a signal has left every meaning
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """What a march of V variants leaves: marks (J, MARKS, V) of all signals over the recorded part, of the contact
+    forces before it (C, MARKS, V), the sensors' samples (H, S, V), and whether the final state is finite (V,)."""
+
+    marks: Array
+    guard: Array
+    history: Array
+    finite: NDArray[np.bool_]
+
+
+def march(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> Marched:
+    """March variants whose number is a multiple of LANES and sample the sensors at ``counts``; return the first
+    ``size`` of them."""
+    model, timeline = tables.model, tables.timeline
+    lanes = lane_table(model, values)
+    state = initial_state(model, lanes)
+    blocks = lanes.gravity.shape[0]
+    sensors = len(tables.sensors)
+    history = np.full((blocks, counts.size, sensors, lanes.gravity.shape[1]), np.nan)
+    marks = _blank_marks(blocks, len(tables.signals))
+    guard = _blank_marks(blocks, len(tables.signals) - sensors)
+    bounds = _bounds(tables, lanes)
+    marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, sensors:]
+    before = False
+    for segment in timeline.segments:
+        table = tables.table(segment)
+        watch = table.watch if segment.recorded else table.guard
+        unseen = segment.fresh or (segment.recorded and not before)
+        record = Record(
+            marks if segment.recorded else guard,
+            rows_sampled(segment, counts if segment.recorded else counts[:0]),
+            history,
+        )
+        _march_segment(tables, segment, lanes, state, (watch, record), unseen)
+        before = segment.recorded
+    finite = np.isfinite(state.q).all(axis=1) & np.isfinite(state.v).all(axis=1)
+    return Marched(
+        from_blocks(marks, size), from_blocks(guard, size), from_blocks(history, size), finite.reshape(-1)[:size]
+    )
+
+
+def _march_segment(
+    tables: SceneTables,
+    segment: Segment,
+    lanes: LaneTable,
+    state: State,
+    seen: tuple[Watch, Record],
+    unseen: bool,
+) -> None:
+    """One segment: the impulse and the new accelerations of its event, its first station, its steps."""
+    model, watch, record = tables.model, *seen
+    table = tables.table(segment)
+    stepped = lanes.steps_of(_step(tables, segment, lanes))
+    if segment.strikes:
+        active = np.array([*segment.active, *([False] * len(model.dampers))])
+        blow = tabulate_blow(model, segment, np.where(active[:, None], lanes.mass, 0.0), lanes.time_scale)
+        strike(blow, lanes.gravity, state)
+    if segment.fresh:
+        settle(table.ties, stepped, state)
+    if unseen:
+        watch_start(table.ties, stepped, state, watch, record, segment.first)
+    kernel = march_one if model.ties == 1 else march_many
+    kernel(table.ties, stepped, state, watch, record, tables.newmark, segment.first)
+
+
+def _step(tables: SceneTables, segment: Segment, lanes: LaneTable) -> Array:
+    """(blocks, LANES) step of a segment in s; free vibration lasts some first periods of the body."""
+    if not segment.free:
+        return lanes.time_scale * segment.step
+    steps = sum(part.steps for part in tables.timeline.segments if part.free)
+    period = 2.0 * math.pi / tables.model.first_omega
+    return np.full_like(lanes.time_scale, tables.timeline.free_periods * period / steps)
+
+
+def initial_state(model: SceneModel, lanes: LaneTable) -> State:
+    """Modal state at time 0, (blocks, N, LANES): undeformed and at rest, or the static equilibrium under the weights
+    at their first places. Coordinates count from the body's own sag where its weight acts."""
+    shape = lanes.rates.shape
+    q = np.zeros(shape)
+    for part in model.bodies:
+        if part.own_weight and model.study.start == "rest":
+            sag = part.modal.participation / part.modal.omega**2
+            q[:, part.modes] = -sag[:, None] * lanes.gravity[:, None]
+    if model.study.start == "equilibrium":
+        for r, carriage in enumerate(model.carriages):
+            if not carriage.rider.touches(0.0, 1e-9):
+                continue
+            part = model.bodies[carriage.body]
+            place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length)
+            soft = part.modal.shape(place.reshape(1))[0] / part.modal.omega**2
+            q[:, part.modes] += soft[:, None] * lanes.weight[:, r, None]
+    return State(q, np.zeros(shape), np.zeros(shape))
+
+
+def _blank_marks(blocks: int, signals: int) -> Array:
+    marks = np.zeros((blocks, signals, MARKS, LANES))
+    marks[:, :, LARGEST], marks[:, :, SMALLEST] = -np.inf, np.inf
+    marks[:, :, [LARGEST_AT, SMALLEST_AT, BELOW_AT, DIVERGED_AT]] = -1.0
+    return marks
+
+
+def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
+    """(blocks, signals, LANES) magnitudes beyond which a signal has diverged; infinite where no scale is known."""
+    model = tables.model
+    own = sum(part.modal.mass for part in model.bodies if part.own_weight)
+    weight = np.abs(lanes.weight[:, : len(model.carriages)]).sum(axis=1) + own * lanes.gravity
+    scale = _static_scales(tables) * DIVERGED
+    contact = DIVERGED * np.abs(lanes.weight[:, : len(model.carriages)])
+    sensors = scale[None, :, None] * weight[:, None]
+    found = np.concatenate([sensors, contact], axis=1)
+    return np.where(found > 0.0, found, np.inf)
+
+
+def _static_scales(tables: SceneTables) -> Array:
+    """(sensors,) a sensor's largest static reading per unit force over its body, rates at the highest frequency."""
+    found = []
+    for sensor in tables.sensors:
+        part = tables.model.bodies[sensor.body]
+        s = np.linspace(0.0, part.modal.length, 65)
+        x = s if sensor.under is not None else np.array([sensor.at])
+        displacement = Sensor(sensor.name, "displacement", sensor.body, sensor.at, sensor.under)
+        reader = displacement if sensor.offset_order else sensor
+        largest = np.abs(reader.flexibility(tables.model, x, s, "model")).max()
+        found.append(largest * part.modal.omega.max() ** sensor.offset_order)
+    return np.array(found)

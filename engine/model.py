@@ -1,0 +1,193 @@
+"""From a study's scene to arrays of modes: every body in modal coordinates, every carriage a tie, every damper a tie.
+
+A `SceneModel` is what variants share that differ only in mass, force, pace, damping and gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies import Beam
+from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.modal import ModalBody
+from engine.scene import Study
+from engine.timeline import Rider
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity
+
+Array = NDArray[np.float64]
+AUTO_MODES = 12
+
+Inertia = Literal["force", "mass", "mass-without-convective"]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPart:
+    """A body's place in the scene's modal coordinates.
+
+    modes: its slice of all modes. fibre_distance: m, NaN where it is not known. own_weight: gravity acts on it too.
+    """
+
+    name: str
+    modal: ModalBody
+    modes: slice
+    second_moment: float
+    fibre_distance: float
+    own_weight: bool
+
+
+@dataclass(frozen=True, eq=False)
+class CarriageTie:
+    """A carriage as the march sees it: its body's number, its way, and which of its inertia terms act."""
+
+    name: str
+    body: int
+    rider: Rider
+    inertia: Inertia
+
+
+@dataclass(frozen=True, eq=False)
+class DamperTie:
+    """A damper to ground at a place of a body: force -c w'."""
+
+    body: int
+    at: float
+    coefficient: float
+
+
+@dataclass(frozen=True, eq=False)
+class SceneModel:
+    """Bodies, carriages and dampers of one scene; modes of all bodies stand in one row."""
+
+    study: Study
+    bodies: tuple[BodyPart, ...]
+    carriages: tuple[CarriageTie, ...]
+    dampers: tuple[DamperTie, ...]
+
+    @property
+    def ties(self) -> int:
+        """Number of ties: carriages first, then dampers."""
+        return len(self.carriages) + len(self.dampers)
+
+    @cached_property
+    def omega(self) -> Array:
+        """(N,) natural frequencies of all bodies, rad/s."""
+        return np.concatenate([part.modal.omega for part in self.bodies])
+
+    @property
+    def leading_body(self) -> BodyPart:
+        """The body of the first carriage, whose first period and length make ratios."""
+        return self.bodies[self.carriages[0].body]
+
+    @property
+    def first_omega(self) -> float:
+        """Lowest elastic natural frequency of the leading body, rad/s."""
+        omega = self.leading_body.modal.omega
+        return float(omega[omega > 0.0][0])
+
+    @property
+    def riders(self) -> tuple[Rider, ...]:
+        """The ways of all carriages."""
+        return tuple(carriage.rider for carriage in self.carriages)
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """The model that this scene marches: the fullest of its carriages'."""
+        kinds = {carriage.inertia for carriage in self.carriages}
+        if "mass" in kinds:
+            return Fidelity.MASS
+        return Fidelity.MASS_WITHOUT_CONVECTIVE if "mass-without-convective" in kinds else Fidelity.FORCE
+
+    def sag(self, body: int, x: Array, derivative: int) -> Array:
+        """d^j/dx^j of a body's deflection under its own weight per unit gravity, zero where that does not act."""
+        part = self.bodies[body]
+        if not part.own_weight:
+            return np.zeros_like(x)
+        return part.modal.own_weight_deflection(x, derivative)
+
+
+def build_model(study: Study, paces: Mapping[str, float], delays: Mapping[str, float]) -> SceneModel:
+    """The model of a study without sweep.
+
+    paces: per carriage, the first carriage's time scale over its own. delays: per carriage, in the first one's time
+    scale. Raises BadInput where the scene cannot be marched.
+    """
+    if not study.carriage:
+        raise BadInput(
+            "nothing moves", where=study.source.where("carriage"), expected="at least one table [carriage.name]"
+        )
+    used = [name for name in study.body if _in_use(study, name)]
+    parts: list[BodyPart] = []
+    first = 0
+    for name in used:
+        part = _body_part(name, study.body[name], first)
+        parts.append(part)
+        first = part.modes.stop
+    carriages = []
+    for name, carriage in study.carriage.items():
+        body = used.index(carriage.on)
+        rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
+        carriages.append(CarriageTie(name, body, rider, _inertia(study.solver.fidelity, carriage.inertial)))
+    dampers = [DamperTie(i, at, c) for i, part in enumerate(parts) for at, c in part.modal.dampers]
+    model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers))
+    _check_rigid_modes(model)
+    return model
+
+
+def _in_use(study: Study, body: str) -> bool:
+    """Whether a body carries a carriage or a sensor."""
+    ridden = any(carriage.on == body for carriage in study.carriage.values())
+    return ridden or any(study.body_of(sensor) == body for sensor in study.sensor)
+
+
+def _inertia(fidelity: str, inertial: bool) -> Inertia:
+    """The terms of a carriage that act at a fidelity; "auto" is the carriage's own kind in full."""
+    if fidelity == "force" or not inertial:
+        return "force"
+    return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
+
+
+def _body_part(name: str, body: object, first: int) -> BodyPart:
+    """A body of the study in modal coordinates, its modes counted from ``first``."""
+    assert isinstance(body, Beam)
+    modes = AUTO_MODES if body.modes == "auto" else int(body.modes)
+    springs = tuple(Spring(s.at, s.stiffness, s.rotational, s.damping) for s in body.springs)
+    properties = BeamProperties(
+        length=body.length,
+        area=body.area,
+        second_moment=body.second_moment,
+        youngs_modulus=body.youngs_modulus,
+        density=body.density,
+        ends=body.ends,
+        supports=springs,
+    )
+    fibre = np.nan if body.fibre_distance is None else body.fibre_distance
+    modal = uniform_beam(properties, modes)
+    return BodyPart(name, modal, slice(first, first + modes), body.second_moment, fibre, body.own_weight)
+
+
+def _check_rigid_modes(model: SceneModel) -> None:
+    """A body that nothing holds has no static equilibrium and no sag, and needs a mode that bends."""
+    for part in model.bodies:
+        where = model.study.source.where(f"body.{part.name}.supports")
+        if part.modal.rigid_modes == len(part.modal.omega):
+            raise BadInput(
+                "only rigid-body modes are kept",
+                where=model.study.source.where(f"body.{part.name}.modes"),
+                expected=f"more than {part.modal.rigid_modes} modes",
+            )
+        if part.modal.rigid_modes and model.study.start == "equilibrium":
+            raise BadInput(
+                "nothing holds this body, so it has no static equilibrium to start from",
+                where=where,
+                expected="supports that hold it",
+                remedy='hold the body, or set initial = "rest"',
+            )
+        if part.modal.rigid_modes and part.own_weight:
+            raise BadInput("nothing holds this body against its own weight", where=where, remedy="own_weight = false")

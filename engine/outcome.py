@@ -1,0 +1,219 @@
+"""From what a march observed to the numbers of each variant: extremes, places, statuses, the study's own reduction."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.histories import counts_reduced, counts_shown, stations_shown
+from engine.kernels.layout import (
+    BELOW_AT,
+    DIVERGED_AT,
+    LARGEST,
+    LARGEST_AT,
+    SMALLEST,
+    SMALLEST_AT,
+    SQUARES,
+)
+from engine.lanes import LaneValues, padded
+from engine.march import Marched, march
+from engine.model import SceneModel
+from engine.plan import Bucket, Plan
+from engine.reduction import Cycle
+from engine.tables import SceneTables
+from results_schema.parts import Rows
+from results_schema.status import Status
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Flat = dict[str, NDArray[np.generic]]
+
+STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
+
+
+def run_chunk(plan: Plan, bucket: Bucket, variants: Counts) -> tuple[Flat, Rows | None]:
+    """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept."""
+    tables = bucket.tables
+    counts = np.zeros(0, dtype=np.int64)
+    if plan.reduction is not None:
+        counts = counts_reduced(tables.timeline, plan.reduction.stations)
+    values = plan.values(bucket, padded(variants))
+    marched = march(tables, values, counts, variants.size)
+    values = plan.values(bucket, variants)
+    flat: Flat = {
+        **_extremes(tables, marched),
+        **_contact_forces(tables, marched),
+        **_statics(tables, values),
+        **_reduced(plan, tables, values, counts, marched.history),
+    }
+    status, diverged_step = _status(tables.model, marched)
+    for name, array in flat.items():
+        if array.dtype == np.float64:
+            array[status >= Status.NOT_CONVERGED] = np.nan
+        flat[name] = array
+    flat |= {
+        "status": status,
+        "diverged_step": diverged_step,
+        "fidelity_used": np.full(variants.size, int(tables.model.fidelity), dtype=np.int8),
+        "modes_used": np.full(variants.size, tables.model.omega.size, dtype=np.int32),
+        "steps_used": np.full(variants.size, tables.steps, dtype=np.int32),
+    }
+    return flat, _histories(plan, bucket, variants)
+
+
+def _extremes(tables: SceneTables, marched: Marched) -> Flat:
+    """Largest and smallest value of every sensor, where the first carriage was then, and the root mean square."""
+    found: Flat = {}
+    counted = _counted(tables)
+    for j, sensor in enumerate(tables.sensors):
+        marks = marched.marks[j]
+        seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
+        found[f"{sensor.name}_max"] = np.where(seen, marks[LARGEST], np.nan)
+        found[f"{sensor.name}_min"] = np.where(seen, marks[SMALLEST], np.nan)
+        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, marks[LARGEST_AT])
+        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, marks[SMALLEST_AT])
+        found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / max(1, counted[j]))
+    return found
+
+
+def _counted(tables: SceneTables) -> list[int]:
+    """Number of steps at which every sensor counts."""
+    segments = [segment for segment in tables.timeline.segments if segment.recorded]
+    return [
+        sum(s.steps for s in segments if sensor.under is None or s.active[sensor.under]) for sensor in tables.sensors
+    ]
+
+
+def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
+    """Extremes of every contact force, and where it first was negative."""
+    found: Flat = {}
+    for c, carriage in enumerate(tables.model.carriages):
+        marks = marched.marks[len(tables.sensors) + c]
+        seen = marks[LARGEST_AT] >= 0.0
+        found[f"{carriage.name}_contact_force_max"] = np.where(seen, marks[LARGEST], np.nan)
+        found[f"{carriage.name}_contact_force_min"] = np.where(seen, marks[SMALLEST], np.nan)
+        place = tables.timeline.positions(c, marks[SMALLEST_AT])
+        found[f"{carriage.name}_contact_force_min_position"] = place
+        opened = _opened_at(tables, marched, c)
+        found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
+    return found
+
+
+def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
+    """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
+    marks = marched.marks[len(tables.sensors) + carriage]
+    if tables.model.carriages[carriage].inertia == "force":
+        return np.full(marks.shape[-1], -1.0)
+    early, late = marched.guard[carriage][BELOW_AT], marks[BELOW_AT]
+    return np.where(early >= 0.0, early, late)
+
+
+def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    """Status of every variant, and the first step at which it had diverged, or -1."""
+    bad = np.concatenate([marched.marks[:, DIVERGED_AT], marched.guard[:, DIVERGED_AT]])
+    first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
+    diverged = np.isfinite(first) | ~marched.finite
+    sensors = len(marched.marks) - len(marched.guard)
+    inertial = [c for c, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
+    below = np.concatenate(
+        [marched.marks[[sensors + c for c in inertial], BELOW_AT], marched.guard[inertial, BELOW_AT]]
+    )
+    separated = (below >= 0.0).any(axis=0)
+    status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))
+    status = np.where(diverged, np.int8(Status.DIVERGED), status).astype(np.int8)
+    return status, np.where(np.isfinite(first), first, -1.0).astype(np.int64)
+
+
+def _statics(tables: SceneTables, values: LaneValues) -> Flat:
+    """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
+    first, last = tables.timeline.window
+    counts = np.unique(np.rint(np.linspace(first, last, STATIC_STATIONS)).astype(np.int64))
+    unit = tables.static_at(counts)
+    weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
+    gravity = values.of("gravity")
+    found: Flat = {}
+    for j, sensor in enumerate(tables.sensors):
+        if weights.shape[0] == 1 and not np.any(unit.gravity[:, j]):
+            found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(weights[0])
+        else:
+            found[f"{sensor.name}_static"] = _largest_static(unit.force[:, j], unit.gravity[:, j], weights, gravity)
+    return found
+
+
+def _largest_static(force: Array, offset: Array, weights: Array, gravity: Array) -> Array:
+    """(V,) largest |sum of unit readings times weights + offset times gravity|, in pieces of variants."""
+    found = np.empty(gravity.size)
+    for first in range(0, gravity.size, 1024):
+        part = slice(first, first + 1024)
+        reading = offset[:, None] * gravity[part]
+        for r in range(weights.shape[0]):
+            reading = reading + force[:, r, None] * weights[r, part]
+        found[part] = np.abs(reading).max(axis=0)
+    return found
+
+
+def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts, history: Array) -> Flat:
+    """The study's own results from the cycle."""
+    if plan.reduction is None:
+        return {}
+    unit = tables.static_at(counts)
+    weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
+    static = unit.gravity[:, :, None] * values.of("gravity")
+    for r in range(weights.shape[0]):
+        static = static + unit.force[:, :, r, None] * weights[r]
+    first, last = tables.timeline.window
+    cycle = Cycle(
+        phase=(counts - first) / (last - first),
+        position=tables.timeline.positions(0, counts.astype(np.float64)),
+        history=history,
+        static=static,
+        static_slope=unit.slope[:, :, 0, None] * weights[0],
+        motion=tables.model.carriages[0].rider.motion,
+    )
+    return dict(plan.reduction(cycle))
+
+
+def _histories(plan: Plan, bucket: Bucket, variants: Counts) -> Rows | None:
+    """Histories of the kept ones among some variants, marched again with samples."""
+    kept = np.intersect1d(variants, plan.shown)
+    if kept.size == 0:
+        return None
+    tables = bucket.tables.with_accelerations
+    counts = counts_shown(plan, bucket)
+    values = plan.values(bucket, padded(kept))
+    marched = march(tables, values, counts, kept.size)
+    time_scale = plan.values(bucket, kept).time_scale(tables.model.carriages[0].name)
+    elapsed = _elapsed(tables, counts, time_scale)
+    arrays: dict[str, Array] = {"elapsed": elapsed}
+    for j, sensor in enumerate(tables.sensors):
+        arrays[sensor.name] = marched.history[:, j].T
+    for c, carriage in enumerate(tables.model.carriages):
+        path = tables.timeline.motion(c, counts.astype(np.float64))
+        arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], kept.size, axis=0)
+        arrays[f"{carriage.name}_speed"] = path.dS / time_scale[:, None]
+        arrays[f"{carriage.name}_acceleration_along"] = path.ddS / time_scale[:, None] ** 2
+    status, _ = _status(tables.model, marched)
+    for name, array in arrays.items():
+        if name != "elapsed":
+            array[status >= Status.NOT_CONVERGED] = np.nan
+    size = stations_shown(plan)
+    return Rows(kept, {name: _filled(np.ascontiguousarray(array), size) for name, array in arrays.items()})
+
+
+def _filled(array: Array, stations: int) -> Array:
+    return np.pad(array, ((0, 0), (0, stations - array.shape[1])), constant_values=np.nan)
+
+
+def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
+    """(V, H) seconds since time 0 of stations by their count."""
+    timeline = tables.timeline
+    index, tau = timeline.moments(counts.astype(np.float64))
+    found = tau * time_scale[:, None]
+    free = np.array([segment.free for segment in timeline.segments])[index]
+    if free.any():
+        start = next(segment.first for segment in timeline.segments if segment.free)
+        steps = timeline.steps - start
+        period = 2.0 * np.pi / tables.model.first_omega
+        rest = (counts - start) * (timeline.free_periods * period / steps)
+        found = found + np.where(free, rest, 0.0)
+    return found

@@ -1,0 +1,255 @@
+"""From a study to work: all variants, grouped by scene and step count, with sizes and times known before anything runs.
+
+Scene, step count and bucket of a variant are functions of that variant alone, so no result depends on its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.fidelity import Needs, check_fixed_steps, check_most_steps, needed_steps, round_up
+from engine.kernels.layout import LANES
+from engine.kernels.schemes import Scheme
+from engine.lanes import LANE_KEYS, LaneValues
+from engine.model import SceneModel, build_model
+from engine.reduction import Reduction
+from engine.scene import Study
+from engine.sweep import Cases, expand
+from engine.tables import SceneTables, Window
+from results_schema.errors import BadInput
+
+Counts = NDArray[np.int64]
+
+PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
+TASK_SECONDS = 0.4  # of one chunk: a stop waits no longer than that
+MOST_LANES = 65536  # of one chunk
+MOST_HISTORY_BYTES = 48 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
+MOST_MEMORY = 16 * 2**30
+SHOWN = 64  # variants whose histories are kept by default
+
+
+@dataclass(frozen=True, eq=False)
+class Bucket:
+    """Variants that share a scene and a step count; ``reason`` says which rule asked for that many."""
+
+    tables: SceneTables
+    variants: Counts
+    reason: str
+
+    @property
+    def scene(self) -> SceneModel:
+        """The shared scene."""
+        return self.tables.model
+
+    @property
+    def steps(self) -> int:
+        """Steps over one passage or cycle."""
+        return self.tables.steps
+
+    @property
+    def seconds_per_variant(self) -> float:
+        """Expected time on one thread."""
+        signals = 1.0 + 0.1 * len(self.tables.signals)
+        ties = self.scene.ties**1.5
+        return self.scene.omega.size * self.tables.timeline.steps * signals * ties / PACE
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All work of a study. ``base`` is the scene without sweep."""
+
+    study: Study
+    cases: Cases
+    buckets: tuple[Bucket, ...]
+    reduction: Reduction | None
+    shown: Counts
+    base: SceneModel
+
+    @property
+    def size(self) -> int:
+        """Number of variants."""
+        return self.cases.size
+
+    @property
+    def window(self) -> Window:
+        """What extremes and histories cover."""
+        return "whole" if self.reduction is None else "last-cycle"
+
+    @cached_property
+    def key(self) -> str:
+        """What finished parts belong to: the study's text and the kernels."""
+        from engine.kernels.jit import kernel_hash
+
+        return f"{self.study.source.sha256}-{kernel_hash()}"
+
+    @property
+    def seconds(self) -> float:
+        """Expected time of the march on one thread."""
+        return sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets)
+
+    @property
+    def numbers_per_variant(self) -> int:
+        """Floating-point results of one variant."""
+        sensors, carriages = len(self.study.sensor), len(self.study.carriage)
+        found = 6 * sensors + 4 * carriages + 4
+        if self.reduction is not None:
+            sizes = self.reduction.sizes(self.study)
+            found += sum(int(np.prod([sizes[d] for d in dims])) for dims in self.reduction.outputs(self.study).values())
+        return found
+
+    @property
+    def disk_bytes(self) -> int:
+        """Upper bound of the archive's size; the parts take as much until it is written."""
+        from engine.histories import stations_shown
+
+        shown = int(self.shown.size) * stations_shown(self) * (len(self.study.sensor) + 2)
+        return 8 * (self.size * self.numbers_per_variant + shown) + 65536
+
+    @property
+    def memory_bytes(self) -> int:
+        """Expected peak: results, a chunk per thread, and the program itself."""
+        return 300 * 2**20 + 3 * self.disk_bytes + 8 * MOST_HISTORY_BYTES
+
+    def lanes_per_chunk(self, bucket: Bucket) -> int:
+        """Variants of one task, by time and memory."""
+        lanes = TASK_SECONDS / bucket.seconds_per_variant
+        if self.reduction is not None:
+            rows = min(2 * self.reduction.stations, bucket.steps)
+            lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
+        return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
+
+    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Bucket, Counts]]:
+        """The tasks that are left; ``chunk`` fixes the number of variants of each."""
+        for bucket in self.buckets:
+            left = bucket.variants if done is None else np.setdiff1d(bucket.variants, done, assume_unique=True)
+            size = chunk or self.lanes_per_chunk(bucket)
+            for first in range(0, left.size, size):
+                yield bucket, left[first : first + size]
+
+    def values(self, bucket: Bucket, variants: Counts) -> LaneValues:
+        """Numbers of some variants of a bucket."""
+        return LaneValues(bucket.scene.study, self.cases.columns_of(variants), variants.size)
+
+
+def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
+    """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
+    cases = expand(study)
+    window: Window = "whole" if reduction is None else "last-cycle"
+    buckets = tuple(bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window))
+    base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
+    plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
+    if plan.memory_bytes > MOST_MEMORY:
+        raise BadInput(
+            "the study does not fit into memory",
+            where=study.source.where("sweep"),
+            expected=f"at most {MOST_MEMORY / 2**30:.0f} GiB",
+            received=f"{plan.memory_bytes / 2**30:.1f} GiB for {plan.size} variants",
+            remedy="fewer variants or sensors, or fewer histories",
+        )
+    return plan
+
+
+def _scenes(study: Study, cases: Cases) -> Iterator[tuple[SceneModel, Counts]]:
+    """Distinct scenes with their variants."""
+    everything = np.arange(cases.size, dtype=np.int64)
+    for variants in _split(everything, _structure(cases, everything)):
+        own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
+        values = LaneValues(own, cases.columns_of(variants), variants.size)
+        timing = values.timing()
+        columns = np.stack([column for pair in timing.values() for column in pair])
+        codes = np.zeros(variants.size, dtype=np.int64)
+        if np.any(columns != columns[:, :1]):
+            codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
+        for part in _split(np.arange(variants.size), codes):
+            yield build_model(own, *_timing_of(values, int(part[0]))), variants[part]
+
+
+def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
+    """Paces and delays of one lane, by carriage."""
+    timing = values.timing()
+    return (
+        {name: float(pace[lane]) for name, (pace, _) in timing.items()},
+        {name: float(delay[lane]) for name, (_, delay) in timing.items()},
+    )
+
+
+def _structural(cases: Cases) -> list[str]:
+    """Swept keys that change the scene itself."""
+    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
+
+
+def _structure(cases: Cases, variants: Counts) -> Counts:
+    """(V,) number of the scene that each variant has, by the dimensions that change it."""
+    positions = cases.positions(variants)
+    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(_structural(cases))}
+    code = np.zeros(variants.size, dtype=np.int64)
+    for dim, size in zip(cases.dims, cases.shape, strict=True):
+        if dim in dims:
+            code = code * size + positions[dim]
+    return code
+
+
+def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
+    """Items by equal codes, both in ascending order."""
+    if items.size and np.all(codes == codes[0]):
+        yield items
+        return
+    order = np.argsort(codes, kind="stable")
+    yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)
+
+
+def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) -> Iterator[Bucket]:
+    """Variants of one scene by their step counts."""
+    values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
+    scheme = Scheme(*scene.study.solver.newmark)
+    time_scale = values.time_scale(scene.carriages[0].name)
+    if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
+        steps = values.of("solver.steps").astype(np.int64)
+        check_most_steps(scene, steps)
+        check_fixed_steps(scene, scheme, time_scale, steps)
+        for part in _split(np.arange(variants.size), steps):
+            yield Bucket(SceneTables(scene, int(steps[part[0]]), window), variants[part], "as the study says")
+        return
+    distinct, inverse = np.unique(time_scale, return_inverse=True)
+    needs = needed_steps(scene, scheme, distinct)
+    check_most_steps(scene, needs.total)
+    steps = round_up(needs.total)[inverse]
+    for part in _split(np.arange(variants.size), steps):
+        reason = _reason(needs, inverse[part])
+        yield Bucket(SceneTables(scene, int(steps[part[0]]), window), variants[part], reason)
+
+
+def _reason(needs: Needs, lanes: Counts) -> str:
+    """The rule that decides for the most demanding of some variants."""
+    worst = lanes[np.argmax(needs.total[lanes])]
+    return list(needs.per_rule)[needs.deciding[worst]]
+
+
+def _shown(study: Study, size: int) -> Counts:
+    """Variants whose histories are kept: all, none, or some spread over the sweep."""
+    wanted = study.output.histories
+    if wanted == "none":
+        return np.zeros(0, dtype=np.int64)
+    if wanted != "auto" or size <= SHOWN:
+        return np.arange(size, dtype=np.int64)
+    return np.unique(np.rint(np.linspace(0, size - 1, SHOWN)).astype(np.int64))
+
+
+def explain(plan: Plan) -> list[Mapping[str, object]]:
+    """One row per bucket for people: variants, fidelity, modes, steps and why."""
+    return [
+        {
+            "variants": int(bucket.variants.size),
+            "fidelity": bucket.scene.fidelity.name.lower().replace("_", "-"),
+            "modes": int(bucket.scene.omega.size),
+            "steps": bucket.steps,
+            "reason": bucket.reason,
+            "seconds": bucket.seconds_per_variant * bucket.variants.size,
+        }
+        for bucket in plan.buckets
+    ]

@@ -1,0 +1,169 @@
+"""Run a plan: chunks of variants as dask tasks on threads. The only file that knows dask and threads."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.plan import Bucket, Plan, make_plan
+from engine.reduction import Reduction
+from engine.scene import Study
+from results_schema.errors import BadInput, Interrupted
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from results_schema.parts import Rows
+
+Counts = NDArray[np.int64]
+Arrays = dict[str, NDArray[Any]]
+Sink = Callable[[Counts, Arrays, "Rows | None"], object]
+Progress = Callable[[int, int], object]
+
+WAITING = 4  # finished chunks per thread that may wait for the sink
+
+
+def run(
+    study: Study,
+    *,
+    threads: int | None = None,
+    chunk: int | None = None,
+    reduction: Reduction | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a study in memory and return the march's dataset. Raises BadInput.
+
+    threads: default all processors. chunk: variants per task, chosen by time and memory otherwise; results do not
+    depend on either, bit for bit.
+    """
+    from engine.dataset import Collector, build
+
+    plan = make_plan(study, reduction=reduction)
+    collector = Collector(plan.size)
+    execute(plan, collector.add, threads=threads, chunk=chunk, progress=progress)
+    return build(plan, collector.arrays, collector.selected)
+
+
+def execute(
+    plan: Plan,
+    sink: Sink,
+    *,
+    threads: int | None = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+    done: Counts | None = None,
+) -> None:
+    """March everything that is not ``done`` and hand chunk after chunk to ``sink``, always on the calling thread.
+
+    Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
+    """
+    _check_threads(threads)
+    warm_up(plan)
+    tasks = list(plan.chunks(done, chunk))
+    finished = 0 if done is None else int(done.size)
+    halt = threading.Event()
+    results: queue.Queue[Any] = queue.Queue(maxsize=WAITING * (threads or os.cpu_count() or 1))
+    worker = threading.Thread(target=_compute, args=(plan, tasks, threads, results, (halt, stop)), daemon=True)
+    worker.start()
+    try:
+        for _ in tasks:
+            outcome = _next(results, stop)
+            if isinstance(outcome, BaseException):
+                raise outcome
+            variants, arrays, selected = outcome
+            sink(variants, arrays, selected)
+            finished += variants.size
+            if progress is not None:
+                progress(finished, plan.size)
+    finally:
+        halt.set()
+        while worker.is_alive():
+            _drain(results)
+            worker.join(0.01)
+
+
+def warm_up(plan: Plan) -> None:
+    """Load or compile the kernels once, and rebuild a damaged cache once."""
+    from engine.kernels import jit
+    from engine.outcome import run_chunk
+
+    if not plan.buckets:
+        return
+    bucket = min(plan.buckets, key=lambda b: b.seconds_per_variant)
+    try:
+        run_chunk(plan, bucket, bucket.variants[:1])
+    except Exception as error:
+        if not jit.cache_is_damaged(error):
+            raise
+        jit.forget_compiled()
+        run_chunk(plan, bucket, bucket.variants[:1])
+
+
+def _compute(
+    plan: Plan,
+    tasks: list[tuple[Bucket, Counts]],
+    threads: int | None,
+    results: queue.Queue[Any],
+    halts: tuple[threading.Event, threading.Event | None],
+) -> None:
+    """Run the chunks as one dask graph on its threaded scheduler."""
+    import dask.threaded
+
+    halted = partial(_any_set, halts)
+    graph = {
+        ("chunk", i): (partial(_task, plan, bucket, variants, results, halted),)
+        for i, (bucket, variants) in enumerate(tasks)
+    }
+    if graph:
+        dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
+
+
+def _task(plan: Plan, bucket: Bucket, variants: Counts, results: queue.Queue[Any], halted: Callable[[], bool]) -> None:
+    """One chunk; what it raises travels to the caller as its result."""
+    from engine.outcome import run_chunk
+
+    if halted():
+        return
+    try:
+        found: Any = (variants, *run_chunk(plan, bucket, variants))
+    except BaseException as error:
+        found = error
+    while not halted():
+        try:
+            results.put(found, timeout=0.05)
+            return
+        except queue.Full:
+            continue
+
+
+def _next(results: queue.Queue[Any], stop: threading.Event | None) -> Any:
+    """The next finished chunk, or Interrupted."""
+    while True:
+        if stop is not None and stop.is_set():
+            raise Interrupted("stopped; finished work is kept", remedy="run again to go on")
+        try:
+            return results.get(timeout=0.05)
+        except queue.Empty:
+            continue
+
+
+def _drain(results: queue.Queue[Any]) -> None:
+    while not results.empty():
+        results.get_nowait()
+
+
+def _any_set(events: tuple[threading.Event | None, ...]) -> bool:
+    return any(event is not None and event.is_set() for event in events)
+
+
+def _check_threads(threads: int | None) -> None:
+    if threads is not None and threads < 1:
+        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))

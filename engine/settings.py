@@ -1,0 +1,142 @@
+"""The parts of a study file that say how to compute, what to keep and what to vary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
+
+from engine.document import shortened
+from engine.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
+from engine.units import Dimensionless, fault
+
+NEWMARK: Mapping[str, tuple[float, float]] = {
+    "average-acceleration": (1 / 4, 1 / 2),
+    "linear-acceleration": (1 / 6, 1 / 2),
+    "fox-goodwin": (1 / 12, 1 / 2),
+    "central-difference": (0.0, 1 / 2),
+}
+FIDELITIES = ("auto", "force", "mass", "mass-without-convective")
+MAX_STEPS = 100_000_000
+
+Scheme = Annotated[str, AfterValidator(one_of(*NEWMARK, "newmark", planned=("hht-alpha", "generalized-alpha")))]
+Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES, planned=("static",)))]
+
+
+class Solver(Spec):
+    """How to march.
+
+    beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step).
+    steps: over one whole passage or one whole cycle. tolerance: wanted where something is "auto".
+    audit: variants run again at higher fidelity.
+    """
+
+    scheme: Scheme = "average-acceleration"
+    beta: Dimensionless | None = Field(default=None, ge=0, le=1)
+    gamma: Dimensionless | None = Field(default=None, ge=0.5, le=1.5)
+    fidelity: Chosen = "auto"
+    steps: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_STEPS)], by_form] = "auto"
+    tolerance: Dimensionless = Field(default=1e-3, gt=0, lt=1)
+    static_correction: bool = True
+    audit: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=0)], by_form] = "auto"
+
+    @property
+    def newmark(self) -> tuple[float, float]:
+        """(beta, gamma) of the scheme."""
+        if self.beta is not None and self.gamma is not None:
+            return self.beta, self.gamma
+        return NEWMARK[self.scheme]
+
+    @model_validator(mode="after")
+    def _fitting_keys(self) -> Solver:
+        given = [name for name in ("beta", "gamma") if getattr(self, name) is not None]
+        if self.scheme == "newmark" and len(given) < 2:
+            raise fault('the scheme "newmark" needs beta and gamma', expected="beta and gamma")
+        if self.scheme != "newmark" and given:
+            expected, received = 'scheme = "newmark"', f'scheme = "{self.scheme}"'
+            raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
+        if self.audit not in ("auto", 0):
+            raise fault("the audit is not built yet", expected='audit = "auto" or 0', received=str(self.audit))
+        return self
+
+
+class Every(Spec):
+    """Histories thinned to every n-th station."""
+
+    every: int = Field(ge=1, le=MAX_STEPS)
+
+
+class Output(Spec):
+    """What the archive keeps of the histories."""
+
+    histories: Annotated[
+        Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
+    ] = "auto"
+
+
+def read_amount(value: Any) -> float | int | str:
+    """A number of a sweep, whose dimension only its path decides: finite number, or text with a unit."""
+    if isinstance(value, str) or (isinstance(value, int) and not isinstance(value, bool)):
+        return value
+    if isinstance(value, float) and isfinite(value):
+        return value
+    raise fault("a number is wanted here", expected='a number, or a string such as "15 m"', received=shortened(value))
+
+
+def as_tuple(value: Any) -> Any:
+    """One path as a list of one."""
+    return (value,) if isinstance(value, str) else value
+
+
+Amount = Annotated[float | int | str, PlainValidator(read_amount)]
+Amounts = Annotated[tuple[Amount, ...], Strict(False), Field(min_length=1)]
+Paths = Annotated[tuple[str, ...], Strict(False), BeforeValidator(as_tuple), Field(min_length=1, max_length=100)]
+
+
+class SweepAxis(Spec):
+    """One varied number, or several that vary together: listed values, a range, or a sample of a range.
+
+    of: dotted key or keys, all of which get the same value. sobol: size of the sample (scrambled, seed 0).
+    """
+
+    of: Paths
+    values: Amounts | None = None
+    from_: Amount | None = Field(default=None, alias="from")
+    to: Amount | None = None
+    count: int | None = Field(default=None, ge=1)
+    sobol: int | None = Field(default=None, ge=1)
+    spacing: Literal["linear", "log"] = "linear"
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return next(n for n in (self.count, self.sobol, len(self.values or ())) if n is not None)
+
+    @model_validator(mode="after")
+    def _one_form(self) -> SweepAxis:
+        forms = [name for name in ("values", "count", "sobol") if getattr(self, name) is not None]
+        if len(forms) != 1:
+            received = " and ".join(forms) or "none of them"
+            raise fault("an axis is written in exactly one way", expected="values, count or sobol", received=received)
+        ranged = [name for name in ("from_", "to") if getattr(self, name) is not None]
+        if forms == ["values"] and (ranged or "spacing" in self.model_fields_set):
+            raise fault("from, to and spacing do not go with values", expected="values alone")
+        if forms != ["values"] and len(ranged) < 2:
+            raise fault(f"{forms[0]} needs from and to", expected="from = ..., to = ...")
+        return self
+
+
+class Sweep(Spec):
+    """All axes by name. zip: axes of equal length are paired instead of spanning a grid."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, SweepAxis]
+    entry_class = SweepAxis
+    zip: bool = False
+
+    @property
+    def axes(self) -> dict[str, SweepAxis]:
+        """Axes by name, in the order of the file."""
+        return dict(self.__pydantic_extra__)

@@ -1,0 +1,218 @@
+"""What is observed at every step, and the rows of numbers that make it: sensors at a place, sensors under a carriage,
+contact forces.
+
+Displacement, bending moment, shear force and stress are linear in w and its derivatives along the track and carry the
+static residual of the modes left out (mechanics section 7.8): influence line minus kept modes, times the actual
+contact force. Velocity and acceleration are those of the kept modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import Watch
+from engine.model import BodyPart, CarriageTie, SceneModel
+from engine.timeline import Rider
+from engine.track import Way
+
+Array = NDArray[np.float64]
+
+SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
+DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
+RATE_ORDER = {"velocity": 1, "acceleration": 2}
+
+
+class Channel(NamedTuple):
+    """A sum over the modes: what it multiplies ("q", "v", "a"), the power of 1/h, and rows (1 or S, N)."""
+
+    of: str
+    order: int
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A quantity on a body, at a fixed place or under a carriage (its number)."""
+
+    name: str
+    quantity: str
+    body: int
+    at: float
+    under: int | None
+
+    def places(self, along: tuple[Way, ...]) -> Array:
+        """Where it reads, m: one place, or one per station."""
+        return np.array([self.at]) if self.under is None else along[self.under].s
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        """Its sums over the modes."""
+        part = model.bodies[self.body]
+        x = self.places(along)
+        if self.quantity in DERIVATIVE:
+            factor, order = _factor(part, self.quantity), DERIVATIVE[self.quantity]
+            return [Channel("q", 0, _spread(model, part, factor * part.modal.shape(x, order)))]
+        shape = part.modal.shape(x)
+        if self.under is None:
+            return [Channel({1: "v", 2: "a"}[RATE_ORDER[self.quantity]], RATE_ORDER[self.quantity], _spread(model, part, shape))]
+        way = along[self.under]
+        ds, dds = way.ds[:, None], way.dds[:, None]
+        slope = part.modal.shape(x, 1)
+        if self.quantity == "velocity":
+            rows = {"q": ds * slope, "v": shape}
+        else:
+            rows = {"q": ds**2 * part.modal.shape(x, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
+        return [Channel(of, RATE_ORDER[self.quantity], _spread(model, part, row)) for of, row in rows.items()]
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations, ties): static response per unit force of each tie that the kept modes miss."""
+        found = np.zeros((along[0].s.size, model.ties))
+        if self.quantity not in DERIVATIVE or not model.study.solver.static_correction:
+            return found
+        for r, (carriage, way) in enumerate(zip(model.carriages, along, strict=True)):
+            if way.active and carriage.body == self.body:
+                found[:, r] = self.flexibility(model, self.places(along), way.s, "missed")
+        for r, damper in enumerate(model.dampers, start=len(model.carriages)):
+            if damper.body == self.body:
+                found[:, r] = self.flexibility(model, self.places(along), np.array([damper.at]), "missed")
+        return found
+
+    def flexibility(self, model: SceneModel, x: Array, s: Array, share: str) -> Array:
+        """Static reading at x per unit force at s (broadcast); ``share``: "missed", "kept" or "model" (what the
+        march tends to when it is slow: all of it with the static correction, else the kept modes)."""
+        part = model.bodies[self.body]
+        factor, order = _factor(part, self.quantity), DERIVATIVE[self.quantity]
+        full = factor * part.modal.influence_at(x, s, order)
+        if share == "model" and model.study.solver.static_correction:
+            return full
+        elastic = part.modal.omega > 0.0
+        soft = part.modal.shape(s)[:, elastic] / part.modal.omega[elastic] ** 2
+        kept = factor * np.sum(part.modal.shape(x, order)[:, elastic] * soft, axis=1)
+        return full - kept if share == "missed" else kept
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations,): what the body's own weight adds per unit gravity, in step units."""
+        stations = along[0].s.size
+        x = self.places(along)
+        if not model.bodies[self.body].own_weight:
+            return np.zeros(stations)
+        if self.quantity in DERIVATIVE:
+            factor = _factor(model.bodies[self.body], self.quantity)
+            return np.broadcast_to(factor * model.sag(self.body, x, DERIVATIVE[self.quantity]), stations)
+        if self.under is None:
+            return np.zeros(stations)
+        way = along[self.under]
+        slope = model.sag(self.body, x, 1)
+        return way.ds * slope if self.quantity == "velocity" else way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope
+
+    @property
+    def offset_order(self) -> int:
+        """The power of 1/h that makes the offset SI."""
+        return RATE_ORDER.get(self.quantity, 0)
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations,) bool: whether it reads anything there."""
+        return np.full(along[0].s.size, self.under is None or along[self.under].active)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce:
+    """The force between a carriage (its number) and its body, N."""
+
+    carriage: int
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        return []
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        found = np.zeros((along[0].s.size, model.ties))
+        found[:, self.carriage] = 1.0
+        return found
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+    @property
+    def offset_order(self) -> int:
+        return 0
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """Whether the carriage is on the body and off the last part of the span towards a held end."""
+        way, carriage = along[self.carriage], model.carriages[self.carriage]
+        low, high = span_counted(model, carriage.rider, carriage.body)
+        return way.active & (way.s >= low) & (way.s <= high)
+
+
+Signal = Sensor | ContactForce
+
+
+def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, float]:
+    """Places between which a contact force counts: a pinned or clamped end is left out where the way leads to it."""
+    length = rider.length
+    beam = model.study.body[model.bodies[body].name]
+    left, right = getattr(beam, "ends", ("free", "free"))
+    low, high = (1.0 - SPAN_COUNTED) * length, SPAN_COUNTED * length
+    forward = rider.stays or float(rider.motion.path(0.0).dS) > 0.0
+    backward = rider.stays or not forward
+    return (low if left != "free" and backward else 0.0), (high if right != "free" and forward else length)
+
+
+def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
+    """The sensors in the study's order, the acceleration across of some carriages, then all contact forces."""
+    bodies = [part.name for part in model.bodies]
+    names = [carriage.name for carriage in model.carriages]
+    sensors: list[Signal] = []
+    for name, spec in model.study.sensor.items():
+        under = None if spec.under is None else names.index(spec.under)
+        at = 0.0 if spec.at is None else spec.at
+        sensors.append(Sensor(name, spec.quantity, bodies.index(model.study.body_of(name)), at, under))
+    for carriage in accelerated:
+        name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
+        sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))
+    return (*sensors, *(ContactForce(number) for number in range(len(names))))
+
+
+def tabulate_watch(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Watch:
+    """Rows of every signal along a segment."""
+    channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
+    ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
+    rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
+    modes = 4 * -(-model.omega.size // 4)
+    return Watch(
+        on_q=_stacked(rows["q"], modes),
+        on_v=_stacked(rows["v"], modes),
+        on_a=_stacked(rows["a"], modes),
+        signal=np.array([number for number, _ in ordered], dtype=np.int64),
+        order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
+        static=np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1)),
+        offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
+        offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
+        counted=np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1)),
+    )
+
+
+def _factor(part: BodyPart, quantity: str) -> float:
+    """What a derivative of w is multiplied by: M = -E I w'', V = dM/ds, extreme-fibre stress M c / I."""
+    if quantity == "displacement":
+        return 1.0
+    factor = -part.modal.bending_stiffness
+    return factor * part.fibre_distance / part.second_moment if quantity == "stress" else factor
+
+
+def _spread(model: SceneModel, part: BodyPart, rows: Array) -> Array:
+    """Rows of one body in the row of all modes."""
+    found = np.zeros((rows.shape[0], model.omega.size))
+    found[:, part.modes] = rows
+    return found
+
+
+def _stacked(rows: list[Array], modes: int) -> Array:
+    """(1 or stations, channels, modes), the modes filled up with zeros to whole fours."""
+    stations = max((row.shape[0] for row in rows), default=1)
+    found = np.zeros((stations, len(rows), modes))
+    for channel, row in enumerate(rows):
+        found[:, channel, : row.shape[1]] = row
+    return found

@@ -1,0 +1,148 @@
+"""The tables of a scene at one number of steps, built when they are first needed and shared by all its chunks."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import Newmark, Ties, Watch
+from engine.model import SceneModel
+from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
+from engine.timeline import Segment, Timeline, build_timeline
+from engine.track import Way, tabulate_ties, ways
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+KEPT_BYTES = 96 * 2**20  # tables kept per scene; older ones are built again
+SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
+
+Window = Literal["whole", "last-cycle"]
+
+
+class SegmentTable(NamedTuple):
+    """What the march needs of one segment besides its lanes."""
+
+    ties: Ties
+    watch: Watch
+    guard: Watch
+
+    @property
+    def bytes(self) -> int:
+        """Size in memory."""
+        return sum(array.nbytes for part in self for array in part)
+
+
+class StaticUnit(NamedTuple):
+    """Static readings at some stations: per unit force of each carriage (H, J, C), per unit gravity (H, J), and the
+    first one's derivative by the first carriage's position (H, J, C)."""
+
+    force: Array
+    gravity: Array
+    slope: Array
+
+
+@dataclass(eq=False)
+class SceneTables:
+    """Timeline, signals and tables of a scene at ``steps`` per unit of scene time."""
+
+    model: SceneModel
+    steps: int
+    window: Window
+    accelerations: Literal["unread", "read"] = "unread"
+    _kept: OrderedDict[tuple[float, float, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @cached_property
+    def timeline(self) -> Timeline:
+        """The scene cut into segments."""
+        return build_timeline(self.model.riders, self.steps, self.window)
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """Sensors, then contact forces; between them every carriage's acceleration across, where that is read."""
+        return build_signals(self.model, () if self.accelerations == "unread" else self.model.carriages)
+
+    @cached_property
+    def with_accelerations(self) -> SceneTables:
+        """The same with the accelerations of the carriages read."""
+        return SceneTables(self.model, self.steps, self.window, "read")
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The study's sensors."""
+        return tuple(signal for signal in self.signals if isinstance(signal, Sensor))
+
+    @property
+    def newmark(self) -> Newmark:
+        """The scheme's coefficients."""
+        return Newmark(*self.model.study.solver.newmark)
+
+    def table(self, segment: Segment) -> SegmentTable:
+        """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
+        unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
+        key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.active)
+        with self._lock:
+            found = self._kept.pop(key, None)
+            if found is None:
+                found = self._build(segment._replace(start=segment.start - unit, end=segment.end - unit))
+            self._kept[key] = found
+            while len(self._kept) > 1 and sum(table.bytes for table in self._kept.values()) > KEPT_BYTES:
+                self._kept.popitem(last=False)
+        return found
+
+    def _build(self, segment: Segment) -> SegmentTable:
+        along = ways(self.model, segment)
+        contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
+        return SegmentTable(
+            tabulate_ties(self.model, along, self.newmark),
+            tabulate_watch(self.model, self.signals, along),
+            tabulate_watch(self.model, contacts, along),
+        )
+
+    def ways_at(self, counts: Counts) -> tuple[Way, ...]:
+        """Places of all carriages at stations by their count; ``active`` says whether any of them is on its body."""
+        found = []
+        for rider in range(len(self.model.carriages)):
+            place = self.timeline.positions(rider, counts)
+            here = np.isfinite(place)
+            nowhere = np.zeros_like(place)
+            found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any())))
+        return tuple(found)
+
+    def static_at(self, counts: Counts) -> StaticUnit:
+        """Static readings of every sensor with the carriages where they are at stations by their count."""
+        along = self.ways_at(counts)
+        here = [np.isfinite(self.timeline.positions(rider, counts)) for rider in range(len(along))]
+        shape = (counts.size, len(self.sensors), len(along))
+        force, slope, gravity = np.zeros(shape), np.zeros(shape), np.zeros(shape[:2])
+        for j, sensor in enumerate(self.sensors):
+            gravity[:, j] = sensor.offset(self.model, along) if sensor.offset_order == 0 else 0.0
+            for r in range(len(along)):
+                if along[r].active:
+                    force[:, j, r] = np.where(here[r], self._unit(sensor, along, r), 0.0)
+            if along[0].active:
+                slope[:, j, 0] = np.where(here[0], self._unit_slope(sensor, along), 0.0)
+        return StaticUnit(force, gravity, slope)
+
+    def _unit(self, sensor: Sensor, along: tuple[Way, ...], rider: int) -> Array:
+        """Static reading of a sensor per unit force of a carriage, at every station."""
+        if sensor.offset_order != 0 or self.model.carriages[rider].body != sensor.body:
+            return np.zeros(along[0].s.size)
+        reading = sensor.flexibility(self.model, sensor.places(along), along[rider].s, "model")
+        return np.broadcast_to(reading, along[0].s.shape)
+
+    def _unit_slope(self, sensor: Sensor, along: tuple[Way, ...]) -> Array:
+        """Derivative of the first carriage's unit reading by its position, from places a little apart."""
+        length = self.model.carriages[0].rider.length
+        first, others = along[0], along[1:]
+        before = replace(first, s=np.maximum(first.s - SLOPE_STEP * length, 0.0))
+        after = replace(first, s=np.minimum(first.s + SLOPE_STEP * length, length))
+        change = self._unit(sensor, (after, *others), 0) - self._unit(sensor, (before, *others), 0)
+        return np.asarray(change / (after.s - before.s))

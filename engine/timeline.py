@@ -1,0 +1,254 @@
+"""The scene in normalised time: who rides where, which events cut it into segments, how many steps each gets.
+
+Scene time tau counts in units of the first carriage's time scale, one passage or one cycle, so that all variants of a
+shared scene step through the same stations, each at its own pace (mechanics section 3). An event (a carriage sets
+off, enters, leaves, reverses at an instant, stops) falls on a step boundary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.law import Motion, Path
+from engine.motions import Cruise
+
+Array = NDArray[np.float64]
+
+MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
+FREE_STEPS = 200  # per first period of the body in free vibration
+_SAME = 1e-12  # events closer than this part of the scene are one
+
+
+@dataclass(frozen=True)
+class Rider:
+    """A carriage's way in scene time: its motion on a body of a length (m), started late, at its own pace.
+
+    pace: units of the motion's own tau per unit of scene time. delay: scene time at which it sets off.
+    """
+
+    motion: Motion
+    length: float
+    pace: float = 1.0
+    delay: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """Scene time at which the motion ends."""
+        return self.delay + self.motion.duration / self.pace
+
+    @property
+    def stays(self) -> bool:
+        """Whether the carriage stands on its place before and after its motion; a cruise only passes."""
+        return not isinstance(self.motion, Cruise)
+
+    @property
+    def top_speed(self) -> float:
+        """Largest |dS/dtau| per unit of scene time, m."""
+        return self.motion.max_speed * self.pace
+
+    def path(self, tau: Array, start: float, end: float) -> Path:
+        """Position and its derivatives by scene time on a segment without a break inside, one-sided at its ends."""
+        own, first, last = ((t - self.delay) * self.pace for t in (tau, start, end))
+        if last <= 0.0 or first >= self.motion.duration:
+            place = self.motion.path(0.0 if last <= 0.0 else self.motion.duration).S
+            return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
+        found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
+        return Path(found.S, found.dS * self.pace, found.ddS * self.pace**2)
+
+    def touches(self, start: float, end: float) -> bool:
+        """Whether the carriage is on the body between two neighbouring events."""
+        middle = 0.5 * (start + end)
+        if not self.stays and not self.delay <= middle <= self.end:
+            return False
+        place = float(self.path(np.array([middle]), start, end).S[0])
+        return 0.0 <= place <= self.length
+
+    def events(self) -> Iterator[float]:
+        """Scene times that must be step boundaries, in no order."""
+        yield from (self.delay, self.end)
+        for tau in (*self.motion.breaks(), *self._crossings()):
+            yield self.delay + float(tau) / self.pace
+
+    def _crossings(self) -> Iterator[float]:
+        """The motion's own times at which it passes an end of the body."""
+        low, high = self.motion.range()
+        ends = [place for place, beyond in ((0.0, low < 0.0), (self.length, high > self.length)) if beyond]
+        if not ends:
+            return
+        from scipy.optimize import brentq
+
+        tau = np.linspace(0.0, self.motion.duration, 4001)
+        places = self.motion.path(tau).S
+        for end in ends:
+            for i in np.flatnonzero(np.diff(np.signbit(places - end))):
+                yield float(brentq(lambda t, e=end: float(self.motion.path(t).S) - e, tau[i], tau[i + 1], xtol=1e-15))
+
+
+class Strike(NamedTuple):
+    """A carriage that arrives at the beginning of a segment with a speed, or whose speed jumps there (m per tau)."""
+
+    rider: int
+    kind: Literal["arrival", "reversal"]
+    speed: float
+
+
+class Segment(NamedTuple):
+    """Steps between two events, or a slice of them.
+
+    start, end: scene time; for free vibration both are the scene's end, and its duration follows from the body.
+    first: count of the scene's stations at which it begins. active: per rider, whether it is in contact.
+    fresh: an event precedes it, so accelerations are solved for anew. recorded: whether extremes count.
+    """
+
+    start: float
+    end: float
+    steps: int
+    first: int
+    active: tuple[bool, ...]
+    fresh: bool
+    strikes: tuple[Strike, ...]
+    recorded: bool
+    free: bool
+
+    @property
+    def step(self) -> float:
+        """Scene time per step."""
+        return (self.end - self.start) / self.steps
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """All segments of a scene for a number of steps per unit of scene time.
+
+    window: first and last count of the recorded part. repeats: the path repeats itself every unit of scene time.
+    free_periods: first periods of free vibration after the last carriage.
+    """
+
+    riders: tuple[Rider, ...]
+    segments: tuple[Segment, ...]
+    window: tuple[int, int]
+    repeats: bool
+    free_periods: float
+
+    @property
+    def steps(self) -> int:
+        """All steps from the beginning to the end."""
+        last = self.segments[-1]
+        return last.first + last.steps
+
+    def moments(self, counts: Array) -> tuple[NDArray[np.int64], Array]:
+        """Segment and scene time of stations by their count; a boundary belongs to the segment that ends there."""
+        firsts = np.array([segment.first for segment in self.segments])
+        index = np.maximum(np.searchsorted(firsts, counts, side="left") - 1, 0)
+        starts = np.array([segment.start for segment in self.segments])
+        steps = np.array([segment.step for segment in self.segments])
+        return index, starts[index] + (counts - firsts[index]) * steps[index]
+
+    def motion(self, rider: int, counts: Array) -> Path:
+        """Place of a rider (m) and its derivatives by scene time at stations by their count; NaN where it is off the
+        body or the count is negative."""
+        found = Path(*(np.full(counts.shape, np.nan) for _ in range(3)))
+        index, tau = self.moments(counts)
+        for number in np.unique(index[counts >= 0]):
+            segment = self.segments[number]
+            if segment.active[rider]:
+                here = (index == number) & (counts >= 0)
+                path = self.riders[rider].path(tau[here], segment.start, segment.end)
+                for part, values in zip(found, path, strict=True):
+                    part[here] = values
+        return found
+
+    def positions(self, rider: int, counts: Array) -> Array:
+        """Only the place of a rider, as in `motion`."""
+        return self.motion(rider, counts).S
+
+
+def build_timeline(riders: tuple[Rider, ...], steps: int, window: Literal["whole", "last-cycle"]) -> Timeline:
+    """Cut the scene at its events and spread the steps; ``steps`` are wanted per unit of scene time.
+
+    >>> bed = Cruise(kind="cruise", start=-1.0, end=3.0, speed=1.0)
+    >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
+    [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
+    """
+    repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
+    end = max(rider.end for rider in riders)
+    last_cycle = end - 1.0 if window == "last-cycle" and riders[0].motion.period is not None else 0.0
+    free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
+    seams = {float(k) for k in range(1, math.ceil(end))} if riders[0].motion.period is not None else set()
+    hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
+    cuts = _merged([*hard, *seams], end)
+    segments: list[Segment] = []
+    count, before = 0, tuple(False for _ in riders)
+    for start, stop in pairwise(cuts):
+        active = tuple(rider.touches(start, stop) for rider in riders)
+        fresh = min(abs(start - t) for t in hard) <= _SAME * end
+        strikes = tuple(_strikes(riders, active, before, start, stop)) if fresh else ()
+        total = max(1, math.ceil(steps * (stop - start) - 1e-9 * steps))
+        for first, last in pairwise(_slices(total)):
+            at, to = (start + (stop - start) * n / total for n in (first, last))
+            head = first == 0
+            segments.append(
+                Segment(
+                    at,
+                    stop if last == total else to,
+                    last - first,
+                    count + first,
+                    active,
+                    fresh and head,
+                    strikes if head else (),
+                    start >= last_cycle - _SAME * end,
+                    False,
+                )
+            )
+        count, before = count + total, active
+    beginning = next(s.first for s in segments if s.recorded)
+    if free > 0.0:
+        gone, total = tuple(False for _ in riders), math.ceil(free * FREE_STEPS)
+        for first, last in pairwise(_slices(total)):
+            segments.append(Segment(end, end, last - first, count + first, gone, first == 0, (), True, True))
+        count += total
+    return Timeline(riders, tuple(segments), (beginning, count), repeats, free)
+
+
+def _merged(times: list[float], end: float) -> list[float]:
+    """Ascending times within the scene, those that are the same but for rounding once."""
+    found: list[float] = []
+    for time in sorted(min(max(t, 0.0), end) for t in times):
+        if not found or time - found[-1] > _SAME * end:
+            found.append(time)
+    return found
+
+
+def _slices(total: int) -> list[int]:
+    """Boundaries of nearly equal slices that fit a table."""
+    parts = math.ceil(total / MOST_STATIONS)
+    return [total * part // parts for part in range(parts + 1)]
+
+
+def _strikes(
+    riders: tuple[Rider, ...], active: tuple[bool, ...], before: tuple[bool, ...], start: float, stop: float
+) -> Iterator[Strike]:
+    """Arrivals and reversals at the beginning of a segment."""
+    for number, rider in enumerate(riders):
+        if not active[number]:
+            continue
+        after = float(rider.path(np.array([start]), start, stop).dS[0])
+        own = (start - rider.delay) * rider.pace
+        if not before[number] and (start > 0.0 or _enters(rider)):
+            yield Strike(number, "arrival", after)
+        for reversal in rider.motion.reversals():
+            if before[number] and abs(reversal.tau - own) <= _SAME * rider.motion.duration:
+                yield Strike(number, "reversal", (reversal.after - reversal.before) * rider.pace)
+
+
+def _enters(rider: Rider) -> bool:
+    """Whether a carriage comes onto the body at time 0 from outside, rather than having been there."""
+    place = float(rider.motion.path(0.0).S)
+    return not rider.stays and (place <= 0.0 or place >= rider.length)

@@ -1,0 +1,85 @@
+"""Every error a user can meet, each with the exit code of the command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class WanderlastError(Exception):
+    """An error with one readable message; base of all others and exit code of a bug of our own.
+
+    >>> print(BadInput("must be positive", where="body.bed.length", expected="> 0 m", received="-3"))
+    body.bed.length: must be positive; expected > 0 m, received -3
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, where: str = "", expected: str = "", received: str = "", remedy: str = "") -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.received = received
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        found = ", ".join(
+            f"{word} {value}" for word, value in (("expected", self.expected), ("received", self.received)) if value
+        )
+        message = f"{self.where}: {self.what}" if self.where else self.what
+        remedy = f"remedy: {self.remedy}" if self.remedy else ""
+        return "; ".join(part for part in (message, found, remedy) if part)
+
+
+class BadInput(WanderlastError):
+    """Bad input or usage: refused before anything is computed or written."""
+
+    exit_code = 2
+
+
+class ArchiveError(WanderlastError):
+    """An archive or a part of one that is damaged, foreign or of a newer schema."""
+
+    exit_code = 4
+
+
+class WorkersGaveUp(WanderlastError):
+    """The workers could not go on; finished work is kept."""
+
+    exit_code = 70
+
+
+class OutputFailed(WanderlastError):
+    """Writing failed (disk full, read-only); finished work is kept. Carries the path and the free bytes there."""
+
+    exit_code = 74
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        path: Path | str = "",
+        free_bytes: int | None = None,
+        expected: str = "",
+        received: str = "",
+        remedy: str = "",
+    ) -> None:
+        super().__init__(what, where=str(path), expected=expected, received=received, remedy=remedy)
+        self.path = path
+        self.free_bytes = free_bytes
+
+    def __str__(self) -> str:
+        message = super().__str__()
+        return message if self.free_bytes is None else f"{message}; {self.free_bytes} bytes free there"
+
+
+class ArchiveBusy(WanderlastError):
+    """Another run holds this archive."""
+
+    exit_code = 75
+
+
+class Interrupted(WanderlastError):
+    """Stopped by a signal; finished work is kept."""
+
+    exit_code = 130

@@ -1,0 +1,207 @@
+"""The only module that opens, writes, syncs and replaces files of results.
+
+A file appears under its name whole or not at all: it is written beside, closed, synced, moved over the name, and
+the folder is synced.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from results_schema.errors import BadInput, OutputFailed
+
+# The netCDF and HDF5 libraries are not safe under threads: every call into them holds this lock.
+NETCDF_LOCK = threading.RLock()
+
+_TEMPORARY = ".wanderlast-tmp"
+_SIDECAR = ".sha256"
+
+
+class Faults:
+    """What goes wrong before an operation ("open", "write", "fsync", "replace"): nothing, except in tests."""
+
+    def before(self, operation: str, path: Path) -> None:
+        """Called before each operation; a test's subclass raises OSError or kills the process here."""
+
+
+FAULTS = Faults()
+
+
+def write_whole(path: Path | str, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a temporary file beside `path`, then put it in the place of `path`.
+
+    Raises OutputFailed (path, free bytes) when the system or the netCDF library cannot write; the old file stays.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{_TEMPORARY}")
+    try:
+        FAULTS.before("open", temporary)
+        temporary.touch()
+        FAULTS.before("write", temporary)
+        write(temporary)
+        _sync(temporary)
+        FAULTS.before("replace", path)
+        os.replace(temporary, path)
+        _sync(path.parent)
+    except BaseException as error:
+        _discard(temporary)
+        if isinstance(error, OSError) or _is_netcdf_failure(error):
+            raise output_failed(path, error) from error
+        raise
+
+
+def output_failed(path: Path, error: BaseException) -> OutputFailed:
+    """The error for a failed operation on `path`, with the bytes that are free there."""
+    try:
+        free = shutil.disk_usage(path.parent).free
+    except OSError:
+        free = None
+    reason = getattr(error, "strerror", None) or str(error)
+    return OutputFailed(
+        f"cannot write ({reason})",
+        path=path,
+        free_bytes=free,
+        remedy="free some space or choose another place, then run again: finished work is kept",
+    )
+
+
+def _is_netcdf_failure(error: BaseException) -> bool:
+    return isinstance(error, RuntimeError) and str(error).startswith("NetCDF:")
+
+
+def _sync(path: Path) -> None:
+    FAULTS.before("fsync", path)
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _discard(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        # The disk that failed may refuse this too; the next start cleans up.
+        return
+
+
+def clean_leftovers(path: Path | str) -> None:
+    """Remove temporary files that a killed run left beside `path`; call it while holding the lock of `path`."""
+    path = Path(path)
+    for entry in path.parent.iterdir():
+        if entry.name.startswith(f".{path.name}.") and entry.name.endswith(_TEMPORARY):
+            _discard(entry)
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether this is a file that `write_whole` had not finished."""
+    return path.name.endswith(_TEMPORARY)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a small UTF-8 file whole. Raises OutputFailed."""
+
+    def fill(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_whole(path, fill)
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder (its parent exists) and sync the parent. Raises OutputFailed."""
+    try:
+        FAULTS.before("open", path)
+        path.mkdir(exist_ok=True)
+        _sync(path.parent)
+    except OSError as error:
+        raise output_failed(path, error) from error
+
+
+def remove_folder(path: Path) -> None:
+    """Remove a folder with everything in it, if it is there. Raises OutputFailed."""
+    try:
+        if path.exists():
+            FAULTS.before("open", path)
+            shutil.rmtree(path)
+    except OSError as error:
+        raise output_failed(path, error) from error
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file and its sidecar, if they are there. Raises OutputFailed."""
+    try:
+        path.unlink(missing_ok=True)
+        sidecar(path).unlink(missing_ok=True)
+    except OSError as error:
+        raise output_failed(path, error) from error
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's bytes, hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def sidecar(path: Path) -> Path:
+    """The file beside `path` that holds its SHA-256, in the form that `sha256sum --check` reads."""
+    return path.with_name(path.name + _SIDECAR)
+
+
+def write_sidecar(path: Path) -> None:
+    """Store the SHA-256 of a finished file beside it. Raises OutputFailed."""
+    try:
+        digest = sha256_of(path)
+    except OSError as error:
+        raise output_failed(path, error) from error
+    write_text(sidecar(path), f"{digest}  {path.name}\n")
+
+
+def sidecar_matches(path: Path) -> bool:
+    """Whether the file is the one its sidecar was written for (False where either is missing or unreadable)."""
+    try:
+        return sidecar(path).read_text(encoding="utf-8") == f"{sha256_of(path)}  {path.name}\n"
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def check_output_place(path: Path | str) -> None:
+    """Refuse a place where `path` could not be written, before anything is computed.
+
+    Raises BadInput when the folder is missing, read-only or a file, or when `path` itself is a folder, and
+    OutputFailed when the disk is full. Leaves nothing behind.
+    """
+    path = Path(path)
+    folder = path.parent
+    if not folder.exists():
+        raise BadInput("the output folder does not exist", where=str(folder), remedy="create it first")
+    if not folder.is_dir():
+        raise BadInput("the output folder is a file", where=str(folder), expected="a folder", received="a file")
+    if path.is_dir():
+        raise BadInput("the output is a folder", where=str(path), expected="the name of a file", received="a folder")
+    try:
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(b"0")
+    except (PermissionError, FileNotFoundError) as error:
+        raise _read_only(folder, error) from error
+    except OSError as error:
+        if error.errno == errno.EROFS:
+            raise _read_only(folder, error) from error
+        raise output_failed(path, error) from error
+
+
+def _read_only(folder: Path, error: OSError) -> BadInput:
+    return BadInput(
+        "the output folder cannot be written",
+        where=str(folder),
+        expected="a writable folder",
+        received=str(error.strerror),
+        remedy="choose another folder with -o",
+    )

@@ -1,0 +1,281 @@
+"""The finished chunks of a run: one immutable netCDF-4 file each, from which a killed run goes on.
+
+Beside an archive `a.nc` lie `a.nc.lock`, held by the run, and the folder `a.nc.parts` with a file `key` (what the
+parts were computed from), the parts, and the SHA-256 of each part. A part counts when its SHA-256 does.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from results_schema import files
+from results_schema.errors import ArchiveError, BadInput
+from results_schema.locks import Lock
+
+Arrays = dict[str, np.ndarray]
+
+_SELECTED = "selected"
+_VARIANTS = "variants"
+_SUFFIX = ".nc"
+_CHUNK_BYTES = 1 << 20
+
+
+class Rows(NamedTuple):
+    """Results of some variants: `variants` (n,) int64, and arrays (n, ...) by name."""
+
+    variants: np.ndarray
+    arrays: Mapping[str, np.ndarray]
+
+
+class PartStore:
+    """The parts of one archive, locked while the `with` block lasts.
+
+    key: what the results depend on: the study's hash with the kernels' hash.
+    Entering raises ArchiveBusy when another run holds the archive, and BadInput when the parts there have another
+    key (see `discard_foreign`).
+    """
+
+    def __init__(self, archive_path: Path | str, key: str) -> None:
+        archive_path = Path(archive_path)
+        self._archive = archive_path
+        self._folder = archive_path.with_name(archive_path.name + ".parts")
+        self._lock = Lock(archive_path.with_name(archive_path.name + ".lock"))
+        self._key = key
+        self._discard = False
+        self._valid: dict[Path, np.ndarray] | None = None
+
+    @classmethod
+    def discard_foreign(cls, archive_path: Path | str, key: str) -> PartStore:
+        """A store that removes parts with another key on entering instead of refusing them (`--overwrite`)."""
+        store = cls(archive_path, key)
+        store._discard = True
+        return store
+
+    def __enter__(self) -> PartStore:
+        self._lock.take()
+        try:
+            self._open()
+        except BaseException:
+            self._lock.release()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._lock.release()
+
+    def _open(self) -> None:
+        files.clean_leftovers(self._archive)
+        if self._folder.exists() and not self._folder.is_dir():
+            raise BadInput("a file is in the way of the parts", where=str(self._folder), remedy="move it away")
+        found = self._stored_key()
+        if found and found != self._key and not self._discard:
+            raise BadInput(
+                "unfinished parts of another study or program version are there",
+                where=str(self._folder),
+                expected=f"key {self._key}",
+                received=f"key {found}",
+                remedy="finish that run with its own study and version, or discard its parts with --overwrite",
+            )
+        if found != self._key:
+            # Without a key (a power cut before the first part) nothing in the folder can be trusted.
+            files.remove_folder(self._folder)
+        files.make_folder(self._folder)
+        if found != self._key:
+            files.write_text(self._key_file, self._key + "\n")
+
+    @property
+    def _key_file(self) -> Path:
+        return self._folder / "key"
+
+    def _stored_key(self) -> str:
+        try:
+            return self._key_file.read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError):
+            return ""
+
+    def write(self, variants: np.ndarray, arrays: Mapping[str, np.ndarray], selected: Rows | None = None) -> Path:
+        """Store one finished chunk: variants (n,), arrays (n, ...), and rows of a few variants of it (histories).
+
+        Raises OutputFailed when the disk cannot take it, ValueError when the arrays do not fit the variants.
+        """
+        tables = {"/": _checked(Rows(variants, arrays))}
+        if selected is not None and len(selected.variants):
+            tables[_SELECTED] = _checked(selected)
+        indices = tables["/"].variants
+        path = self._folder / (hashlib.sha1(indices.tobytes()).hexdigest() + _SUFFIX)
+
+        def fill(temporary: Path) -> None:
+            _write_tables(temporary, tables)
+
+        files.write_whole(path, fill)
+        files.write_sidecar(path)
+        if self._valid is not None:
+            self._valid[path] = indices
+        return path
+
+    def finished(self) -> np.ndarray:
+        """The variants (ascending, int64) of all valid parts; whatever else lies in the folder is deleted."""
+        self._valid = {}
+        for path in sorted(self._folder.iterdir()):
+            if path.suffix == _SUFFIX and files.sidecar_matches(path):
+                self._admit(path)
+            elif path != self._key_file and not self._is_sidecar(path):
+                files.remove_file(path)
+        for path in sorted(self._folder.iterdir()):
+            if self._is_sidecar(path) and path.with_suffix("") not in self._valid:
+                files.remove_file(path)
+        return np.unique(np.concatenate([np.empty(0, np.int64), *self._valid.values()]))
+
+    def _is_sidecar(self, path: Path) -> bool:
+        return path.name.endswith(_SUFFIX + ".sha256")
+
+    def _admit(self, path: Path) -> None:
+        assert self._valid is not None
+        try:
+            self._valid[path] = _read_tables(path, [_VARIANTS])["/"].variants
+        except ArchiveError:
+            files.remove_file(path)
+
+    def assemble(self, n_variants: int) -> Arrays:
+        """All results, arrays (n_variants, ...) by name; one part is in memory beside them at a time.
+
+        Raises ArchiveError when variants are missing, or when a part turns out damaged (it is deleted: run again).
+        """
+        result: Arrays = {}
+        covered = np.zeros(n_variants, bool)
+        for path, tables in self._parts():
+            rows = tables["/"]
+            if rows.variants.max() >= n_variants:
+                raise ArchiveError(
+                    "a part holds variants that the study does not have",
+                    where=str(path),
+                    expected=f"below {n_variants}",
+                    received=str(rows.variants.max()),
+                )
+            if not result:
+                result = {name: np.empty((n_variants, *a.shape[1:]), a.dtype) for name, a in rows.arrays.items()}
+            _require_same_arrays(path, result, rows.arrays)
+            for name, array in rows.arrays.items():
+                result[name][rows.variants] = array
+            covered[rows.variants] = True
+        if not covered.all():
+            raise ArchiveError(
+                "variants are not computed yet",
+                where=str(self._folder),
+                expected=f"{n_variants} finished variants",
+                received=str(int(covered.sum())),
+                remedy="run again to resume",
+            )
+        return result
+
+    def assemble_selected(self) -> Rows:
+        """The rows given as `selected`, by ascending variant; no variants and no arrays where there are none."""
+        found = [tables[_SELECTED] for _, tables in self._parts() if _SELECTED in tables]
+        if not found:
+            return Rows(np.empty(0, np.int64), {})
+        variants, first = np.unique(np.concatenate([rows.variants for rows in found]), return_index=True)
+        names = found[0].arrays
+        arrays = {name: np.concatenate([rows.arrays[name] for rows in found])[first] for name in names}
+        return Rows(variants, arrays)
+
+    def _parts(self) -> Iterator[tuple[Path, dict[str, Rows]]]:
+        if self._valid is None:
+            self.finished()
+        for path in sorted(self._valid or {}):
+            try:
+                tables = _read_tables(path)
+            except ArchiveError:
+                files.remove_file(path)
+                raise
+            yield path, tables
+
+    def remove(self) -> None:
+        """Remove all parts: the archive is written."""
+        files.remove_folder(self._folder)
+        self._valid = {}
+
+
+def _checked(rows: Rows) -> Rows:
+    variants = np.ascontiguousarray(rows.variants, np.int64)
+    if variants.ndim != 1 or variants.size == 0 or variants.min() < 0:
+        raise ValueError(f"variants: expected (n > 0,) numbers >= 0, received shape {variants.shape}")
+    if _VARIANTS in rows.arrays:
+        raise ValueError(f"an array is called {_VARIANTS!r}, the name of the numbers of the variants")
+    for name, array in rows.arrays.items():
+        if array.ndim == 0 or array.shape[0] != variants.size or array.size == 0 or array.dtype.kind not in "iuf":
+            raise ValueError(f"{name}: expected numbers ({variants.size}, ...), received {array.dtype} {array.shape}")
+    return Rows(variants, rows.arrays)
+
+
+def _require_same_arrays(path: Path, result: Arrays, arrays: Mapping[str, np.ndarray]) -> None:
+    def described(found: Mapping[str, np.ndarray]) -> str:
+        return ", ".join(f"{name} {found[name].dtype} {found[name].shape[1:]}" for name in sorted(found))
+
+    if described(result) != described(arrays):
+        raise ArchiveError(
+            "parts of one run hold different results",
+            where=str(path),
+            expected=described(result),
+            received=described(arrays),
+            remedy="discard the parts with --overwrite",
+        )
+
+
+def _write_tables(path: Path, tables: Mapping[str, Rows]) -> None:
+    import netCDF4
+
+    with files.NETCDF_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
+        for group, rows in tables.items():
+            place = dataset if group == "/" else dataset.createGroup(group)
+            _store(place, _VARIANTS, rows.variants)
+            for name, array in rows.arrays.items():
+                _store(place, name, array)
+
+
+def _store(place: Any, name: str, array: np.ndarray) -> None:
+    dims = tuple(f"n{size}" for size in array.shape)
+    for dim, size in zip(dims, array.shape, strict=True):
+        if dim not in place.dimensions:
+            place.createDimension(dim, size)
+    row_bytes = array.itemsize * int(np.prod(array.shape[1:], dtype=np.int64))
+    rows = min(array.shape[0], max(1, _CHUNK_BYTES // row_bytes))
+    variable = place.createVariable(
+        name, array.dtype, dims, fletcher32=True, chunksizes=(rows, *array.shape[1:]), fill_value=False
+    )
+    variable.set_auto_maskandscale(False)
+    variable[...] = array
+
+
+def _read_tables(path: Path, names: list[str] | None = None) -> dict[str, Rows]:
+    """The tables of a part, or only the arrays called `names`. Raises ArchiveError naming a damaged part."""
+    import netCDF4
+
+    try:
+        with files.NETCDF_LOCK, netCDF4.Dataset(path, "r") as dataset:
+            dataset.set_auto_maskandscale(False)
+            tables = {"/": _read_rows(dataset, names)}
+            if _SELECTED in dataset.groups:
+                tables[_SELECTED] = _read_rows(dataset.groups[_SELECTED], names)
+    except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
+        raise ArchiveError(
+            f"this part is damaged ({error})", where=str(path), remedy="run again: it is computed again"
+        ) from error
+    return tables
+
+
+def _read_rows(place: Any, names: list[str] | None) -> Rows:
+    arrays = {
+        name: np.asarray(variable[...]) for name, variable in place.variables.items() if names is None or name in names
+    }
+    variants = arrays.pop(_VARIANTS)
+    if variants.size == 0:
+        raise ValueError("no rows")
+    return Rows(variants, arrays)

@@ -1,0 +1,31 @@
+"""The declarations as a table for people."""
+
+from __future__ import annotations
+
+from results_schema.status import flag_meanings, flag_values
+from results_schema.variables import AXES, EVERY_KIND, Variable, registered
+
+
+def reference_table() -> str:
+    """All declarations as a markdown table, for the README."""
+    rows = ["| variable | in | dimensions | type | unit | meaning |", "|---|---|---|---|---|---|"]
+    for kind, variables in registered().items():
+        where = {EVERY_KIND: "every kind", AXES: "coordinates"}.get(kind, kind)
+        rows += [_row(where, variable) for variable in variables]
+    return "\n".join(rows) + "\n"
+
+
+def _row(where: str, variable: Variable) -> str:
+    lead = {"grid": ["the sweep's"], "history": ["the sweep's or `history`"], "none": []}[variable.lead]
+    dims = ", ".join(lead + [" or ".join(f"`{name}`" for name in dim.split("|")) for dim in variable.dims])
+    unit = "the sensor's" if variable.units == "{sensor}" else (variable.units or "1")
+    if variable.flags is not None:
+        unit = "flags"
+    elif variable.dtype == "str":
+        unit = ""
+    text = variable.meaning or variable.long_name
+    if variable.flags is not None:
+        words = zip(flag_values(variable.flags), flag_meanings(variable.flags).split(), strict=True)
+        text += ": " + ", ".join(f"{value} {word}" for value, word in words)
+    cells = (f"`{variable.name}`", where, dims, variable.dtype, unit, text.replace("|", "\\|"))
+    return "| " + " | ".join(cells) + " |"

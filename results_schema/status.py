@@ -1,0 +1,85 @@
+"""What became of a variant, and which model computed it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+_MESSAGES = (
+    "fine",
+    "the contact force is negative somewhere on 0-98 % of the span: the carriage would lift off there; values kept",
+    "the error could not be estimated; values kept",
+    "the estimated error is larger than the tolerance; values kept",
+    "an eigenvalue, tie or Newton solution did not converge; no values",
+    "the march left the finite numbers; no values",
+    "the worker died in this variant; no values",
+)
+
+
+class Status(IntEnum):
+    """Result code of one variant; where several apply, the highest.
+
+    >>> Status.TOLERANCE_MISSED.values_kept, Status.DIVERGED.values_kept
+    (True, False)
+    """
+
+    OK = 0
+    SEPARATED = 1
+    UNRESOLVED = 2
+    TOLERANCE_MISSED = 3
+    NOT_CONVERGED = 4
+    DIVERGED = 5
+    CRASHED = 6
+
+    @property
+    def message(self) -> str:
+        """One sentence for people."""
+        return _MESSAGES[self]
+
+    @property
+    def values_kept(self) -> bool:
+        """Whether the variant's results are numbers; otherwise they are NaN."""
+        return self < Status.NOT_CONVERGED
+
+
+class Fidelity(IntEnum):
+    """The model a variant was computed with, cheapest first."""
+
+    STATIC = 0
+    FORCE = 1
+    MASS_WITHOUT_CONVECTIVE = 2
+    MASS = 3
+    TIED = 4
+    FRAME = 5
+
+
+def flag_values(flags: type[IntEnum]) -> list[int]:
+    """The numbers of a CF flag variable, ascending (write them in the variable's own dtype)."""
+    return sorted(int(flag) for flag in flags)
+
+
+def flag_meanings(flags: type[IntEnum]) -> str:
+    """The CF attribute `flag_meanings`: one word each, in the order of `flag_values`.
+
+    >>> flag_meanings(Fidelity)
+    'static force mass_without_convective mass tied frame'
+    """
+    return " ".join(flags(value).name.lower() for value in flag_values(flags))
+
+
+def label(flag: IntEnum) -> str:
+    """A flag as people write it.
+
+    >>> label(Status.TOLERANCE_MISSED)
+    'tolerance-missed'
+    """
+    return flag.name.lower().replace("_", "-")
+
+
+def highest(flags: Sequence[Status]) -> Status:
+    """The status that counts where several apply (ok where none does).
+
+    >>> highest([Status.SEPARATED, Status.TOLERANCE_MISSED]).name
+    'TOLERANCE_MISSED'
+    """
+    return max(flags, default=Status.OK)

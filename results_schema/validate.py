@@ -1,0 +1,141 @@
+"""A dataset against the declarations: what is there, in which shape and unit, and why numbers are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.errors import ArchiveError
+from results_schema.status import Status
+from results_schema.variables import Variable, axes, expand
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_TEXT_KINDS = "UTO"
+_COUNT_SHOWN = 3
+
+
+def validate(dataset: xr.Dataset, kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> None:
+    """Compare a dataset of a kind ("passage"; a group: "/audit") with what is declared.
+
+    sensors: name -> unit. The grid is the dimensions of `status` (of a group: none). Raises ArchiveError that lists
+    all findings.
+    """
+    findings = list(findings_of(dataset, kind, sensors, carriages))
+    if findings:
+        raise ArchiveError(f"the results of {kind} are not as declared: " + "; ".join(findings))
+
+
+def findings_of(dataset: xr.Dataset, kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> Iterator[str]:
+    """Every difference from the declarations as one text."""
+    declared = expand(kind, sensors, carriages)
+    grid = tuple(map(str, dataset["status"].dims)) if "status" in dataset else ()
+    for name, variable in declared.items():
+        if variable.required and name not in dataset:
+            yield f"{name}: expected in every {kind}, received nothing"
+    for name in map(str, list(dataset.data_vars)):
+        if name not in declared:
+            yield f"{name}: expected a declared name, received an unknown one"
+            continue
+        array, variable = dataset[name], declared[name]
+        yield from _shape_findings(array, variable, grid)
+        yield from _attribute_findings(array, variable)
+        if array.dtype.kind == "f":
+            yield from _value_findings(dataset, name, variable)
+    for name in map(str, list(dataset.coords)):
+        yield from _coordinate_findings(dataset, name)
+
+
+def _shape_findings(array: xr.DataArray, variable: Variable, grid: tuple[str, ...]) -> Iterator[str]:
+    leads: dict[str, list[tuple[str, ...]]] = {"grid": [grid], "history": [grid, ("history",)], "none": [()]}
+    dims = tuple(map(str, array.dims))
+    if not any(_dims_fit(dims, (*lead, *variable.dims)) for lead in leads[variable.lead]):
+        wanted = " or ".join(str((*lead, *variable.dims)) for lead in leads[variable.lead])
+        yield f"{array.name}: expected dimensions {wanted}, received {dims}"
+    if _type_name(array) != variable.dtype:
+        yield f"{array.name}: expected {variable.dtype}, received {_type_name(array)}"
+
+
+def _dims_fit(dims: tuple[str, ...], wanted: tuple[str, ...]) -> bool:
+    return len(dims) == len(wanted) and all(
+        name in choice.split("|") for name, choice in zip(dims, wanted, strict=True)
+    )
+
+
+def _type_name(array: xr.DataArray) -> str:
+    return "str" if array.dtype.kind in _TEXT_KINDS else str(array.dtype.name)
+
+
+def _attribute_findings(array: xr.DataArray, variable: Variable) -> Iterator[str]:
+    for key, wanted in variable.attributes().items():
+        received = array.attrs.get(key)
+        if key == "comment" or (key == "long_name" and received):
+            continue
+        if received is None:
+            yield f"{array.name}: expected the attribute {key} = {wanted!r}, received none"
+        elif not np.array_equal(received, wanted):
+            yield f"{array.name}: expected {key} = {wanted!r}, received {received!r}"
+
+
+def _value_findings(dataset: xr.Dataset, name: str, variable: Variable) -> Iterator[str]:
+    array = dataset[name]
+    values = array.values
+    if np.isinf(values).any():
+        yield f"{name}: expected finite numbers or NaN, received {int(np.isinf(values).sum())} infinite ones"
+    if variable.nan_allowed:
+        return
+    failed = _failed(dataset, array)
+    if failed is None:
+        return
+    unexplained = np.isnan(values) & ~failed
+    if unexplained.any():
+        yield f"{name}: expected numbers where the status keeps them, received NaN at {_places(unexplained)}"
+    unwanted = ~np.isnan(values) & failed
+    if unwanted.any():
+        yield f"{name}: expected NaN where the status keeps no values, received numbers at {_places(unwanted)}"
+
+
+def _failed(dataset: xr.Dataset, array: xr.DataArray) -> np.ndarray | None:
+    """Where no values are kept, in the shape of `array`; None where that cannot be said (its dims are wrong)."""
+    if "status" not in dataset:
+        return np.zeros(array.shape, bool)
+    status = dataset["status"]
+    failed = status.values >= Status.NOT_CONVERGED
+    if "history" in array.dims and "history" in dataset.coords:
+        chosen = dataset["history"].values
+        if chosen.min() < 0 or chosen.max() >= failed.size:
+            return None
+        failed = failed.ravel()[chosen]
+    elif array.dims[: status.ndim] != status.dims:
+        return None
+    return np.broadcast_to(failed.reshape(failed.shape + (1,) * (array.ndim - failed.ndim)), array.shape)
+
+
+def _places(mask: np.ndarray) -> str:
+    places = [tuple(map(int, index)) for index in np.argwhere(mask)[:_COUNT_SHOWN]]
+    more = int(mask.sum()) - len(places)
+    return ", ".join(map(str, places)) + (f" and {more} more" if more > 0 else "")
+
+
+def _coordinate_findings(dataset: xr.Dataset, name: str) -> Iterator[str]:
+    array = dataset.coords[name]
+    if "_FillValue" in array.attrs or array.encoding.get("_FillValue") is not None:
+        yield f"{name}: expected a coordinate without _FillValue, received one"
+    if not array.attrs.get("long_name"):
+        yield f"{name}: expected the attribute long_name, received none"
+    is_text = array.dtype.kind in _TEXT_KINDS
+    if not is_text and not array.attrs.get("units"):
+        yield f"{name}: expected the attribute units, received none"
+    if array.dtype.kind == "f" and not np.isfinite(array.values).all() and name not in ("elapsed",):
+        yield f"{name}: expected finite numbers, received NaN or infinite ones"
+    variable = axes().get(name)
+    if variable is None:
+        return
+    if _type_name(array) != variable.dtype:
+        yield f"{name}: expected {variable.dtype}, received {_type_name(array)}"
+    wanted = variable.attributes().get("units")
+    if wanted and array.attrs.get("units") not in (None, wanted):
+        yield f"{name}: expected units = {wanted!r}, received {array.attrs.get('units')!r}"

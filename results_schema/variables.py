@@ -1,0 +1,361 @@
+"""Every output declared once: name, dimensions, type, unit, meaning.
+
+Checks, attributes in the archive and the table of the README derive from the declarations here and from those that
+each kind of study adds with `declare`. Names are templates: `{sensor}` and `{carriage}` stand for every sensor's
+and every carriage's name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any, Literal
+
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity, Status, flag_meanings, flag_values
+
+EVERY_KIND = "*"
+AXES = "axes"
+
+QUANTITY_UNITS: Mapping[str, str] = {
+    "displacement": "m",
+    "velocity": "m s-1",
+    "acceleration": "m s-2",
+    "bending_moment": "N m",
+    "shear_force": "N",
+    "stress": "Pa",
+}
+
+_RESERVED_WORDS = """
+    direction position phase peak sensor variant speed_ratio mass_ratio station elapsed history mode
+    status fidelity_used modes_used steps_used error_estimate error_steps error_modes error_fidelity
+    dynamic_amplification lag loop_area odd_rms even_excess peaks_per_cycle peak_value peak_phase odd_even_ratio
+    harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
+    critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
+    tool_centre_point_error robot component sensor_unit diverged_step
+"""
+# Names of results, not usable for a sweep's axis, a sensor or a carriage.
+RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One output, or one template for the outputs of every sensor or carriage.
+
+    dims: dimensions beyond the leading ones; "a|b" allows either.
+    units: udunits text; "{sensor}" is the sensor's own unit, "" dimensionless.
+    lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
+        (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
+    nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
+    """
+
+    name: str
+    dims: tuple[str, ...] = ()
+    dtype: str = "float64"
+    units: str | None = ""
+    long_name: str = ""
+    meaning: str = ""
+    flags: type[IntEnum] | None = None
+    required: bool = True
+    nan_allowed: bool = False
+    lead: Literal["grid", "history", "none"] = "grid"
+
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes of an expanded variable; `comment` holds the meaning.
+
+        `flag_values` is a list of int: the writer stores it in the variable's dtype.
+        """
+        found: dict[str, Any] = {"long_name": self.long_name}
+        if self.flags is not None:
+            found |= {"flag_values": flag_values(self.flags), "flag_meanings": flag_meanings(self.flags)}
+        elif self.units is not None and self.dtype != "str":
+            found["units"] = self.units or "1"
+        return found | ({"comment": self.meaning} if self.meaning else {})
+
+
+_REGISTRY: dict[str, dict[str, Variable]] = {}
+
+
+def declare(kind: str, *variables: Variable) -> None:
+    """Add the outputs of a kind of study ("*": of every kind, "axes": coordinates, "/audit": of a group).
+
+    Raises ValueError when a name is declared again with another meaning.
+    """
+    known = _REGISTRY.setdefault(kind, {})
+    for variable in variables:
+        if known.setdefault(variable.name, variable) != variable:
+            raise ValueError(f"{variable.name} of {kind} is declared twice: expected {known[variable.name]}")
+
+
+def registered() -> dict[str, tuple[Variable, ...]]:
+    """Every kind with the declarations of its own, in the order they were made."""
+    return {kind: tuple(variables.values()) for kind, variables in _REGISTRY.items()}
+
+
+def declarations(kind: str) -> tuple[Variable, ...]:
+    """What a dataset of this kind may hold: the outputs of every kind, then its own (a group: only its own)."""
+    if kind.startswith("/"):
+        return tuple(_REGISTRY.get("/" + kind.split("/")[1], {}).values())
+    shared = {} if kind in (EVERY_KIND, AXES) else _REGISTRY.get(EVERY_KIND, {})
+    return tuple({**shared, **_REGISTRY.get(kind, {})}.values())
+
+
+def axes() -> dict[str, Variable]:
+    """The declared coordinates by name."""
+    return dict(_REGISTRY[AXES])
+
+
+def expand(kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> dict[str, Variable]:
+    """The declarations of a kind with the names and units of one study filled in.
+
+    sensors: name -> unit. Raises BadInput when two outputs get the same name or a name is reserved.
+
+    >>> expand("march", {"midspan": "m"}, ["table"])["midspan_max"].units
+    'm'
+    """
+    for name in (*sensors, *carriages):
+        if name in RESERVED:
+            raise BadInput("this name is reserved for results", where=name, remedy="choose another name")
+    found: dict[str, Variable] = {}
+    for variable in declarations(kind):
+        for one in _instances(variable, sensors, carriages):
+            if one.name in found or (one.name != variable.name and one.name in RESERVED):
+                raise BadInput(
+                    "two results would get this name",
+                    where=one.name,
+                    remedy="rename the sensor or carriage",
+                )
+            found[one.name] = one
+    return found
+
+
+def _instances(variable: Variable, sensors: Mapping[str, str], carriages: Sequence[str]) -> Iterable[Variable]:
+    if "{sensor}" in variable.name:
+        return [_filled(variable, "sensor", name, unit) for name, unit in sensors.items()]
+    if "{carriage}" in variable.name:
+        return [_filled(variable, "carriage", name, "") for name in carriages]
+    if variable.units == "{sensor}":
+        units = set(sensors.values())
+        return [replace(variable, units=units.pop() if len(units) == 1 else None)]
+    return [variable]
+
+
+def _filled(variable: Variable, word: str, name: str, unit: str) -> Variable:
+    mark = "{" + word + "}"
+    return replace(
+        variable,
+        name=variable.name.replace(mark, name),
+        long_name=variable.long_name.replace(mark, name),
+        meaning=variable.meaning.replace(mark, name),
+        units=unit if variable.units == "{sensor}" else variable.units,
+    )
+
+
+def _axis(name: str, long_name: str, units: str = "", dtype: str = "float64", meaning: str = "") -> Variable:
+    return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
+
+
+declare(
+    AXES,
+    Variable(
+        "speed_ratio",
+        long_name="speed ratio",
+        meaning="speed over omega_1 L / pi, L the length of the track",
+        required=False,
+    ),
+    Variable("mass_ratio", long_name="mass ratio", meaning="carriage mass over body mass", required=False),
+    _axis("position", "position of the first carriage on its track", "m"),
+    _axis("phase", "phase of the last cycle", meaning="0 to 1, 0 where the motion's formula starts"),
+    _axis("station", "number of the recorded instant", dtype="int64"),
+    Variable(
+        "elapsed",
+        ("position|phase|station",),
+        units="s",
+        long_name="time since the start",
+        required=False,
+        lead="history",
+    ),
+    _axis("history", "flat number of the variant in the sweep's grid, last axis fastest", dtype="int64"),
+    _axis("variant", "number of the variant of a sampled or zipped sweep", dtype="int64"),
+    _axis("direction", "direction of travel", dtype="str", meaning="forward is from start to end"),
+    _axis("sensor", "sensor", dtype="str"),
+    Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
+    _axis("peak", "number of the peak in the cycle", dtype="int64"),
+    _axis("harmonic", "number of the harmonic of the cycle", dtype="int64"),
+    _axis("mode", "number of the mode, from 1", dtype="int64"),
+    _axis("sample", "number of the variant that was run again", dtype="int64"),
+    _axis("scheme", "time integration scheme", dtype="str"),
+    _axis("step_count", "steps over one passage or cycle", dtype="int64"),
+    _axis("mode_count", "number of modes", dtype="int64"),
+    _axis("quantity", "measured quantity", dtype="str"),
+    _axis("relative_step", "omega_1 times the time step"),
+    _axis("robot", "robot", dtype="str"),
+    _axis("component", "component of the vector", dtype="str"),
+)
+
+declare(
+    EVERY_KIND,
+    Variable("status", (), "int8", None, "status of the variant", "the highest that applies", Status),
+    Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
+    Variable("modes_used", (), "int32", long_name="number of modes used", meaning="number of modes marched"),
+    Variable("steps_used", (), "int32", long_name="number of steps used", meaning="steps over one passage or cycle"),
+    Variable(
+        "diverged_step",
+        (),
+        "int64",
+        long_name="first step at which the variant had diverged",
+        meaning="counted from the start; -1 where it has not",
+        required=False,
+    ),
+    Variable(
+        "error_estimate",
+        long_name="estimated relative error",
+        meaning="largest over the sensors of the largest estimated error over time, divided by the largest static "
+        "value of that sensor (velocity and acceleration: by their own largest value)",
+        required=False,
+        nan_allowed=True,
+    ),
+    *(
+        Variable(
+            f"error_{source}",
+            long_name=f"part of the estimated relative error that comes from the {what}",
+            required=False,
+            nan_allowed=True,
+        )
+        for source, what in (("steps", "time step"), ("modes", "number of modes"), ("fidelity", "choice of model"))
+    ),
+)
+
+
+def _extreme(which: str, word: str) -> tuple[Variable, Variable]:
+    return (
+        Variable(
+            f"{{sensor}}_{which}",
+            units="{sensor}",
+            long_name=f"{word} value of {{sensor}}",
+            meaning="over all step instants (asymmetry, double-peak: of the last cycle)",
+        ),
+        Variable(
+            f"{{sensor}}_{which}_position",
+            units="m",
+            long_name=f"position of the first carriage at the {word} value of {{sensor}}",
+            meaning="NaN where the carriage was off the body",
+            nan_allowed=True,
+        ),
+    )
+
+
+EXTREMES: tuple[Variable, ...] = (*_extreme("max", "largest"), *_extreme("min", "smallest"))
+ROOT_MEAN_SQUARES: tuple[Variable, ...] = (
+    Variable(
+        "{sensor}_rms",
+        units="{sensor}",
+        long_name="root mean square of {sensor}",
+        meaning="over the same instants as the extremes",
+        required=False,
+    ),
+)
+CONTACT_FORCES: tuple[Variable, ...] = (
+    Variable(
+        "{carriage}_contact_force_max",
+        units="N",
+        long_name="largest contact force of {carriage}",
+        meaning="over 0-98 % of the span; NaN where the carriage is never there",
+        nan_allowed=True,
+    ),
+    Variable(
+        "{carriage}_contact_force_min",
+        units="N",
+        long_name="smallest contact force of {carriage}",
+        meaning="over 0-98 % of the span; NaN where the carriage is never there",
+        nan_allowed=True,
+    ),
+    Variable(
+        "{carriage}_contact_force_min_position",
+        units="m",
+        long_name="position of {carriage} at its smallest contact force",
+        meaning="NaN where it never touches the body",
+        nan_allowed=True,
+    ),
+    Variable(
+        "{carriage}_separation_position",
+        units="m",
+        long_name="first position of {carriage} with a negative contact force",
+        meaning="NaN where the contact holds",
+        nan_allowed=True,
+        required=False,
+    ),
+)
+HISTORIES: tuple[Variable, ...] = (
+    Variable(
+        "{sensor}",
+        ("position|phase|station",),
+        units="{sensor}",
+        long_name="history of {sensor}",
+        meaning="at the instants of `elapsed`",
+        required=False,
+        lead="history",
+        nan_allowed=True,
+    ),
+    Variable(
+        "{carriage}_position",
+        ("position|phase|station",),
+        units="m",
+        long_name="position of {carriage}",
+        meaning="NaN where it is off the body",
+        required=False,
+        lead="history",
+        nan_allowed=True,
+    ),
+)
+MARCH: tuple[Variable, ...] = (*EXTREMES, *ROOT_MEAN_SQUARES, *CONTACT_FORCES, *HISTORIES)
+
+declare("march", *MARCH)
+
+declare(
+    "/model",
+    Variable("frequency", ("mode",), units="Hz", long_name="natural frequency of the body", lead="none"),
+    Variable("damping_ratio", ("mode",), long_name="damping ratio of the mode", lead="none", required=False),
+    Variable(
+        "mode_shape",
+        ("mode", "position"),
+        units="kg-0.5",
+        long_name="mode shape on the track",
+        meaning="unit modal mass",
+        lead="none",
+        required=False,
+    ),
+)
+declare(
+    "/audit",
+    Variable(
+        "observed_error",
+        ("sample",),
+        long_name="observed relative error",
+        meaning="against the same variant at higher fidelity",
+        lead="none",
+        nan_allowed=True,
+    ),
+    Variable(
+        "estimated_error",
+        ("sample",),
+        long_name="estimated relative error",
+        meaning="the estimate of the archive for the same variant",
+        lead="none",
+        nan_allowed=True,
+    ),
+)
+
+
+def sensor_unit(quantity: str) -> str:
+    """The unit of a sensor's quantity; BadInput for an unknown one.
+
+    >>> sensor_unit("bending_moment")
+    'N m'
+    """
+    if quantity not in QUANTITY_UNITS:
+        raise BadInput(
+            "unknown quantity", where="quantity", expected=" | ".join(QUANTITY_UNITS), received=repr(quantity)
+        )
+    return QUANTITY_UNITS[quantity]

@@ -1,0 +1,12 @@
+"""Questions that engineers ask of the engine: one file per kind of question, run, summarised, drawn and reported.
+
+>>> import studies
+>>> studies.kind_names()
+('asymmetry', 'double-peak', 'passage', 'trajectory')
+"""
+
+from __future__ import annotations
+
+from studies.study import Kind, kind_names, kind_named, run
+
+__all__ = ["Kind", "kind_named", "kind_names", "run"]

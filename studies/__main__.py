@@ -1,0 +1,8 @@
+"""`python -m studies` is the same as `wanderlast`."""
+
+import sys
+
+from studies.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

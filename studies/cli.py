@@ -1,0 +1,118 @@
+"""The command `wanderlast`: what it understands. The work is done elsewhere, and imported only when it is asked for."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from studies import trouble
+
+_FOLDER = click.Path(path_type=Path, file_okay=False)
+_FILE = click.Path(path_type=Path)
+_THREADS = click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads; default: all cores.")
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="wanderlast", message="wanderlast %(version)s")
+def commands() -> None:
+    """Batch studies of loads that move on structures that bend.
+
+    STUDY is the path of a study file (TOML) or the name of a built-in study (see "wanderlast list").
+
+    \b
+    Exit codes: 0 fine; 2 bad input; 3 finished, but some variants carry a status other than ok;
+    4 damaged or foreign archive; 70 workers gave up; 74 input/output failed; 75 another run holds
+    the archive; 130 and 143 interrupted, finished work is kept; 1 a bug of our own.
+    """
+
+
+@commands.command()
+@click.argument("kind")
+@click.argument("file", type=_FILE, required=False)
+def init(kind: str, file: Path | None) -> None:
+    """Write a commented study file of KIND to start from (FILE; default: KIND.toml)."""
+    from studies import actions
+
+    actions.init(kind, file)
+
+
+@commands.command()
+@click.argument("study")
+def check(study: str) -> None:
+    """Validate STUDY and explain what a run would do; computes nothing large, writes nothing."""
+    from studies import actions
+
+    actions.check(study)
+
+
+@commands.command()
+@click.argument("study")
+@click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
+@click.option("--overwrite", is_flag=True, help="Replace what is there, and unfinished parts of another study.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+@_THREADS
+@_JSON
+def run(study: str, as_json: bool, **options: Any) -> int:
+    """Run STUDY, write its archive and print a summary.
+
+    Started again after any interruption it goes on from what is finished.
+    """
+    from studies import actions
+
+    return actions.run(study, actions.RunOptions(**options), as_json=as_json)
+
+
+@commands.command()
+@click.argument("archive", type=_FILE)
+@click.option("-o", "folder", type=_FOLDER, metavar="FOLDER", help="Where to write; default: <archive>-report, here.")
+def report(archive: Path, folder: Path | None) -> None:
+    """Write one self-contained page with the figures of ARCHIVE, and the figures as SVG and PNG."""
+    from studies import actions
+
+    actions.report(archive, folder)
+
+
+@commands.command()
+@click.argument("archive", type=_FILE)
+def info(archive: Path) -> int:
+    """Tell what is inside ARCHIVE, who made it, and whether it is whole."""
+    from studies import actions
+
+    return actions.info(archive)
+
+
+@commands.command(name="list")
+def list_() -> None:
+    """List the built-in studies, and the kinds that "init" knows."""
+    from studies import actions
+
+    actions.list_studies()
+
+
+@commands.command()
+@click.option("--modes", type=click.IntRange(1, 64), default=10, show_default=True, help="Modes of the beam.")
+@click.option("--steps", type=click.IntRange(1, 10**7), default=1000, show_default=True, help="Steps of a passage.")
+@click.option("--variants", type=click.IntRange(1, 10**7), default=16384, show_default=True, help="Variants at once.")
+@_THREADS
+@_JSON
+def bench(modes: int, steps: int, variants: int, threads: int | None, as_json: bool) -> None:
+    """Measure the throughput of the march on this machine, compiling left out."""
+    from studies import actions
+
+    actions.bench(modes, steps, variants, threads, as_json=as_json)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; every error ends as one message on standard error."""
+    command = list(sys.argv[1:] if arguments is None else arguments)
+
+    def invoke() -> int:
+        code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+
+    return trouble.exit_code_of(invoke)

@@ -1,0 +1,147 @@
+"""From a study to its archive: lock, parts, march, assembly, one file written whole.
+
+Killed at any moment it leaves finished parts behind, and goes on from them when it is started again.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.scene import Study
+from results_schema import files
+from results_schema.archive import OutputState, open_archive, output_state, write_archive
+from results_schema.errors import ArchiveError, BadInput
+from results_schema.parts import PartStore
+from studies.provenance import attributes
+from studies.stopping import Stop
+from studies.study import finish, kind_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.plan import Plan
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of a run.
+
+    results: the archive's root. resumed: variants that an earlier start had finished. seconds: of this run, 0 where
+    the archive was finished already.
+    """
+
+    archive: Path
+    results: xr.Dataset
+    resumed: int
+    seconds: float
+
+    @property
+    def was_finished(self) -> bool:
+        """Whether there was nothing to do."""
+        return self.seconds == 0.0
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How to run, nothing that changes a result. threads: None takes all cores."""
+
+    overwrite: bool = False
+    threads: int | None = None
+
+
+def run_to_archive(
+    study: Study, archive: Path, options: RunOptions, *, progress: Progress | None = None, stop: Stop | None = None
+) -> Outcome:
+    """Run a study and write its archive, or find it finished there.
+
+    Raises BadInput before anything is computed or written; Interrupted, OutputFailed and ArchiveBusy with finished
+    work kept; ArchiveError when this study's archive is there and damaged.
+    """
+    from engine.plan import make_plan
+
+    started, stop = time.perf_counter(), stop or Stop()
+    kind = kind_of(study)
+    files.check_output_place(archive)
+    if _state(study, archive, options) == "same study, finished":
+        return Outcome(archive, open_archive(archive).root, 0, 0.0)
+    plan = make_plan(study, reduction=kind.reduction(study))
+    _check_disk(plan, archive)
+    with _store(plan, archive, options) as store:
+        done = store.finished()
+        _march(plan, store, done, options, progress, stop)
+        stop.check()
+        root = _finished_dataset(plan, store)
+        seconds = time.perf_counter() - started
+        root = root.assign_attrs(attributes(study, plan.key, seconds))
+        stop.check()
+        write_archive(archive, root, _groups(plan))
+        store.remove()
+    return Outcome(archive, root, int(done.size), seconds)
+
+
+def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
+    """What is at the output's place, as far as it matters; refuses another study's archive."""
+    if options.overwrite:
+        return "absent"
+    state = output_state(archive, study.source.sha256)
+    if state == "another study":
+        raise BadInput(
+            "there is something else already",
+            where=str(archive),
+            expected="no file, or the archive of this very study",
+            remedy="choose another place with -o, or replace it with --overwrite",
+        )
+    return state
+
+
+def _check_disk(plan: Plan, archive: Path) -> None:
+    """Refuse a run whose parts and archive would not fit on the disk."""
+    free, needed = shutil.disk_usage(archive.parent).free, 2 * plan.disk_bytes
+    if needed > free:
+        raise BadInput(
+            f"the archive of {plan.size} variants does not fit on the disk",
+            where=str(archive.parent),
+            expected=f"{needed} bytes for the parts and the archive",
+            received=f"{free} bytes free",
+            remedy="fewer variants, sensors or histories, or another place with -o",
+        )
+
+
+def _store(plan: Plan, archive: Path, options: RunOptions) -> PartStore:
+    return (PartStore.discard_foreign if options.overwrite else PartStore)(archive, plan.key)
+
+
+def _march(
+    plan: Plan, store: PartStore, done: np.ndarray, options: RunOptions, progress: Progress | None, stop: Stop
+) -> None:
+    from engine.run import execute
+
+    if done.size < plan.size:
+        execute(plan, store.write, threads=options.threads, progress=progress, stop=stop.event, done=done)
+
+
+def _finished_dataset(plan: Plan, store: PartStore) -> xr.Dataset:
+    """The study's dataset from all parts. That it is as declared is our affair, not the user's."""
+    from engine.dataset import build
+
+    arrays = store.assemble(plan.size)
+    dataset = build(plan, arrays, store.assemble_selected())
+    try:
+        return finish(dataset, plan.study)
+    except ArchiveError as error:
+        raise AssertionError(str(error)) from error
+
+
+def _groups(plan: Plan) -> dict[str, xr.Dataset]:
+    from engine.dataset import model_groups
+
+    return dict(model_groups(plan))

@@ -1,0 +1,128 @@
+"""What a kind of study is, where the kinds are found, and how a study is run."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.reduction import Reduction
+    from engine.scene import Study
+    from studies.figures import Figure
+    from studies.results import Results
+
+KINDS_FOLDER = Path(__file__).parent / "kinds"
+
+
+class Kind(Protocol):
+    """One kind of question. A module in `studies/kinds` has one as its attribute KIND, and declares its results.
+
+    name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
+    """
+
+    name: str
+    summary: str
+    question: str
+
+    def check(self, study: Study) -> None:
+        """Refuse a scene that does not suit the kind. Raises BadInput; nothing large is computed."""
+
+    def reduction(self, study: Study) -> Reduction | None:
+        """What to compute from the histories of each chunk of variants; None where extremes are enough."""
+
+    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+        """The engine's dataset with the study's own results."""
+
+    def findings(self, results: Results) -> list[str]:
+        """The answer in sentences, the most important first; every number comes from the data."""
+
+    def figures(self, results: Results) -> list[Figure]:
+        """The figures of the report, the most important first."""
+
+
+def kind_names() -> tuple[str, ...]:
+    """The kinds of study that there are; a new one is one new file in the folder of kinds."""
+    modules = pkgutil.iter_modules([str(KINDS_FOLDER)])
+    return tuple(sorted(module.name.replace("_", "-") for module in modules))
+
+
+def kind_named(name: str, where: str = "kind") -> Kind:
+    """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
+    known = kind_names()
+    if name not in known:
+        near = get_close_matches(name, known, n=1)
+        remedy = f'did you mean "{near[0]}"?' if near else ""
+        expected = f"one of {', '.join(known)}"
+        raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
+    return cast(Kind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
+
+
+def kind_of(study: Study) -> Kind:
+    """The kind of a study, after its check. Raises BadInput."""
+    kind = kind_named(study.kind, study.source.where("kind"))
+    kind.check(study)
+    return kind
+
+
+def run(study: Study, **options: Any) -> xr.Dataset:
+    """Run a study in memory: the dataset of its archive. options: as of `engine.run`. Raises BadInput."""
+    import engine
+
+    kind = kind_of(study)
+    return finish(engine.run(study, reduction=kind.reduction(study), **options), study)
+
+
+def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """The study's own results added to the engine's dataset, all compared with the declarations.
+
+    Raises ArchiveError where the two differ.
+    """
+    from results_schema.validate import validate
+
+    kind = kind_named(study.kind)
+    finished = kind.summarise(dataset, study)
+    missing = {key: value for key, value in study_attributes(study).items() if key not in finished.attrs}
+    finished = finished.assign_attrs(missing)
+    validate(finished, kind.name, sensor_units(study), tuple(study.carriage))
+    return finished
+
+
+def study_attributes(study: Study) -> Mapping[str, str]:
+    """What a dataset says of the study it came from."""
+    return {
+        "title": study.title or study.kind,
+        "study_kind": study.kind,
+        "study": study.source.text,
+        "study_sha256": study.source.sha256,
+    }
+
+
+def sensor_units(study: Study) -> dict[str, str]:
+    """Name and unit of every sensor."""
+    from results_schema.variables import sensor_unit
+
+    return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+
+
+def findings(dataset: xr.Dataset) -> list[str]:
+    """The answer of a finished study in sentences, from its dataset alone."""
+    from studies.results import Results
+
+    results = Results.of(dataset)
+    return kind_named(results.study.kind).findings(results)
+
+
+def figures(dataset: xr.Dataset) -> Sequence[Figure]:
+    """The figures of a finished study, from its dataset alone."""
+    from studies.results import Results
+
+    results = Results.of(dataset)
+    return kind_named(results.study.kind).figures(results)

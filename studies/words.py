@@ -1,0 +1,122 @@
+"""Numbers and units as people write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_PREFIXED = ("m", "N", "N m", "Pa")
+_METRES = (-9, -6, -3, 0)
+
+
+class Scale(NamedTuple):
+    """A unit that suits the size of some values: values times `factor` are in `unit`."""
+
+    factor: float
+    unit: str
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, and never in the form 1e+05 between 1e-4 and 1e6.
+
+    >>> number(0.00123456), number(12345.6), number(5.0), number(-1.2e-7), number(float("nan"))
+    ('0.00123', '12300', '5', '-1.2e-7', 'none')
+    """
+    if not math.isfinite(value):
+        return "none"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    rounded = round(value, digits - 1 - size)
+    if -4 <= size < 6:
+        places = max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
+        text = f"{rounded:.{places}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"{mantissa}e{int(exponent)}"
+
+
+def unit_text(units: str) -> str:
+    """A unit of the archive as people write it.
+
+    >>> unit_text("m s-2"), unit_text("N m"), unit_text("1"), unit_text("kg m-3")
+    ('m/s²', 'N m', '', 'kg/m³')
+    """
+    over, under = [], []
+    for part in ("" if units == "1" else units).split():
+        stem = part.rstrip("-0123456789")
+        power = part[len(stem) :]
+        if power.startswith("-"):
+            under.append(stem + ("" if power == "-1" else power[1:].translate(_SUPERSCRIPTS)))
+        else:
+            over.append(stem + power.translate(_SUPERSCRIPTS))
+    if not under:
+        return " ".join(over)
+    bottom = under[0] if len(under) == 1 else f"({' '.join(under)})"
+    return f"{' '.join(over) or '1'}/{bottom}"
+
+
+def axis_title(name: str, units: str) -> str:
+    """Name and unit as on a figure's axis.
+
+    >>> axis_title("speed", "m s-1"), axis_title("mass ratio", "")
+    ('speed (m/s)', 'mass ratio')
+    """
+    unit = unit_text(units)
+    return f"{name} ({unit})" if unit else name
+
+
+def scale_for(largest: float, units: str) -> Scale:
+    """A unit in which values of this size read well.
+
+    >>> scale_for(0.0123, "m"), scale_for(2.5e4, "N"), scale_for(3.0, "m s-2")
+    (Scale(factor=1000.0, unit='mm'), Scale(factor=0.001, unit='kN'), Scale(factor=1.0, unit='m/s²'))
+    """
+    if units not in _PREFIXED or not math.isfinite(largest) or largest <= 0.0:
+        return Scale(1.0, unit_text(units))
+    known = _METRES if units == "m" else tuple(_PREFIXES)
+    exponent = 3 * math.floor(math.log10(largest) / 3.0 + 1e-12)
+    exponent = min(max(exponent, known[0]), known[-1])
+    return Scale(10.0**-exponent, _PREFIXES[exponent] + units)
+
+
+def quantity(value: float, units: str, digits: int = 3) -> str:
+    """A value with its unit.
+
+    >>> quantity(0.0012345, "m"), quantity(5.0, "m s-1"), quantity(0.25, "1")
+    ('1.23 mm', '5 m/s', '0.25')
+    """
+    scale = scale_for(abs(value), units)
+    text = number(value * scale.factor, digits)
+    return f"{text} {scale.unit}" if scale.unit else text
+
+
+def percent(part: float, digits: int = 2) -> str:
+    """A part in percent.
+
+    >>> percent(0.01234)
+    '1.2 %'
+    """
+    return f"{number(100.0 * part, digits)} %"
+
+
+def counted(count: int, noun: str) -> str:
+    """A number with its noun.
+
+    >>> counted(1, "variant"), counted(2400, "variant")
+    ('1 variant', '2,400 variants')
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts joined as in a sentence.
+
+    >>> listed(["a", "b", "c"])
+    'a, b and c'
+    """
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))

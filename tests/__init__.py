@@ -1,0 +1,1 @@
+"""Tests; `naive` and `reference` are a second source that shares no code with the engine."""

@@ -1,0 +1,114 @@
+"""Prescribed motions as tuples of phases with exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from tests.naive.scene import Phase
+
+
+def cruise(start: float, end: float, speed: float, begin: float = 0.0) -> tuple[Phase, ...]:
+    """Constant speed > 0 (m/s) from start to end (m), backward where end < start, beginning at time `begin`."""
+    velocity = math.copysign(speed, end - start)
+    return (
+        Phase(
+            begin,
+            begin + abs(end - start) / speed,
+            lambda t: start + velocity * (t - begin),
+            lambda t: velocity,
+            lambda t: 0.0,
+        ),
+    )
+
+
+def sinusoidal(centre: float, amplitude: float, circular: float, cycles: float) -> tuple[Phase, ...]:
+    """s = centre + amplitude sin(Om t) with Om in rad/s."""
+    return (
+        Phase(
+            0.0,
+            2.0 * math.pi * cycles / circular,
+            lambda t: centre + amplitude * math.sin(circular * t),
+            lambda t: amplitude * circular * math.cos(circular * t),
+            lambda t: -amplitude * circular**2 * math.sin(circular * t),
+        ),
+    )
+
+
+def _turn(at: float, depth: float, speed: float, begin: float, middle: float) -> Phase:
+    """Half a turn at the end `at`: s = at + depth (1 - cos(pi u / t_r)), u from the turn's middle, t_r = pi |depth|/v.
+
+    depth is signed into the stroke; the half lasts t_r/2, and at its outer edge the speed is v and s'' is 0.
+    """
+    rate = speed / abs(depth)
+    return Phase(
+        begin,
+        begin + 0.5 * math.pi / rate,
+        lambda t: at + depth * (1.0 - math.cos(rate * (t - middle))),
+        lambda t: depth * rate * math.sin(rate * (t - middle)),
+        lambda t: depth * rate**2 * math.cos(rate * (t - middle)),
+    )
+
+
+def out_and_back(start: float, end: float, speed: float, turn: float, cycles: int) -> tuple[Phase, ...]:
+    """There and back `cycles` times; at each end the speed turns as a cosine over `turn` (> 0) of the stroke.
+
+    It begins at rest at `start`, in the middle of a turn. One cycle lasts 2 (stroke - 2 d)/v + 2 pi d/v with
+    d = turn x stroke, and the two halves of a turn are separate phases without a jump between them.
+    """
+    depth = turn * (end - start)
+    half = 0.5 * math.pi * abs(depth) / speed
+    phases: list[Phase] = []
+    t = 0.0
+    for _ in range(cycles):
+        for here, there, into in ((start, end, depth), (end, start, -depth)):
+            phases.append(_turn(here, into, speed, t, t))
+            t += half
+            phases.extend(cruise(here + into, there - into, speed, t))
+            t = phases[-1].end
+            phases.append(_turn(there, -into, speed, t, t + half))
+            t += half
+    return joined(phases)
+
+
+def instant_out_and_back(start: float, end: float, speed: float, cycles: int) -> tuple[Phase, ...]:
+    """There and back `cycles` times at constant speed; s' changes its sign at once at both ends."""
+    phases: list[Phase] = []
+    t = 0.0
+    for _ in range(cycles):
+        phases.extend(cruise(start, end, speed, t))
+        phases.extend(cruise(end, start, speed, phases[-1].end))
+        t = phases[-1].end
+    return joined(phases)
+
+
+def reversed_motion(phases: tuple[Phase, ...], total: float) -> tuple[Phase, ...]:
+    """The same path ridden backward in time: s(total - t)."""
+    return tuple(_reversed_phase(phase, total) for phase in phases[::-1])
+
+
+def _reversed_phase(phase: Phase, total: float) -> Phase:
+    return Phase(
+        total - phase.end,
+        total - phase.start,
+        lambda t: phase.s(total - t),
+        lambda t: -phase.ds(total - t),
+        lambda t: phase.dds(total - t),
+    )
+
+
+def shifted(phase: Phase, delay: float) -> Phase:
+    """The same piece of motion `delay` seconds later."""
+    return Phase(
+        phase.start + delay,
+        phase.end + delay,
+        lambda t: phase.s(t - delay),
+        lambda t: phase.ds(t - delay),
+        lambda t: phase.dds(t - delay),
+    )
+
+
+def joined(phases: Sequence[Phase]) -> tuple[Phase, ...]:
+    """Phases whose ends are bitwise the starts of the next, so that no instant falls between two of them."""
+    ends = [after.start for after in phases[1:]] + [phases[-1].end]
+    return tuple(Phase(p.start, end, p.s, p.ds, p.dds) for p, end in zip(phases, ends, strict=True))

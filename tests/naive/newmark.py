@@ -1,0 +1,133 @@
+"""Newmark's method with dense matrices, one solve per step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.naive.scene import (
+    Array,
+    Scene,
+    Side,
+    State,
+    acceleration,
+    contact_forces,
+    events,
+    impulse,
+    system,
+)
+
+
+class Newmark(NamedTuple):
+    """Parameters of the scheme; the default is average acceleration."""
+
+    beta: float = 0.25
+    gamma: float = 0.5
+
+
+class Event(NamedTuple):
+    """What the histories do not show: the values just before an event at instant number `step`."""
+
+    step: int
+    t: float
+    v: Array
+    a: Array
+    contact_force: Array
+
+
+@dataclass(frozen=True)
+class History:
+    """Everything at every instant t (S,).
+
+    q, v, a: (S, N). contact_force: (S, loads), N, 0 off the body. position, w_under: (S, loads), m, NaN off the body.
+    At an event all of it is the limit from the right (after the impulse); `before` keeps the limits from the left. An
+    event at the last instant is not carried out: there the values are limits from the left.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    contact_force: Array
+    position: Array
+    w_under: Array
+    before: tuple[Event, ...]
+
+    def displacement(self, row: Array) -> Array:
+        """Displacement (S,) where the modes have the row (N,)."""
+        return self.q @ row
+
+
+def grid(scene: Scene, start: float, end: float, steps: int) -> Array:
+    """About `steps` equal steps between start and end, with every event of the scene exactly on an instant."""
+    marks = [start, *(t for t in events(scene) if start < t < end), end]
+    pieces = [np.linspace(a, b, max(1, round(steps * (b - a) / (end - start))) + 1)[:-1] for a, b in pairwise(marks)]
+    return np.concatenate([*pieces, [end]])
+
+
+def snapped(scene: Scene, times: Sequence[float] | Array) -> tuple[Array, set[int]]:
+    """The instants with events put exactly on them, and the indices of inner events.
+
+    Raises ValueError where an event lies between two instants.
+    """
+    t = np.array(times, dtype=np.float64)
+    inner: set[int] = set()
+    for event in events(scene):
+        if not t[0] - 1e-12 <= event <= t[-1] + 1e-12:
+            continue
+        index = int(np.argmin(np.abs(t - event)))
+        if abs(t[index] - event) > 1e-9 * (t[-1] - t[0]):
+            raise ValueError(f"event at t = {event} s is not an instant of the grid")
+        t[index] = event
+        if 0 < index < len(t) - 1:
+            inner.add(index)
+    return t, inner
+
+
+def collect(scene: Scene, t: Array, states: Sequence[State], a: Sequence[Array], before: Sequence[Event]) -> History:
+    """Histories with contact forces, positions and displacements under the loads."""
+    last = len(t) - 1
+    sides: list[Side] = ["right" if n < last else "left" for n in range(len(t))]
+    force = np.array([contact_forces(scene, *at) for at in zip(t, states, a, sides, strict=True)]).reshape(
+        len(t), len(scene.loads)
+    )
+    position = np.full_like(force, np.nan)
+    under = np.full_like(force, np.nan)
+    for n, side in enumerate(sides):
+        for j, load in enumerate(scene.loads):
+            phase = load.phase(t[n], side)
+            if phase is not None:
+                position[n, j] = phase.s(t[n])
+                under[n, j] = scene.phi(position[n, j], 0) @ states[n].q
+    q, v = np.array([s.q for s in states]), np.array([s.v for s in states])
+    return History(t, q, v, np.array(a), force, position, under, tuple(before))
+
+
+def march(scene: Scene, times: Sequence[float] | Array, start: State, scheme: Newmark | None = None) -> History:
+    """Newmark's march over the instants `times` (S,) from `start`, which holds just after times[0] (no impulse there).
+
+    Predictors u* = q + h q' + (1/2 - beta) h^2 q'', v* = q' + (1 - gamma) h q''; then
+    (M + gamma h C + beta h^2 K) q''_new = f - C v* - K u* with matrices just before the new instant. At an event the
+    impulse is added and q'' computed anew with the matrices just after it.
+    """
+    beta, gamma = scheme or Newmark()
+    t, inner = snapped(scene, times)
+    states, accelerations, before = [start], [acceleration(scene, t[0], start, "right")], []
+    for n in range(1, len(t)):
+        h, (q, v), a = t[n] - t[n - 1], states[-1], accelerations[-1]
+        u_star = q + h * v + (0.5 - beta) * h**2 * a
+        v_star = v + (1.0 - gamma) * h * a
+        m, c, k, f = system(scene, t[n], "left")
+        a = np.linalg.solve(m + gamma * h * c + beta * h**2 * k, f - c @ v_star - k @ u_star)
+        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
+        if n in inner:
+            before.append(Event(n, t[n], state.v, a, contact_forces(scene, t[n], state, a, "left")))
+            state = State(state.q, state.v + impulse(scene, t[n], state))
+            a = acceleration(scene, t[n], state, "right")
+        states.append(state)
+        accelerations.append(a)
+    return collect(scene, t, states, accelerations, before)

@@ -1,0 +1,230 @@
+"""Loads riding on a body that is given as modes of unit modal mass, and the dense matrices of the coupled system.
+
+With the material acceleration D2w = phi.q'' + 2 s' phi'.q' + (s'^2 phi'' + s'' phi').q of the contact point and the
+contact force F = m (g - D2w) acting on the modes, moving all that is linear in q to the left gives
+
+    M(t) q'' + C(t) q' + K(t) q = f(t)
+    M = I + sum m phi phi^T
+    C = diag(2 zeta omega) + sum m phi (2 s' phi')^T + sum c psi psi^T        (psi: the row of a damper)
+    K = diag(omega^2)      + sum m phi (s'^2 phi'' + s'' phi')^T
+    f = sum m g phi + own weight
+
+Nothing here is clever on purpose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+Law = Callable[[float], float]
+Shape = Callable[[float, int], Array]
+Side = Literal["left", "right"]
+
+RELATIVE_JUMP = 1e-9  # smaller differences of s' or s'' across a phase boundary are rounding, not events
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One smooth piece of a motion, start <= t <= end in s: position s(t) in m and its two exact derivatives."""
+
+    start: float
+    end: float
+    s: Law
+    ds: Law
+    dds: Law
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load and its motion; off the body before the first phase and after the last.
+
+    mass: kg in M(t). convective_mass: kg in C(t) and K(t); equal to mass, or 0 where convective terms are left out.
+    weight: N along gravity. arrival_speed: vertical speed in m/s before the load touches the body.
+    """
+
+    phases: tuple[Phase, ...]
+    weight: float
+    mass: float = 0.0
+    convective_mass: float = 0.0
+    arrival_speed: float = 0.0
+
+    @property
+    def enter(self) -> float:
+        """Time in s at which the load touches the body."""
+        return self.phases[0].start
+
+    @property
+    def leave(self) -> float:
+        """Time in s at which the load leaves the body."""
+        return self.phases[-1].end
+
+    def phase(self, t: float, side: Side) -> Phase | None:
+        """The phase valid just before ("left") or just after ("right") t; None while the load is off the body."""
+        for phase in self.phases:
+            if side == "left" and phase.start < t <= phase.end:
+                return phase
+            if side == "right" and phase.start <= t < phase.end:
+                return phase
+        return None
+
+    def active(self, t: float, side: Side = "right") -> bool:
+        """Whether the load is in contact just before or just after t."""
+        return self.phase(t, side) is not None
+
+
+def moving_force(weight: float, phases: Sequence[Phase]) -> Load:
+    """A force of `weight` N that moves and has no inertia."""
+    return Load(tuple(phases), weight)
+
+
+def moving_mass(mass: float, gravity: float, phases: Sequence[Phase]) -> Load:
+    """A mass in kg with every convective term; its weight acts."""
+    return Load(tuple(phases), mass * gravity, mass, mass)
+
+
+def mass_without_convective(mass: float, gravity: float, phases: Sequence[Phase]) -> Load:
+    """A mass in kg that takes part with phi.q'' only; its weight acts."""
+    return Load(tuple(phases), mass * gravity, mass, 0.0)
+
+
+class Damper(NamedTuple):
+    """A discrete damper to ground: row psi = phi(x_d), shape (N,), and coefficient in N s/m; force -c psi (psi.q')."""
+
+    row: Array
+    coefficient: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A body of N modes and what acts on it.
+
+    phi(s, derivative) -> (N,), unit modal mass; omega (N,) rad/s; zeta (N,); own_weight (N,) modal force of gravity.
+    """
+
+    phi: Shape
+    omega: Array
+    zeta: Array
+    loads: tuple[Load, ...]
+    dampers: tuple[Damper, ...] = ()
+    own_weight: Array | None = None
+
+
+class System(NamedTuple):
+    """M, C, K of shape (N, N) and f of shape (N,) at one instant."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    force: Array
+
+
+class State(NamedTuple):
+    """Modal coordinates q and velocities v, each (N,)."""
+
+    q: Array
+    v: Array
+
+
+def convective_rows(phi: Shape, phase: Phase, t: float) -> tuple[Array, Array, Array]:
+    """phi, 2 s' phi' and s'^2 phi'' + s'' phi' at time t, each (N,)."""
+    s, ds, dds = phase.s(t), phase.ds(t), phase.dds(t)
+    return phi(s, 0), 2.0 * ds * phi(s, 1), ds**2 * phi(s, 2) + dds * phi(s, 1)
+
+
+def system(scene: Scene, t: float, side: Side) -> System:
+    """The coupled matrices just before or just after t, assembled as in the module's docstring."""
+    mass = np.eye(len(scene.omega))
+    damping = np.diag(2.0 * scene.zeta * scene.omega)
+    stiffness = np.diag(scene.omega**2)
+    force = np.zeros(len(scene.omega)) if scene.own_weight is None else scene.own_weight.copy()
+    for damper in scene.dampers:
+        damping = damping + damper.coefficient * np.outer(damper.row, damper.row)
+    for load in scene.loads:
+        phase = load.phase(t, side)
+        if phase is None:
+            continue
+        row, rate_row, position_row = convective_rows(scene.phi, phase, t)
+        mass = mass + load.mass * np.outer(row, row)
+        damping = damping + load.convective_mass * np.outer(row, rate_row)
+        stiffness = stiffness + load.convective_mass * np.outer(row, position_row)
+        force = force + load.weight * row
+    return System(mass, damping, stiffness, force)
+
+
+def acceleration(scene: Scene, t: float, state: State, side: Side) -> Array:
+    """q'' consistent with the equations of motion at t, shape (N,)."""
+    now = system(scene, t, side)
+    solved: Array = np.linalg.solve(now.mass, now.force - now.damping @ state.v - now.stiffness @ state.q)
+    return solved
+
+
+def contact_forces(scene: Scene, t: float, state: State, a: Array, side: Side) -> Array:
+    """Contact force of every load in N, 0 while it is off the body; shape (loads,)."""
+    forces = np.zeros(len(scene.loads))
+    for j, load in enumerate(scene.loads):
+        phase = load.phase(t, side)
+        if phase is not None:
+            row, rate_row, position_row = convective_rows(scene.phi, phase, t)
+            convective = rate_row @ state.v + position_row @ state.q
+            forces[j] = load.weight - load.mass * (row @ a) - load.convective_mass * convective
+    return forces
+
+
+def impulse(scene: Scene, t: float, state: State) -> Array:
+    """Jump dq' at t by masses that arrive or reverse at once, shape (N,).
+
+    A mass must end with the vertical speed phi.(q' + dq') + s'_after phi'.q. The mismatch to the speed it had is
+    phi.q' + s' phi'.q - w'_before on arrival and (s'_after - s'_before) phi'.q on a reversal; momentum gives
+    dq' = -(I + sum over all masses in contact of m phi phi^T)^-1 sum m phi mismatch.
+    """
+    momentum = np.zeros(len(scene.omega))
+    for load in scene.loads:
+        before, after = load.phase(t, "left"), load.phase(t, "right")
+        if after is None:
+            continue
+        row, slope = scene.phi(after.s(t), 0), scene.phi(after.s(t), 1) @ state.q
+        if before is None:
+            convective = after.ds(t) * slope * (load.convective_mass > 0.0)
+            momentum += load.mass * row * (row @ state.v + convective - load.arrival_speed)
+        else:
+            momentum += load.convective_mass * row * (after.ds(t) - before.ds(t)) * slope
+    jump: Array = -np.linalg.solve(system(scene, t, "right").mass, momentum)
+    return jump
+
+
+def _jumps(before: Phase, after: Phase) -> bool:
+    """Whether s' or s'' is discontinuous where two phases meet."""
+    t = after.start
+    speed = max(abs(before.ds(t)), abs(after.ds(t)), 1e-300)
+    rate = max(abs(before.dds(t)), abs(after.dds(t)), speed / (after.end - after.start))
+    return (
+        abs(after.ds(t) - before.ds(t)) > RELATIVE_JUMP * speed
+        or abs(after.dds(t) - before.dds(t)) > RELATIVE_JUMP * rate
+    )
+
+
+def events(scene: Scene) -> tuple[float, ...]:
+    """Times of entry, exit and of every jump of s' or s'', ascending and without repetition."""
+    times: set[float] = set()
+    for load in scene.loads:
+        times |= {load.enter, load.leave}
+        times |= {b.start for a, b in pairwise(load.phases) if _jumps(a, b)}
+    return tuple(sorted(times))
+
+
+def rest(scene: Scene) -> State:
+    """Undeformed and at rest."""
+    zero = np.zeros(len(scene.omega))
+    return State(zero, zero.copy())
+
+
+def equilibrium(scene: Scene, t: float) -> State:
+    """Static equilibrium with every load resting where it is just after t: omega^2 q = f; q' = 0."""
+    return State(system(scene, t, "right").force / scene.omega**2, np.zeros(len(scene.omega)))

@@ -1,0 +1,145 @@
+"""Faults 1, 4 and 5: files that are no study files, and numbers that no study can mean."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine.document import document_of, read_document, write_document
+from engine.scene import load
+from results_schema.errors import BadInput
+from tests.scene.sample import MINIMAL, SAMPLE
+
+
+def refused(text: str | Path) -> str:
+    """The message, got within a time that rules out quadratic reading."""
+    start = time.perf_counter()
+    with pytest.raises(BadInput) as error:
+        load(text)
+    assert time.perf_counter() - start < 10.0
+    assert error.value.exit_code == 2
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("raw", "words"),
+    [
+        (b"\xef\xbb\xbfkind = 'a'\n", ["line 1", "byte-order mark"]),
+        ("kind = 'a'\n".encode("utf-16"), ["line 1", "not text"]),
+        (b"kind = 'a'\ntitle = '\xff'\n", ["line 2", "0xff"]),
+        (b"kind = 'a'\n\0\n", ["line 2"]),
+        (bytes(range(256)), ["UTF-8"]),
+        (b"", ["schema_version"]),
+        (b"kind = 'a'\nkind = 'b'\n", ["line 2", "Cannot overwrite"]),
+        (b"[body.a]\n[body.b]\n[body.a]\n", ["line 3", "twice"]),
+        (b"a = 1\nb =\n", ["line 2", "Invalid value"]),
+        (b"a = 'x", ["line 1", "Expected"]),
+        (b"#" * 1_000_001, ["1000000 bytes"]),
+    ],
+)
+def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
+    file = tmp_path / "study.toml"
+    file.write_bytes(raw)
+    message = refused(file)
+    assert "study.toml" in message
+    assert all(word in message for word in words), message
+
+
+def test_what_is_no_file(tmp_path: Path) -> None:
+    assert "No such file" in refused(tmp_path / "none.toml")
+    assert "not a file" in refused(tmp_path)
+    assert "null" in refused("a\0b")
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("nan", ["finite", "received nan"]),
+        ("-inf", ["finite", "received -inf"]),
+        ("1e400", ["finite", "received 1e400"]),
+        ("-1E+400", ["finite", "received -1E+400"]),
+        ("9223372036854775808", ["64 bits", "9223372036854775808"]),
+        ("0x" + "f" * 5000, ["64 bits"]),
+        ("1" * 5000, ["64 bits"]),
+        ("1." + "1" * 5000, ["finite"]),
+        ("1_" * 4000 + "1", ["64 bits"]),
+        ("[1.0, [2.0, nan]]", ["length.1.1"]),
+        ("{ a = inf }", ["length.a"]),
+    ],
+)
+@pytest.mark.parametrize("sample", [SAMPLE, MINIMAL])
+def test_numbers(sample: str, value: str, words: list[str]) -> None:
+    message = refused(sample.replace("length = 15.0", f"length = {value}"))
+    assert "body.bed.length" in message
+    assert all(word in message for word in words), message
+    assert len(message) < 500
+
+
+def test_line_of_a_number() -> None:
+    line = SAMPLE.split("\n").index("length = 15.0") + 1
+    assert f"line {line}: body.bed.length" in refused(SAMPLE.replace("length = 15.0", "length = 1e999"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = " + "[" * 3000 + "]" * 3000 + "\n",
+        "x = " + "{a = " * 3000 + "1" + "}" * 3000 + "\n",
+        ".".join("a" * 3000) + " = 1\n",
+        "[" + ".".join("a" * 3000) + "]\n",
+        'x = {"a"' + ' . "a"' * 3000 + " = 1}\n",
+        "a." * 400_000 + "b = 1\n",
+        "[" * 900_000 + "\n",
+        "".join(f"[{'a.' * 40}b{i}]\n" for i in range(3000)),
+    ],
+)
+def test_nesting(text: str) -> None:
+    assert "nested" in refused(text) or "[" * 900_000 in text
+
+
+def test_text_is_kept() -> None:
+    document = read_document(SAMPLE)
+    assert document.source.text == SAMPLE
+    assert document.source.sha256 == hashlib.sha256(SAMPLE.encode()).hexdigest()
+    assert document.data == tomllib.loads(SAMPLE)
+
+
+def test_messages_hold_no_control_characters() -> None:
+    message = refused('schema_version = 1\n"\\u001b[31mred\\n" = "\\u001b"\n')
+    assert message.isprintable()
+
+
+def test_numpy_becomes_plain() -> None:
+    data = {"a": np.float32(0.5), "b": np.array([[1, 2], [3, 4]]), "c": (np.int8(3), None), "d": None, "e": np.True_}
+    plain = document_of({key: value for key, value in data.items() if key != "c"}).data
+    assert plain == {"a": 0.5, "b": [[1, 2], [3, 4]], "e": True}
+    assert [type(value) for value in plain.values()] == [float, list, bool]
+    with pytest.raises(BadInput, match=r"a\.1"):
+        document_of({"a": np.array([1.0, np.nan])})
+
+
+scalars = (
+    st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+)
+values = st.recursive(
+    scalars,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("ab. \"'é\n", max_size=5), inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@given(st.dictionaries(st.text("abc-_ .", max_size=6), values, max_size=4))
+@settings(max_examples=150, deadline=None)
+def test_written_data_read_back(data: dict[str, Any]) -> None:
+    assert tomllib.loads(write_document(data)) == data

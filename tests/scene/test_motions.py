@@ -1,0 +1,198 @@
+"""Laws of motion against numerical derivatives, closed forms, symmetry and the naive twins."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine.law import Motion
+from engine.motions import Cruise, OutAndBack, Sinusoidal, Waypoints
+from tests.naive import motions as naive
+
+places = st.floats(0.0, 20.0).map(lambda x: round(x, 3))
+speeds = st.floats(0.01, 50.0)
+
+
+@st.composite
+def strokes(draw: st.DrawFn) -> dict[str, float]:
+    start, end = draw(st.tuples(places, places).filter(lambda pair: abs(pair[0] - pair[1]) > 0.01))
+    return {"start": start, "end": end}
+
+
+cruises = st.builds(lambda s, v: Cruise(kind="cruise", speed=v, **s), strokes(), speeds)
+shuttles = st.builds(
+    lambda s, v, turn, n: OutAndBack(kind="out-and-back", speed=v, turn=turn, cycles=n, **s),
+    strokes(),
+    speeds,
+    st.just(0.0) | st.floats(0.01, 0.5),
+    st.integers(1, 4),
+)
+sines = st.builds(
+    lambda c, a, f, n: Sinusoidal(kind="sinusoidal", centre=c, amplitude=a, frequency=f, cycles=n),
+    places,
+    st.floats(0.01, 9.0),
+    speeds,
+    st.integers(1, 4),
+)
+
+
+@st.composite
+def waypoints(draw: st.DrawFn) -> Waypoints:
+    spans = draw(st.lists(st.floats(0.1, 5.0), min_size=1, max_size=6))
+    positions = draw(st.lists(places, min_size=len(spans) + 1, max_size=len(spans) + 1))
+    return Waypoints(kind="waypoints", times=[0.0, *np.cumsum(spans).tolist()], positions=positions)
+
+
+laws = cruises | shuttles | sines | waypoints()
+
+
+def smooth_instants(motion: Motion, margin: float) -> np.ndarray:
+    tau = np.linspace(0.0, motion.duration, 401)[1:-1] * (1 - 1e-3)
+    edges = [*motion.breaks(), 0.0, motion.duration]
+    if isinstance(motion, OutAndBack):  # the third derivative jumps there
+        first, last = motion.cruise_part()
+        edges += [k + part for k in range(motion.cycles) for part in (first, last, 1 - last, 1 - first)]
+    if isinstance(motion, Waypoints):
+        edges += [time / motion.times[-1] for time in motion.times]
+    return tau[np.abs(tau[:, None] - np.array(edges)).min(axis=1) > margin]
+
+
+@given(laws)
+@settings(max_examples=60, deadline=None)
+def test_derivatives(motion: Motion) -> None:
+    step = 1e-5
+    tau = smooth_instants(motion, 3 * step)
+    before, here, after = (motion.path(tau + shift) for shift in (-step, 0.0, step))
+    scale = np.abs(here.ddS).max() + motion.max_speed
+    assert tau.size > 50
+    np.testing.assert_allclose((after.S - before.S) / (2 * step), here.dS, rtol=0, atol=1e-5 * scale)
+    np.testing.assert_allclose((after.dS - before.dS) / (2 * step), here.ddS, rtol=0, atol=1e-3 * scale)
+
+
+@given(laws)
+@settings(max_examples=60, deadline=None)
+def test_range_and_largest_speed(motion: Motion) -> None:
+    path = motion.path(np.linspace(0.0, motion.duration, 4001))
+    low, high = motion.range()
+    slack = 1e-5 * (high - low)
+    assert path.S.min() >= low - 1e-12 * (1 + abs(low))
+    assert path.S.max() <= high + 1e-12 * (1 + abs(high))
+    assert path.S.min() <= low + slack
+    assert path.S.max() >= high - slack
+    fastest = np.abs(path.dS).max()
+    assert fastest <= motion.max_speed * (1 + 1e-12)
+    assert fastest >= motion.max_speed * (1 - 1e-4)
+
+
+@given(laws)
+@settings(max_examples=40, deadline=None)
+def test_outside_its_time(motion: Motion) -> None:
+    early, late = motion.path([-3.0, -1e-9]), motion.path([motion.duration * 1.001, motion.duration + 5])
+    np.testing.assert_array_equal(early.S, motion.path(0.0).S)
+    assert not np.any(early.dS) and not np.any(early.ddS)
+    assert all(np.isnan(part).all() for part in late)
+    assert np.isfinite(motion.path([0.0, motion.duration, motion.duration * (1 + 1e-15)])).all()
+
+
+def at(motion: Motion, t: float, side: str = "right") -> tuple[float, float, float]:
+    """s, s', s'' in time."""
+    scale = motion.time_scale
+    path = motion.path(t / scale, side)  # type: ignore[arg-type]
+    return float(path.S), float(path.dS) / scale, float(path.ddS) / scale**2
+
+
+def compare_with_phases(motion: Motion, phases: tuple[Any, ...]) -> None:
+    assert motion.duration * motion.time_scale == pytest.approx(phases[-1].end, rel=1e-13)
+    for phase in phases:
+        for part in (0.03, 0.37, 0.5, 0.92):
+            t = phase.start + part * (phase.end - phase.start)
+            assert at(motion, t) == pytest.approx((phase.s(t), phase.ds(t), phase.dds(t)), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(("start", "end"), [(7.5, 14.7), (14.7, 7.5)])
+def test_against_the_naive_twins(start: float, end: float) -> None:
+    keys: dict[str, Any] = {"kind": "out-and-back", "start": start, "end": end, "speed": 5.0, "cycles": 3}
+    compare_with_phases(OutAndBack(turn=0.1, **keys), naive.out_and_back(start, end, 5.0, 0.1, 3))
+    compare_with_phases(OutAndBack(turn=0.0, **keys), naive.instant_out_and_back(start, end, 5.0, 3))
+    compare_with_phases(Cruise(kind="cruise", start=start, end=end, speed=5.0), naive.cruise(start, end, 5.0))
+    wave = Sinusoidal(kind="sinusoidal", centre=7.5, amplitude=7.0, frequency=0.3, cycles=2)
+    compare_with_phases(wave, naive.sinusoidal(7.5, 7.0, 2 * math.pi * 0.3, 2))
+
+
+def test_out_and_back_closed_form() -> None:
+    motion = OutAndBack(kind="out-and-back", start=0.5, end=0.98, speed=2.0, turn=0.1, cycles=3)
+    depth, stroke = 0.048, 0.48
+    assert motion.time_scale == pytest.approx(2 * (math.pi * depth + stroke - 2 * depth) / 2.0, rel=1e-14)
+    turn_time = math.pi * depth / 2.0
+    for u in np.linspace(0, turn_time / 2, 7):
+        assert at(motion, u)[0] == pytest.approx(0.5 + depth * (1 - math.cos(math.pi * u / turn_time)), rel=1e-13)
+    assert at(motion, 0.0) == pytest.approx((0.5, 0.0, 2.0**2 / depth))
+    assert at(motion, turn_time / 2)[:2] == pytest.approx((0.548, 2.0))
+    first, last = motion.cruise_part()
+    scale = motion.time_scale
+    np.testing.assert_allclose(motion.path([first, last]).S, [0.548, 0.932], rtol=1e-13)
+    np.testing.assert_allclose(motion.path(np.linspace(first, last, 9)).dS / scale, 2.0, rtol=1e-12)
+    np.testing.assert_allclose(motion.path([0.5, 1.0, 2.5, 3.0]).S, [0.98, 0.5, 0.98, 0.5], rtol=1e-13)
+    np.testing.assert_allclose(motion.path([0.5, 1.0, 2.5, 3.0]).dS, 0.0, atol=1e-12)
+
+
+@given(shuttles, st.floats(0.001, 0.499))
+@settings(max_examples=60, deadline=None)
+def test_cycles_repeat_and_mirror(motion: OutAndBack, tau: float) -> None:
+    later = [tau + k for k in range(motion.cycles)]
+    first, mirror, again = motion.path(tau), motion.path(1.0 - tau), motion.path(later)
+    atol = 1e-9 * motion.max_speed
+    np.testing.assert_allclose([mirror.S, -mirror.dS], [first.S, first.dS], atol=atol)
+    np.testing.assert_allclose(again.S, first.S, atol=atol)
+    twin = OutAndBack(**(motion.model_dump() | {"start": motion.end, "end": motion.start}))
+    np.testing.assert_allclose(twin.path(tau).S - twin.start, motion.start - first.S, atol=atol)
+
+
+def test_instant_turns_are_one_sided() -> None:
+    motion = OutAndBack(kind="out-and-back", start=1.0, end=3.0, speed=1.0, turn=0, cycles=2)
+    np.testing.assert_array_equal(motion.breaks(), [0.5, 1.0, 1.5])
+    for tau, before, after in motion.reversals():
+        assert (motion.path(tau, "left").dS, motion.path(tau, "right").dS) == (before, after)
+        assert motion.path(tau, "left").S == motion.path(tau, "right").S
+        np.testing.assert_array_equal(motion.path_on([tau - 0.5, tau], tau - 0.5, tau).dS, [before, before])
+        np.testing.assert_array_equal(motion.path_on([tau, tau + 0.5], tau, tau + 0.5).dS, [after, after])
+    assert [r.before for r in motion.reversals()] == [4.0, -4.0, 4.0]
+    assert OutAndBack(kind="out-and-back", start=1.0, end=3.0, speed=1.0, turn=0.1, cycles=2).breaks().size == 0
+
+
+@given(shuttles | sines)
+@settings(max_examples=100, deadline=None)
+def test_rounding_never_leaves_the_range(motion: Motion) -> None:
+    halves = np.arange(0, 2 * motion.duration + 1) / 4
+    low, high = motion.range()
+    positions = motion.path(halves[halves <= motion.duration]).S
+    assert positions.min() >= low and positions.max() <= high
+
+
+def test_waypoints() -> None:
+    motion = Waypoints(kind="waypoints", times=[0.0, "1 s", 4.0], positions=[1.0, "500 cm", 2.0])
+    assert motion.time_scale == 4.0
+    path = motion.path([0.0, 0.25, 1.0])
+    np.testing.assert_allclose(path.S, [1.0, 5.0, 2.0], atol=1e-14)
+    np.testing.assert_allclose(path.dS[[0, 2]], 0.0, atol=1e-13)
+    left, right = motion.path(0.25 - 1e-12), motion.path(0.25 + 1e-12)
+    np.testing.assert_allclose(left.ddS, right.ddS, rtol=1e-8)
+    assert motion.range()[1] > 5.0
+
+
+def test_speed_is_not_in_the_shape() -> None:
+    slow, fast = (OutAndBack(kind="out-and-back", start=1, end=3, speed=v, turn=0.1, cycles=2) for v in (1, 7))
+    assert slow.shape_key() == fast.shape_key()
+    tau = np.linspace(0, 2, 33)
+    np.testing.assert_array_equal(slow.path(tau), fast.path(tau))
+    assert slow.time_scale == pytest.approx(7 * fast.time_scale)
+    keys = [slow.shape_key(), Cruise(kind="cruise", start=1, end=3, speed=1).shape_key()]
+    keys.append(OutAndBack(kind="out-and-back", start=1, end=3, speed=1, turn=0.2, cycles=2).shape_key())
+    assert len(set(keys)) == 3
+    doubled = Waypoints(kind="waypoints", times=[0, 2, 6], positions=[1, 5, 2])
+    assert doubled.shape_key() == Waypoints(kind="waypoints", times=[0, 1, 3], positions=[1, 5, 2]).shape_key()

@@ -1,0 +1,44 @@
+"""Faults 2, 3 and 4 for every key of a study that uses most of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from engine.scene import load
+from engine.sweep import Cases, expand
+from tests.scene.mutations import Mutation, mutations, survives
+from tests.scene.sample import MINIMAL, SAMPLE
+
+OPTIONAL = {
+    "title", "gravity", "initial", "sweep", "solver", "output", "carriage.probe", "carriage.load",
+    "body.bed.damping_ratio", "body.bed.modes", "body.bed.own_weight", "body.bed.fibre_distance",
+    "body.bed.supports.0.stiffness", "body.bed.supports.0.rotational", "body.bed.supports.0.damping",
+    "carriage.table.delay", "carriage.load.headway", "carriage.load.motion.after",
+    "sensor", "sensor.midspan", "sensor.midspan.quantity", "sensor.table_moment", "sensor.table_moment.quantity",
+    "sweep.speed", "sweep.mass", "sweep.speed.spacing",
+    "solver.fidelity", "solver.steps", "solver.tolerance", "solver.static_correction", "solver.audit",
+    "output.histories",
+}  # fmt: skip
+
+
+def read(text: str) -> Cases:
+    return expand(load(text))
+
+
+def test_samples_are_valid() -> None:
+    assert read(SAMPLE).shape == (40, 4)
+    assert read(MINIMAL).shape == ()
+
+
+@pytest.mark.parametrize("mutation", mutations(SAMPLE), ids=str)
+def test_every_key(mutation: Mutation) -> None:
+    accepted = survives(mutation, read)
+    if mutation.how == "drop":
+        assert accepted == (".".join(mutation.path) in OPTIONAL)
+
+
+def test_mutations_reach_every_key() -> None:
+    found = {".".join(mutation.path) for mutation in mutations(SAMPLE)}
+    assert found >= OPTIONAL
+    assert {"body.bed.supports.1.at", "sweep.mass.values.2", "carriage.gripper.motion.times.1"} <= found
+    assert len(mutations(SAMPLE)) > 350

@@ -1,0 +1,130 @@
+"""Numbers with units: exact, of the right dimension, or refused."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import pytest
+from pydantic import Field, ValidationError
+
+from engine.spec import Spec
+from engine.units import (
+    ACCELERATION,
+    AREA,
+    DAMPING,
+    DENSITY,
+    DIMENSIONLESS,
+    FORCE,
+    FREQUENCY,
+    KNOWN,
+    LENGTH,
+    MASS,
+    PRESSURE,
+    ROTATIONAL_STIFFNESS,
+    SECOND_MOMENT,
+    SPEED,
+    STIFFNESS,
+    TIME,
+    Length,
+    Unit,
+)
+
+
+class Thing(Spec):
+    length: Length = Field(gt=0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "value"),
+    [
+        (LENGTH, "15 m", 15.0),
+        (LENGTH, "15m", 15.0),
+        (LENGTH, " 1.5e1  m ", 15.0),
+        (LENGTH, "-3 mm", -0.003),
+        (LENGTH, "480 in", 480 * 0.0254),
+        (AREA, "100 cm^2", 0.01),
+        (AREA, "100 cm2", 0.01),
+        (SECOND_MOMENT, "833 cm⁴", 8.33e-6),
+        (SECOND_MOMENT, "833 cm**4", 8.33e-6),
+        (PRESSURE, "210 GPa", 210e9),
+        (PRESSURE, "0.1 N/mm^2", 1e5),
+        (DENSITY, "7.85 t/m^3", 7850.0),
+        (MASS, "0.1 t", 100.0),
+        (FORCE, "1 kg m/s^2", 1.0),
+        (SPEED, "200 km/h", 200 / 3.6),
+        (ACCELERATION, "981 cm/s/s", 9.81),
+        (STIFFNESS, "200 kN/mm", 2e8),
+        (ROTATIONAL_STIFFNESS, "2 kN m/rad", 2000.0),
+        (ROTATIONAL_STIFFNESS, "2 kN m", 2000.0),
+        (ROTATIONAL_STIFFNESS, "1 N·m/deg", 180 / math.pi),
+        (DAMPING, "3 kN s/m", 3000.0),
+        (TIME, "100 ms", 0.1),
+        (FREQUENCY, "2 kHz", 2000.0),
+        (FREQUENCY, "60 rpm", 1.0),
+        (FREQUENCY, "1 rad/s", 1 / (2 * math.pi)),
+        (FREQUENCY, "3 1/s", 3.0),
+        (DIMENSIONLESS, "5 %", 0.05),
+        (DIMENSIONLESS, "2 percent", 0.02),
+    ],
+)
+def test_values_are_rounded_once(unit: Unit, text: str, value: float) -> None:
+    assert unit.si(text) == value
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "words"),
+    [
+        (LENGTH, "15 kg", ["a mass (kg)", "a length (m)"]),
+        (MASS, "15 N", ["a force (N)", "a mass (kg)"]),
+        (LENGTH, "15 s^3", ["s3", "a length (m)"]),
+        (LENGTH, "15 rad", ["rad1"]),
+        (DIMENSIONLESS, "3 deg", ["plain number"]),
+        (LENGTH, "15", ["no unit"]),
+        (LENGTH, "", ["not a length"]),
+        (LENGTH, "m", ["not a length"]),
+        (LENGTH, "nan m", ["not a length"]),
+        (LENGTH, "1e999 m", ["beyond"]),
+        (LENGTH, "1 furlongg", ["no such unit"]),
+        (LENGTH, "1 m/", ["breaks off"]),
+        (LENGTH, "2**9 m", ["no such unit"]),
+        (LENGTH, "9**9**9**9 m", ["no such unit"]),
+        (LENGTH, "1 m*__import__('os')", ["no such unit"]),
+        (LENGTH, "1 " + "m*" * 60 + "m", ["not a length"]),
+        (MASS, "20 degC", ["not a mechanical unit"]),
+        (DIMENSIONLESS, "3 dB", ["no such unit"]),
+    ],
+)
+def test_refusals(unit: Unit, text: str, words: list[str]) -> None:
+    with pytest.raises(ValueError) as error:
+        unit.si(text)
+    message = f"{error.value} {error.value.context}"  # type: ignore[attr-defined]
+    assert all(word in message for word in words), message
+
+
+def test_numbers_are_si_already() -> None:
+    assert Thing(length=15).length == 15.0
+    assert isinstance(Thing(length=15).length, float)
+
+
+@pytest.mark.parametrize("value", [True, None, "12", [1.0], {}, float("nan"), float("inf"), 0, "0 m", "-1 m", 10**400])
+def test_strict(value: object) -> None:
+    with pytest.raises(ValidationError):
+        Thing(length=value)
+
+
+def test_every_dimension_reads_its_own_symbol() -> None:
+    for unit in KNOWN:
+        if unit.symbol:
+            assert unit.si(f"3 {unit.symbol.replace(' ', '*')}") == 3.0, unit
+
+
+def test_pint_is_imported_only_for_strings() -> None:
+    code = (
+        "import sys; from engine.scene import Study; "
+        "Study(kind='passage', gravity=9.81); assert 'pint' not in sys.modules; "
+        "assert not {'scipy', 'xarray', 'dask', 'numba', 'matplotlib'} & set(sys.modules); "
+        "Study(kind='passage', gravity='9.81 m/s^2'); assert 'pint' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

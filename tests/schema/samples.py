@@ -1,0 +1,113 @@
+"""Small datasets as a study would hand them over, and ways to let the disk fail."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from results_schema import files
+from results_schema.variables import axes, expand
+
+SENSORS = {"midspan": "m", "support": "N m"}
+CARRIAGES = ("table",)
+ATTRIBUTES = {
+    "Conventions": "CF-1.11",
+    "title": "A bed, <script>, {{7*7}}, $ and \nümlauts",
+    "history": "2026-11-21 wanderlast run",
+    "schema_version": 1,
+    "study_kind": "march",
+    "study": "schema_version = 1\ntitle = 'Brücke'\n",
+    "study_sha256": "ab" * 32,
+    "packages": ["numpy 2.4.6", "xarray 2026.9"],
+    "run_seconds": 1.25,
+}
+
+
+def march(shape: tuple[int, ...] = (4, 3)) -> xr.Dataset:
+    """A complete dataset of the march over a grid of speeds and masses (shape () for a study without a sweep)."""
+    dims = ("speed", "mass")[: len(shape)]
+    numbers = np.arange(1.0, np.prod(shape) + 1).reshape(shape)
+    variables = {}
+    for index, (name, variable) in enumerate(expand("march", SENSORS, CARRIAGES).items()):
+        if variable.lead == "grid":
+            data = np.asarray(numbers / (index + 3), variable.dtype)
+            variables[name] = (dims, np.zeros_like(data) if variable.flags else data, variable.attributes())
+    dataset = xr.Dataset(variables, attrs=ATTRIBUTES)
+    for name, size in zip(dims, shape, strict=True):
+        dataset = dataset.assign_coords({name: (name, np.arange(1.0, size + 1), {"units": "kg", "long_name": name})})
+    if shape:
+        ratio = axes()["speed_ratio"]
+        dataset = dataset.assign_coords(speed_ratio=("speed", dataset.speed.values / 7, ratio.attributes()))
+    return dataset
+
+
+def with_histories(dataset: xr.Dataset, chosen: tuple[int, ...] = (0, 5)) -> xr.Dataset:
+    """The dataset with histories of a few variants, on five stations."""
+    history = ("history", np.array(chosen), axes()["history"].attributes() | {"units": "1"})
+    elapsed = (("history", "station"), np.linspace(0, 1, 5 * len(chosen)).reshape(-1, 5))
+    dataset = dataset.assign_coords(history=history, elapsed=(*elapsed, axes()["elapsed"].attributes()))
+    for name in SENSORS:
+        attributes = expand("march", SENSORS, CARRIAGES)[name].attributes()
+        dataset[name] = (("history", "station"), np.sin(elapsed[1]), attributes)
+    return dataset
+
+
+def groups() -> dict[str, xr.Dataset]:
+    """The groups `/audit` and `/model/bed`."""
+    audit = xr.Dataset(
+        {
+            name: ("sample", np.array([1e-4, 2e-4, np.nan]), variable.attributes())
+            for name, variable in expand("/audit", {}, []).items()
+        },
+        coords={
+            "sample": ("sample", np.arange(3), axes()["sample"].attributes()),
+            "scheme": ("sample", np.array(["fox-goodwin", "é", ""]), axes()["scheme"].attributes()),
+        },
+    )
+    model = xr.Dataset({"frequency": ("mode", np.array([1.5, 6.0]), {"units": "Hz", "long_name": "frequency"})})
+    return {"/audit": audit, "/model/bed": model.assign_coords(mode=("mode", [1, 2], axes()["mode"].attributes()))}
+
+
+class FailNth(files.Faults):
+    """Lets the N-th operation meet a full disk; `count` tells how many there were."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.count = 0
+
+    def before(self, operation: str, path: Path) -> None:
+        self.count += 1
+        if self.count == self.number:
+            self.fail(operation, path)
+
+    def fail(self, operation: str, path: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+class KillNth(FailNth):
+    """Kills the process, as SIGKILL or a power cut would, in the N-th operation."""
+
+    def fail(self, operation: str, path: Path) -> None:
+        if operation == "fsync" and path.is_file():
+            # What was not synced is not on the disk after a power cut.
+            os.truncate(path, path.stat().st_size // 2)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def in_child(action: Callable[[], None]) -> int:
+    """Run `action` in a forked process; 0, the signal's number as a negative one, or 1 for an exception."""
+    child = os.fork()
+    if child == 0:
+        try:
+            action()
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status)

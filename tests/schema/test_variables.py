@@ -1,0 +1,113 @@
+import subprocess
+import sys
+
+import pytest
+
+from results_schema import variables
+from results_schema.errors import BadInput
+from results_schema.reference import reference_table
+from results_schema.status import Fidelity, Status, flag_meanings, flag_values, highest, label
+from results_schema.variables import RESERVED, Variable, axes, declarations, declare, expand, registered, sensor_unit
+
+
+def test_status_and_fidelity_are_the_contract():
+    assert [(int(s), label(s)) for s in Status] == [
+        (0, "ok"),
+        (1, "separated"),
+        (2, "unresolved"),
+        (3, "tolerance-missed"),
+        (4, "not-converged"),
+        (5, "diverged"),
+        (6, "crashed"),
+    ]
+    assert [s for s in Status if s.values_kept] == list(Status)[:4]
+    assert [label(f) for f in Fidelity] == ["static", "force", "mass-without-convective", "mass", "tied", "frame"]
+    assert len({s.message for s in Status}) == len(Status)
+    assert highest([]) is Status.OK
+
+
+def test_flags_are_cf():
+    assert flag_values(Status) == list(range(7))
+    assert flag_meanings(Status).split()[3] == "tolerance_missed"
+    assert len(flag_meanings(Fidelity).split()) == len(flag_values(Fidelity))
+
+
+def test_expand_fills_names_units_and_texts():
+    found = expand("march", {"midspan": "m", "root": "N m"}, ["table", "robot_arm"])
+    assert found["root_max"].units == "N m"
+    assert found["root_max_position"].units == "m"
+    assert found["robot_arm_contact_force_min"].units == "N"
+    assert found["midspan"].lead == "history"
+    assert "status" in found and "{" not in "".join(v.name + v.long_name + v.meaning for v in found.values())
+
+
+def test_attributes_are_cf():
+    found = expand("march", {"midspan": "m"}, ["table"])
+    assert found["status"].attributes()["flag_values"] == [0, 1, 2, 3, 4, 5, 6]
+    assert "units" not in found["status"].attributes()
+    assert found["error_estimate"].attributes()["units"] == "1"
+
+
+def test_a_variable_over_sensors_of_different_units_has_none():
+    declare("test-units", Variable("amount", ("sensor",), units="{sensor}", long_name="amount"))
+    try:
+        assert expand("test-units", {"a": "m", "b": "m"}, [])["amount"].units == "m"
+        assert expand("test-units", {"a": "m", "b": "N"}, [])["amount"].units is None
+        with pytest.raises(ValueError, match="declared twice"):
+            declare("test-units", Variable("amount", long_name="other"))
+    finally:
+        variables._REGISTRY.pop("test-units")
+
+
+@pytest.mark.parametrize(
+    ("sensors", "carriages", "named"),
+    [
+        ({"status": "m"}, [], "status"),
+        ({"a": "m", "a_max": "m"}, [], "a_max"),
+        ({"table_contact_force_min": "m"}, ["table"], "table_contact_force_min"),
+        ({}, ["position"], "position"),
+        ({}, ["harmonic"], "harmonic"),
+    ],
+)
+def test_names_that_clash_are_refused(sensors, carriages, named):
+    with pytest.raises(BadInput, match=named):
+        expand("march", sensors, carriages)
+
+
+def test_all_fixed_names_of_the_ground_floor_are_reserved():
+    fixed = {v.name for kind, vs in registered().items() if not kind.startswith("/") for v in vs if "{" not in v.name}
+    assert {v.name for v in declarations("*")} | set(axes()) <= RESERVED
+    assert fixed & {"speed", "mass", "damping_ratio"} == set()
+    assert {"lag", "peak_phase", "critical_step", "variant", "tool_centre_point_error"} <= RESERVED
+
+
+def test_groups_do_not_inherit_the_outputs_of_every_kind():
+    assert [v.name for v in declarations("/model/bed")] == ["frequency", "damping_ratio", "mode_shape"]
+    assert "status" in [v.name for v in declarations("march")]
+
+
+def test_every_declaration_has_a_text_and_a_row_in_the_table():
+    table = reference_table()
+    rows = table.splitlines()[2:]
+    declared = [(kind, v) for kind, vs in registered().items() for v in vs]
+    assert len(rows) == len(declared) > 40
+    for row, (_, variable) in zip(rows, declared, strict=True):
+        assert variable.long_name
+        assert row.startswith(f"| `{variable.name}` |")
+        assert row.count("|") == 7
+
+
+def test_sensor_units():
+    assert sensor_unit("acceleration") == "m s-2"
+    with pytest.raises(BadInput, match="displacement"):
+        sensor_unit("displacment")
+
+
+def test_importing_the_package_is_cheap():
+    modules = ("errors", "status", "variables", "reference", "validate", "files", "locks", "parts", "archive")
+    code = f"import sys; {'; '.join(f'import results_schema.{m}' for m in modules)}; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert not {"xarray", "netCDF4", "pandas", "engine", "studies"} & set(loaded)
+    code = "import sys, results_schema.errors, results_schema.status, results_schema.variables; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert "numpy" not in loaded
