@@ -196,8 +196,7 @@ def _with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows, declared: d
 
 def _stations(plan: Plan, stations: int) -> tuple[str, tuple[str, NDArray[Any], dict[str, Any]]]:
     """The dimension of histories: the phase of a cycle where all have the same, else a number."""
-    if plan.window == "last-cycle" and plan.study.output.histories == "auto":
-        if all(motion.motion.period is not None for motion in plan.base.riders[:1]):
-            return "phase", ("phase", np.arange(stations) / stations, axes()["phase"].attributes())
+    periodic = plan.base.riders[0].motion.period is not None
+    if periodic and plan.window == "last-cycle" and plan.study.output.histories == "auto":
+        return "phase", ("phase", np.arange(stations) / stations, axes()["phase"].attributes())
     return "station", ("station", np.arange(stations, dtype=np.int64), axes()["station"].attributes())
-

@@ -35,12 +35,12 @@ class Needs:
     @property
     def total(self) -> Array:
         """The largest."""
-        return np.max(np.stack(list(self.per_rule.values())), axis=0)
+        return np.asarray(np.max(np.stack(list(self.per_rule.values())), axis=0))
 
     @property
     def deciding(self) -> NDArray[np.int64]:
         """Number of the rule that asks for most."""
-        return np.argmax(np.stack(list(self.per_rule.values())), axis=0)
+        return np.asarray(np.argmax(np.stack(list(self.per_rule.values())), axis=0))
 
 
 def needed_steps(model: SceneModel, scheme: Scheme, time_scale: Array) -> Needs:
@@ -91,7 +91,7 @@ def round_up(steps: Array) -> Counts:
     return np.rint(LEAST_STEPS / _STAIR[0] * part * 2.0**octave).astype(np.int64)
 
 
-def check_fixed_steps(model: SceneModel, scheme: Scheme, time_scale: Array, steps: Array) -> None:
+def check_fixed_steps(model: SceneModel, scheme: Scheme, time_scale: Array, steps: Array | Counts) -> None:
     """Refuse fixed steps beyond a scheme's stability limit (fault 12). Raises BadInput with limit and suggestion."""
     if not math.isfinite(scheme.stability_limit):
         return
@@ -109,7 +109,7 @@ def check_fixed_steps(model: SceneModel, scheme: Scheme, time_scale: Array, step
         )
 
 
-def check_most_steps(model: SceneModel, steps: Array) -> None:
+def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
     """Refuse step counts beyond the cap (fault 13). Raises BadInput."""
     if steps.size and not float(np.max(steps)) <= MOST_STEPS:
         raise BadInput(

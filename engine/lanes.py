@@ -49,7 +49,8 @@ class LaneValues:
         pace = next((key for key in ("speed", "frequency") if hasattr(motion, key)), None)
         if pace is None:
             return np.full(self.size, motion.time_scale)
-        return motion.time_scale * getattr(motion, pace) / self.of(f"carriage.{carriage}.motion.{pace}")
+        way = float(motion.time_scale * getattr(motion, pace))
+        return way / self.of(f"carriage.{carriage}.motion.{pace}")
 
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""
@@ -80,7 +81,7 @@ class LaneValues:
     def damping_rates(self, body: str, omega: Array) -> Array:
         """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
         key = f"body.{body}.damping_ratio"
-        spec = getattr(self.study.body[body], "damping_ratio")
+        spec = self.study.body[body].damping_ratio
         if isinstance(spec, Rayleigh):
             return self.of(f"{key}.rayleigh.0") + self.of(f"{key}.rayleigh.1") * omega[:, None] ** 2
         if isinstance(spec, tuple):

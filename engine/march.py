@@ -27,7 +27,6 @@ from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
 from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table
 from engine.model import SceneModel
-from engine.signals import Sensor
 from engine.tables import SceneTables
 from engine.timeline import Segment
 from engine.track import tabulate_blow
@@ -145,22 +144,8 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     model = tables.model
     own = sum(part.modal.mass for part in model.bodies if part.own_weight)
     weight = np.abs(lanes.weight[:, : len(model.carriages)]).sum(axis=1) + own * lanes.gravity
-    scale = _static_scales(tables) * DIVERGED
+    scale = tables.static_scales * DIVERGED
     contact = DIVERGED * np.abs(lanes.weight[:, : len(model.carriages)])
     sensors = scale[None, :, None] * weight[:, None]
     found = np.concatenate([sensors, contact], axis=1)
     return np.where(found > 0.0, found, np.inf)
-
-
-def _static_scales(tables: SceneTables) -> Array:
-    """(sensors,) a sensor's largest static reading per unit force over its body, rates at the highest frequency."""
-    found = []
-    for sensor in tables.sensors:
-        part = tables.model.bodies[sensor.body]
-        s = np.linspace(0.0, part.modal.length, 65)
-        x = s if sensor.under is not None else np.array([sensor.at])
-        displacement = Sensor(sensor.name, "displacement", sensor.body, sensor.at, sensor.under)
-        reader = displacement if sensor.offset_order else sensor
-        largest = np.abs(reader.flexibility(tables.model, x, s, "model")).max()
-        found.append(largest * part.modal.omega.max() ** sensor.offset_order)
-    return np.array(found)

@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Flat = dict[str, NDArray[np.generic]]
 
-STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
-
 
 def run_chunk(plan: Plan, bucket: Bucket, variants: Counts) -> tuple[Flat, Rows | None]:
     """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept."""
@@ -105,7 +103,7 @@ def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
     if tables.model.carriages[carriage].inertia == "force":
         return np.full(marks.shape[-1], -1.0)
     early, late = marched.guard[carriage][BELOW_AT], marks[BELOW_AT]
-    return np.where(early >= 0.0, early, late)
+    return np.asarray(np.where(early >= 0.0, early, late))
 
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
@@ -126,9 +124,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 
 def _statics(tables: SceneTables, values: LaneValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
-    first, last = tables.timeline.window
-    counts = np.unique(np.rint(np.linspace(first, last, STATIC_STATIONS)).astype(np.int64))
-    unit = tables.static_at(counts)
+    unit = tables.static_over_window
     weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
     gravity = values.of("gravity")
     found: Flat = {}

@@ -26,7 +26,9 @@ from results_schema.errors import BadInput
 Counts = NDArray[np.int64]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
-TASK_SECONDS = 0.4  # of one chunk: a stop waits no longer than that
+TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
+LEAST_TASK_SECONDS = 0.02  # of one chunk: less is not worth its overhead
+TASKS = 16  # into which small studies are cut, so that all threads have work
 MOST_LANES = 65536  # of one chunk
 MOST_HISTORY_BYTES = 48 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
 MOST_MEMORY = 16 * 2**30
@@ -56,7 +58,7 @@ class Bucket:
         """Expected time on one thread."""
         signals = 1.0 + 0.1 * len(self.tables.signals)
         ties = self.scene.ties**1.5
-        return self.scene.omega.size * self.tables.timeline.steps * signals * ties / PACE
+        return float(self.scene.omega.size * self.tables.timeline.steps * signals * ties / PACE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +89,10 @@ class Plan:
 
         return f"{self.study.source.sha256}-{kernel_hash()}"
 
-    @property
+    @cached_property
     def seconds(self) -> float:
         """Expected time of the march on one thread."""
-        return sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets)
+        return float(sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets))
 
     @property
     def numbers_per_variant(self) -> int:
@@ -117,7 +119,8 @@ class Plan:
 
     def lanes_per_chunk(self, bucket: Bucket) -> int:
         """Variants of one task, by time and memory."""
-        lanes = TASK_SECONDS / bucket.seconds_per_variant
+        task = float(np.clip(self.seconds / TASKS, LEAST_TASK_SECONDS, TASK_SECONDS))
+        lanes = task / bucket.seconds_per_variant
         if self.reduction is not None:
             rows = min(2 * self.reduction.stations, bucket.steps)
             lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
@@ -140,7 +143,9 @@ def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"
-    buckets = tuple(bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window))
+    buckets = tuple(
+        bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window)
+    )
     base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
     if plan.memory_bytes > MOST_MEMORY:
@@ -227,7 +232,7 @@ def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) 
 def _reason(needs: Needs, lanes: Counts) -> str:
     """The rule that decides for the most demanding of some variants."""
     worst = lanes[np.argmax(needs.total[lanes])]
-    return list(needs.per_rule)[needs.deciding[worst]]
+    return list(needs.per_rule)[int(needs.deciding[worst])]
 
 
 def _shown(study: Study, size: int) -> Counts:

@@ -20,6 +20,7 @@ from engine.timeline import Rider
 from engine.track import Way
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
@@ -57,7 +58,8 @@ class Sensor:
             return [Channel("q", 0, _spread(model, part, factor * part.modal.shape(x, order)))]
         shape = part.modal.shape(x)
         if self.under is None:
-            return [Channel({1: "v", 2: "a"}[RATE_ORDER[self.quantity]], RATE_ORDER[self.quantity], _spread(model, part, shape))]
+            order = RATE_ORDER[self.quantity]
+            return [Channel("qva"[order], order, _spread(model, part, shape))]
         way = along[self.under]
         ds, dds = way.ds[:, None], way.dds[:, None]
         slope = part.modal.shape(x, 1)
@@ -91,7 +93,7 @@ class Sensor:
         elastic = part.modal.omega > 0.0
         soft = part.modal.shape(s)[:, elastic] / part.modal.omega[elastic] ** 2
         kept = factor * np.sum(part.modal.shape(x, order)[:, elastic] * soft, axis=1)
-        return full - kept if share == "missed" else kept
+        return np.asarray(full - kept if share == "missed" else kept)
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""
@@ -106,14 +108,16 @@ class Sensor:
             return np.zeros(stations)
         way = along[self.under]
         slope = model.sag(self.body, x, 1)
-        return way.ds * slope if self.quantity == "velocity" else way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope
+        if self.quantity == "velocity":
+            return way.ds * slope
+        return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
 
     @property
     def offset_order(self) -> int:
         """The power of 1/h that makes the offset SI."""
         return RATE_ORDER.get(self.quantity, 0)
 
-    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, self.under is None or along[self.under].active)
 
@@ -139,11 +143,11 @@ class ContactForce:
     def offset_order(self) -> int:
         return 0
 
-    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         way, carriage = along[self.carriage], model.carriages[self.carriage]
         low, high = span_counted(model, carriage.rider, carriage.body)
-        return way.active & (way.s >= low) & (way.s <= high)
+        return np.asarray(way.active & (way.s >= low) & (way.s <= high))
 
 
 Signal = Sensor | ContactForce

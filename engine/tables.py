@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 KEPT_BYTES = 96 * 2**20  # tables kept per scene; older ones are built again
+STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
 SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
 Window = Literal["whole", "last-cycle"]
@@ -105,6 +106,26 @@ class SceneTables:
             tabulate_watch(self.model, self.signals, along),
             tabulate_watch(self.model, contacts, along),
         )
+
+    @cached_property
+    def static_over_window(self) -> StaticUnit:
+        """Static readings at stations spread over the recorded part, for the largest of them."""
+        first, last = self.timeline.window
+        return self.static_at(np.unique(np.rint(np.linspace(first, last, STATIC_STATIONS)).astype(np.int64)))
+
+    @cached_property
+    def static_scales(self) -> Array:
+        """(sensors,) a sensor's largest static reading per unit force anywhere on its body; of a rate that of the
+        displacement times powers of the highest frequency kept."""
+        found = []
+        for sensor in self.sensors:
+            part = self.model.bodies[sensor.body]
+            s = np.linspace(0.0, part.modal.length, 65)
+            x = s if sensor.under is not None else np.array([sensor.at])
+            reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
+            largest = np.abs(reader.flexibility(self.model, x, s, "model")).max()
+            found.append(largest * part.modal.omega.max() ** sensor.offset_order)
+        return np.array(found)
 
     def ways_at(self, counts: Counts) -> tuple[Way, ...]:
         """Places of all carriages at stations by their count; ``active`` says whether any of them is on its body."""

@@ -20,6 +20,7 @@ from engine.law import Motion, Path
 from engine.motions import Cruise
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
 FREE_STEPS = 200  # per first period of the body in free vibration
@@ -55,7 +56,8 @@ class Rider:
 
     def path(self, tau: Array, start: float, end: float) -> Path:
         """Position and its derivatives by scene time on a segment without a break inside, one-sided at its ends."""
-        own, first, last = ((t - self.delay) * self.pace for t in (tau, start, end))
+        own = (tau - self.delay) * self.pace
+        first, last = ((t - self.delay) * self.pace for t in (start, end))
         if last <= 0.0 or first >= self.motion.duration:
             place = self.motion.path(0.0 if last <= 0.0 else self.motion.duration).S
             return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
@@ -143,7 +145,7 @@ class Timeline:
         last = self.segments[-1]
         return last.first + last.steps
 
-    def moments(self, counts: Array) -> tuple[NDArray[np.int64], Array]:
+    def moments(self, counts: Array | Counts) -> tuple[NDArray[np.int64], Array]:
         """Segment and scene time of stations by their count; a boundary belongs to the segment that ends there."""
         firsts = np.array([segment.first for segment in self.segments])
         index = np.maximum(np.searchsorted(firsts, counts, side="left") - 1, 0)
@@ -151,7 +153,7 @@ class Timeline:
         steps = np.array([segment.step for segment in self.segments])
         return index, starts[index] + (counts - firsts[index]) * steps[index]
 
-    def motion(self, rider: int, counts: Array) -> Path:
+    def motion(self, rider: int, counts: Array | Counts) -> Path:
         """Place of a rider (m) and its derivatives by scene time at stations by their count; NaN where it is off the
         body or the count is negative."""
         found = Path(*(np.full(counts.shape, np.nan) for _ in range(3)))
@@ -165,7 +167,7 @@ class Timeline:
                     part[here] = values
         return found
 
-    def positions(self, rider: int, counts: Array) -> Array:
+    def positions(self, rider: int, counts: Array | Counts) -> Array:
         """Only the place of a rider, as in `motion`."""
         return self.motion(rider, counts).S
 

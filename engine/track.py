@@ -30,7 +30,7 @@ class Way:
 
 def ways(model: SceneModel, segment: Segment) -> tuple[Way, ...]:
     """The ways of all carriages at the stations 0..steps of a segment."""
-    tau = segment.start + np.arange(segment.steps + 1) * segment.step
+    tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end
     return tuple(
         _way(carriage, segment, tau, active) for carriage, active in zip(model.carriages, segment.active, strict=True)

@@ -12,6 +12,7 @@ from results_schema.errors import BadInput
 
 LIBRARY = Path(__file__).parent / "library"
 STARTS = Path(__file__).parent / "starts"
+EVERY_STUDY = STARTS / "every-study.part"
 
 
 @dataclass(frozen=True)
@@ -60,14 +61,17 @@ def find_study(study: str) -> Path:
     )
 
 
-def find_start(kind: str) -> Path:
-    """The file to start from for a kind of study. Raises BadInput."""
+def start_text(kind: str) -> str:
+    """A study file to start from: what is special about the kind, then every key that all kinds share.
+
+    Raises BadInput for an unknown kind.
+    """
     known = starts()
     if kind not in known:
         raise BadInput(
             "no such kind of study", where=kind, expected=f"one of {', '.join(known)}", remedy=_nearest(kind, known)
         )
-    return known[kind]
+    return known[kind].read_text(encoding="utf-8") + EVERY_STUDY.read_text(encoding="utf-8")
 
 
 def _files(folder: Path) -> Mapping[str, Path]:

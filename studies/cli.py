@@ -35,7 +35,10 @@ def commands() -> None:
 @click.argument("kind")
 @click.argument("file", type=_FILE, required=False)
 def init(kind: str, file: Path | None) -> None:
-    """Write a commented study file of KIND to start from (FILE; default: KIND.toml)."""
+    """Write a commented study file of KIND to start from.
+
+    FILE is KIND.toml unless given.
+    """
     from studies import actions
 
     actions.init(kind, file)
@@ -44,7 +47,7 @@ def init(kind: str, file: Path | None) -> None:
 @commands.command()
 @click.argument("study")
 def check(study: str) -> None:
-    """Validate STUDY and explain what a run would do; computes nothing large, writes nothing."""
+    """Validate STUDY and explain what a run would do."""
     from studies import actions
 
     actions.check(study)
@@ -57,21 +60,32 @@ def check(study: str) -> None:
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 @_THREADS
 @_JSON
-def run(study: str, as_json: bool, **options: Any) -> int:
-    """Run STUDY, write its archive and print a summary.
+def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
+    """Run STUDY and write its archive.
 
-    Started again after any interruption it goes on from what is finished.
+    With a progress bar, and a summary at the end. Started again after any interruption it goes on from what is
+    finished.
     """
-    from studies import actions
+    from studies import actions, console, summary
+    from studies.options import RunOptions
 
-    return actions.run(study, actions.RunOptions(**options), as_json=as_json)
+    outcome = actions.run(study, archive, RunOptions(**how))
+    code = actions.exit_code(outcome)
+    if as_json:
+        console.say_json(summary.as_json(outcome, code))
+    else:
+        console.show_outcome(outcome)
+    return code
 
 
 @commands.command()
 @click.argument("archive", type=_FILE)
 @click.option("-o", "folder", type=_FOLDER, metavar="FOLDER", help="Where to write; default: <archive>-report, here.")
 def report(archive: Path, folder: Path | None) -> None:
-    """Write one self-contained page with the figures of ARCHIVE, and the figures as SVG and PNG."""
+    """Write a page with the figures of ARCHIVE.
+
+    One self-contained HTML page, and the figures as SVG and PNG beside it.
+    """
     from studies import actions
 
     actions.report(archive, folder)
@@ -79,16 +93,16 @@ def report(archive: Path, folder: Path | None) -> None:
 
 @commands.command()
 @click.argument("archive", type=_FILE)
-def info(archive: Path) -> int:
-    """Tell what is inside ARCHIVE, who made it, and whether it is whole."""
+def info(archive: Path) -> None:
+    """Tell what is inside ARCHIVE and whether it is whole."""
     from studies import actions
 
-    return actions.info(archive)
+    actions.info(archive)
 
 
 @commands.command(name="list")
 def list_() -> None:
-    """List the built-in studies, and the kinds that "init" knows."""
+    """List the built-in studies and the kinds of study."""
     from studies import actions
 
     actions.list_studies()
@@ -96,15 +110,19 @@ def list_() -> None:
 
 @commands.command()
 @click.option("--modes", type=click.IntRange(1, 64), default=10, show_default=True, help="Modes of the beam.")
-@click.option("--steps", type=click.IntRange(1, 10**7), default=1000, show_default=True, help="Steps of a passage.")
-@click.option("--variants", type=click.IntRange(1, 10**7), default=16384, show_default=True, help="Variants at once.")
+@click.option("--steps", type=click.IntRange(1, 10**6), default=1000, show_default=True, help="Steps of a passage.")
+@click.option("--variants", type=click.IntRange(1, 10**6), default=16384, show_default=True, help="Variants at once.")
 @_THREADS
 @_JSON
 def bench(modes: int, steps: int, variants: int, threads: int | None, as_json: bool) -> None:
-    """Measure the throughput of the march on this machine, compiling left out."""
-    from studies import actions
+    """Measure the pace of the march on this machine."""
+    from studies import actions, console
 
-    actions.bench(modes, steps, variants, threads, as_json=as_json)
+    found = actions.bench(modes, steps, variants, threads)
+    if as_json:
+        console.say_json(found.as_json())
+    else:
+        console.show_throughput(found)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

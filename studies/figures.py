@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
@@ -25,8 +26,14 @@ from studies.words import number
 INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
 DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-SEQUENTIAL = "cividis"
+SEQUENTIAL = "viridis"
 
+BESIDE: Mapping[str, Any] = {
+    "loc": "upper left",
+    "bbox_to_anchor": (1.01, 1.02),
+    "alignment": "left",
+    "borderpad": 0.0,
+}
 WIDTH = 7.6  # inches: the width of the page's column
 STYLE: Mapping[str, Any] = {
     "text.parse_math": False,
@@ -117,7 +124,7 @@ def png(figure: Figure) -> bytes:
 
 def shades(count: int) -> list[Any]:
     """Colours of `count` ordered values, dark to light but never pale; colour-blind safe."""
-    colours = matplotlib.colormaps["viridis"]
+    colours = matplotlib.colormaps[SEQUENTIAL]
     return [colours(0.9 * i / max(1, count - 1)) for i in range(count)] if count > 1 else [BLUE]
 
 
@@ -148,6 +155,21 @@ def note(axes: Axes, text: str) -> None:
     axes.set(xticks=[], yticks=[])
 
 
+def colour_bar(axes: Axes, mesh: Any, label: str, **options: Any) -> Any:
+    """The bar of a map, with plain numbers."""
+    plain = FuncFormatter(lambda value, _: number(value))
+    bar = axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, format=plain, **options)
+    bar.outline.set_visible(False)
+    bar.ax.minorticks_off()
+    return bar
+
+
+def banded(edges: Sequence[float]) -> dict[str, Any]:
+    """Colours for a map in bands between `edges`, as options of the map; values beyond the ends get end colours."""
+    colours = matplotlib.colormaps[SEQUENTIAL].resampled(len(edges) + 1)
+    return {"cmap": colours, "norm": BoundaryNorm(list(edges), colours.N, extend="both")}
+
+
 def legend_beside(axes: Axes, title: str = "") -> None:
     """The legend at the right of the plot, away from the data."""
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), title=title or None, alignment="left", borderpad=0.0)
+    axes.legend(title=title or None, **BESIDE)

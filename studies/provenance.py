@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from engine.scene import Study
-from results_schema.archive import SCHEMA_VERSION
+from results_schema.reading import SCHEMA_VERSION
 from studies.study import study_attributes
 
 CONVENTIONS = "CF-1.11"

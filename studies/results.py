@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from engine.scene import Study
 
 Array = NDArray[np.float64]
+VARIANT = "variant"
 Index = tuple[int, ...]
 
 
@@ -36,13 +37,22 @@ class Axis:
     units: str
 
     @property
+    def noun(self) -> str:
+        """Its name as a word."""
+        return self.name.replace("_", " ")
+
+    @property
     def title(self) -> str:
         """Name and unit as on a figure's axis."""
-        return axis_title(self.name.replace("_", " "), self.units)
+        return axis_title(self.noun, self.units)
+
+    def value(self, index: int) -> str:
+        """One value with its unit."""
+        return quantity(float(self.values[index]), self.units)
 
     def at(self, index: int) -> str:
-        """One value in words."""
-        return f"{self.name.replace('_', ' ')} {quantity(float(self.values[index]), self.units)}"
+        """One value with name and unit."""
+        return f"{self.noun} {self.value(index)}"
 
     def sets(self, *endings: str) -> bool:
         """Whether one of the keys that it sets ends so."""
@@ -142,6 +152,16 @@ class Results:
 
         full = xr.broadcast(xr.DataArray(values), self.dataset["status"])[0].transpose(*self.dims)
         return np.asarray(full.values, dtype=np.float64)
+
+    def holds_up_to(self, axis: Axis, holds: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+        """The largest value of an axis up to which something holds in every known variant; None if nowhere.
+
+        holds, known: in the sweep's shape.
+        """
+        values = self.everywhere(self.dataset[axis.name])
+        broken = values[known & ~holds]
+        fine = values[known & holds & (values < broken.min() if broken.size else True)]
+        return float(fine.max()) if fine.size else None
 
     def index_of(self, flat: int) -> Index:
         """Place of a variant in the sweep from its flat number."""

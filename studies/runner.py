@@ -17,8 +17,9 @@ import numpy as np
 from engine.scene import Study
 from results_schema import files
 from results_schema.archive import OutputState, open_archive, output_state, write_archive
-from results_schema.errors import ArchiveError, BadInput
+from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
+from studies.options import RunOptions
 from studies.provenance import attributes
 from studies.stopping import Stop
 from studies.study import finish, kind_of
@@ -35,27 +36,15 @@ Progress = Callable[[int, int], None]
 class Outcome:
     """What became of a run.
 
-    results: the archive's root. resumed: variants that an earlier start had finished. seconds: of this run, 0 where
-    the archive was finished already.
+    results: the archive's root. resumed: variants that an earlier start had finished. was_finished: there was
+    nothing to do. seconds: of this run.
     """
 
     archive: Path
     results: xr.Dataset
     resumed: int
+    was_finished: bool
     seconds: float
-
-    @property
-    def was_finished(self) -> bool:
-        """Whether there was nothing to do."""
-        return self.seconds == 0.0
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """How to run, nothing that changes a result. threads: None takes all cores."""
-
-    overwrite: bool = False
-    threads: int | None = None
 
 
 def run_to_archive(
@@ -72,7 +61,8 @@ def run_to_archive(
     kind = kind_of(study)
     files.check_output_place(archive)
     if _state(study, archive, options) == "same study, finished":
-        return Outcome(archive, open_archive(archive).root, 0, 0.0)
+        root = open_archive(archive).root
+        return Outcome(archive, root, int(root["status"].size), True, time.perf_counter() - started)
     plan = make_plan(study, reduction=kind.reduction(study))
     _check_disk(plan, archive)
     with _store(plan, archive, options) as store:
@@ -85,7 +75,7 @@ def run_to_archive(
         stop.check()
         write_archive(archive, root, _groups(plan))
         store.remove()
-    return Outcome(archive, root, int(done.size), seconds)
+    return Outcome(archive, root, int(done.size), False, seconds)
 
 
 def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
@@ -125,16 +115,21 @@ def _march(
 ) -> None:
     from engine.run import execute
 
-    if done.size < plan.size:
+    if done.size == plan.size:
+        return
+    try:
         execute(plan, store.write, threads=options.threads, progress=progress, stop=stop.event, done=done)
+    except Interrupted:
+        stop.check()
+        raise
 
 
 def _finished_dataset(plan: Plan, store: PartStore) -> xr.Dataset:
     """The study's dataset from all parts. That it is as declared is our affair, not the user's."""
     from engine.dataset import build
 
-    arrays = store.assemble(plan.size)
-    dataset = build(plan, arrays, store.assemble_selected())
+    arrays, selected = store.assemble(plan.size), store.assemble_selected()
+    dataset = build(plan, arrays, selected if selected.variants.size else None)
     try:
         return finish(dataset, plan.study)
     except ArchiveError as error:

@@ -86,9 +86,14 @@ def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     Raises ArchiveError where the two differ.
     """
     from results_schema.validate import validate
+    from results_schema.variables import expand
 
     kind = kind_named(study.kind)
     finished = kind.summarise(dataset, study)
+    declared = expand(kind.name, sensor_units(study), tuple(study.carriage))
+    # The engine offers static values to every summary; they are results only where the kind says so.
+    offered = [f"{sensor}_static" for sensor in study.sensor]
+    finished = finished.drop_vars([name for name in offered if name not in declared], errors="ignore")
     missing = {key: value for key, value in study_attributes(study).items() if key not in finished.attrs}
     finished = finished.assign_attrs(missing)
     validate(finished, kind.name, sensor_units(study), tuple(study.carriage))

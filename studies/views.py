@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from results_schema.status import Status
 from studies.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades
-from studies.results import Axis, Results, spread, statuses
+from studies.results import VARIANT, Axis, Results, spread, statuses
 from studies.words import listed
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-VARIANT = "variant"
 MOST_CURVES = 6
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
 SPEEDS = (".motion.speed", ".motion.frequency")
@@ -84,7 +83,7 @@ class View:
             return [Curve("", ways, grid)]
         assert self.y is not None
         order = _order(self.y)
-        return [Curve(self.y.at(int(order[i])), ways[:, i], grid[:, i]) for i in spread(len(order), MOST_CURVES)]
+        return [Curve(self.y.value(int(order[i])), ways[:, i], grid[:, i]) for i in spread(len(order), MOST_CURVES)]
 
     @property
     def words(self) -> str:
@@ -146,7 +145,7 @@ def along_axis(axes: Axes, seen: View, title: str = "", values: Array | None = N
         logarithmic(axes.xaxis)
 
 
-def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve], title: str = "") -> None:
+def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
     """Curves in ordered colours with a legend beside; points, coloured by the second axis, where it is sampled."""
     if seen.is_sampled:
         _draw_points(axes, seen, curves[0])
@@ -154,8 +153,8 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve], title: str = ""
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
         marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
         axes.plot(curve.x, curve.y, color=colour, marker=marker, label=curve.label)
-    if len(curves) > 1:
-        legend_beside(axes, title)
+    if seen.y is not None and len(curves) > 1:
+        legend_beside(axes, seen.y.noun)
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:

@@ -29,14 +29,6 @@ MAX_MODES = 64
 END_WORDS = ("pinned", "clamped", "free")
 
 
-class Body(Spec):
-    """Base of all bodies: a track of some length along which loads ride."""
-
-    @abstractmethod
-    def checks(self, here: str) -> list[Check]:
-        """Conditions between the numbers of this body at the dotted key `here`."""
-
-
 class Spring(Spec):
     """Springs and a damper to ground at a place of the beam (m): N/m, N m/rad, N s/m, not all zero."""
 
@@ -63,11 +55,26 @@ Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)],
 Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
 
 
+class Body(Spec):
+    """Base of all bodies: a track of some length along which loads ride.
+
+    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. modes: how many are kept. own_weight:
+    gravity acts on the body too, and deflections count from the unstressed state.
+    """
+
+    damping_ratio: DampingRatio = 0.0
+    modes: Modes = "auto"
+    own_weight: bool = False
+
+    @abstractmethod
+    def checks(self, here: str) -> list[Check]:
+        """Conditions between the numbers of this body at the dotted key `here`."""
+
+
 class Beam(Body):
     """A uniform beam. SI units; `supports` names both ends or lists springs, between which all is free.
 
-    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. own_weight: gravity acts on the beam
-    too, and deflections count from the unstressed state. fibre_distance: of the extreme fibre, for stress.
+    fibre_distance: of the extreme fibre, for stress.
 
     >>> bed = Beam(kind="beam", length="15 m", area=0.01, second_moment=8.33e-6, youngs_modulus="210 GPa",
     ...            density=7850, supports="pinned-pinned", damping_ratio=0.02)
@@ -82,9 +89,6 @@ class Beam(Body):
     youngs_modulus: Pressure = Field(gt=0)
     density: Density = Field(gt=0)
     supports: Supports
-    damping_ratio: DampingRatio = 0.0
-    modes: Modes = "auto"
-    own_weight: bool = False
     fibre_distance: Length | None = Field(default=None, gt=0)
 
     @property

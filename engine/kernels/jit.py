@@ -14,12 +14,10 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import llvmlite.binding as llvm
 import numba
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 #: LLVM unrolls short loops of constant length completely before its vectoriser sees them, and a loop over the lanes
 #: then stays scalar; with this limit they are vectorised (twice the pace of the march).
@@ -58,21 +56,21 @@ def _private(folder: Path) -> Path | None:
 
 
 _FOLDER = _private(cache_folder()) or Path(tempfile.mkdtemp(prefix="wanderlast-kernels-"))
-numba.config.CACHE_DIR = str(_FOLDER)
+numba.config.CACHE_DIR = str(_FOLDER)  # type: ignore[attr-defined]
 for _option in _LLVM_OPTIONS:
     llvm.set_option("wanderlast", _option)
 
-_POLICY = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
+_POLICY: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
 
 
-def kernel(function: F) -> F:
+def kernel(function: Callable[..., None]) -> Callable[..., None]:
     """Compile a function by the project's policy, cached on disk."""
-    return cast(F, numba.njit(cache=True, **_POLICY)(function))
+    return cast(Callable[..., None], numba.njit(cache=True, **_POLICY)(function))
 
 
-def piece(function: F) -> F:
+def piece(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that kernels take into their own body."""
-    return cast(F, numba.njit(inline="always", **_POLICY)(function))
+    return cast(Callable[..., Any], numba.njit(inline="always", **_POLICY)(function))
 
 
 def cache_is_damaged(error: BaseException) -> bool:

@@ -22,6 +22,7 @@ from engine.kernels.record import (
     GAIN,
     GRAVITY,
     KD,
+    LEAD,
     LOAD,
     Q_NOW,
     RATE_0,
@@ -101,9 +102,12 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
     """
     rows = ties.rows
     stations, modes = rows.shape[0], rows.shape[1]
-    rates = watch.on_v.shape[1] + watch.on_a.shape[1]
+    # a single sum over displacements is gathered in the pass itself, others from the corrected modes kept for them
+    alone = 1 if watch.signal.shape[0] == 1 and watch.on_q.shape[1] == 1 else 0
+    lead_moves = 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
-    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    work = np.zeros((modes, FIELDS, LANES))
+    now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
     y = np.empty((watch.offset.shape[1], LANES))
     marks = np.empty((watch.offset.shape[1], MARKS, LANES))
@@ -130,33 +134,41 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                 )
                 b[SUM, j] = 0.0
                 b[FACTOR, j] = 0.0
+                b[LEAD, j] = 0.0
             if n == stations - 1:
                 for k in range(modes):
                     for j in range(LANES):
                         force[j] = rows[n, k, 0, FORCE] * b[TIE, j]
                     store_mode(work, b, force, state, newmark, block, k)
             m = min(n + 1, stations - 1)
+            at = lead_moves * n
             for k in range(modes):
                 p_now = rows[n, k, 0, FORCE]
-                p, w, rate, curve = rows[m, k, 0, FORCE], rows[m, k, 0, CLOSED], rows[m, k, 0, RATE], rows[m, k, 0, CURVE]
+                p, w, rate, curve = (
+                    rows[m, k, 0, FORCE],
+                    rows[m, k, 0, CLOSED],
+                    rows[m, k, 0, RATE],
+                    rows[m, k, 0, CURVE],
+                )
                 wp = w * p
-                if rates == 0:
+                if alone == 1:
+                    row = watch.on_q[at, 0, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
                         q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
-                        work[k, Q_NOW, j] = q
+                        b[LEAD, j] += row * q
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
                         b[FACTOR, j] += wp * work[k, D, j]
                 else:
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
                         q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
-                        work[k, Q_NOW, j] = q
-                        work[k, V_NOW, j] = v
-                        work[k, A_NOW, j] = a
+                        now[k, Q_NOW, j] = q
+                        now[k, V_NOW, j] = v
+                        now[k, A_NOW, j] = a
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
                         b[FACTOR, j] += wp * work[k, D, j]
-            observe(y, work, b, watch, n)
+            observe(y, now, b, watch, n, alone)
             keep(y, marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)
 
@@ -187,16 +199,19 @@ def close_ties(b, sums, factor, ties, lanes, block, n):
             gain = lanes.gain[block, r, j]
             b[TIE + r, j] = lanes.load[block, r, j] + gain * (sums[r, j] - drive * b[GRAVITY, j])
             sums[r, j] = 0.0
-            for s in range(count):
-                factor[r, s, j] *= gain
-            factor[r, r, j] += 1.0
+        for s in range(count):
+            one = 1.0 if r == s else 0.0
+            for j in range(LANES):
+                factor[r, s, j] = one + lanes.gain[block, r, j] * factor[r, s, j]
     for r in range(count):
         for s in range(r + 1, count):
             for j in range(LANES):
                 ratio = factor[s, r, j] / factor[r, r, j]
+                factor[s, r, j] = ratio
                 b[TIE + s, j] -= ratio * b[TIE + r, j]
-                for t in range(r + 1, count):
-                    factor[s, t, j] -= ratio * factor[r, t, j]
+            for t in range(r + 1, count):
+                for j in range(LANES):
+                    factor[s, t, j] -= factor[s, r, j] * factor[r, t, j]
     for r in range(count - 1, -1, -1):
         for s in range(r + 1, count):
             for j in range(LANES):
@@ -223,7 +238,8 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
     rows = ties.rows
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
     # allocated here and not in a piece: only so does the compiler know their strides
-    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    work = np.zeros((modes, FIELDS, LANES))
+    now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
     y = np.empty((watch.offset.shape[1], LANES))
     marks = np.empty((watch.offset.shape[1], MARKS, LANES))
@@ -249,11 +265,11 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
                 force_on_mode(force, b, rows, n, k)
                 for j in range(LANES):
                     a = work[k, D, j] * force[j] - work[k, C, j]
-                    q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
-                    work[k, Q_NOW, j] = q
-                    work[k, V_NOW, j] = v
-                    work[k, A_NOW, j] = a
+                    q, v, _, _, _ = advance(work, k, j, a, newmark)
+                    now[k, Q_NOW, j] = q
+                    now[k, V_NOW, j] = v
+                    now[k, A_NOW, j] = a
                 gather_ties(sums, factor, work, rows, m, k)
-            observe(y, work, b, watch, n)
+            observe(y, now, b, watch, n, 0)
             keep(y, marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)

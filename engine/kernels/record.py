@@ -20,27 +20,32 @@ from engine.kernels.layout import (
 )
 
 # rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
-SUM, FACTOR, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, TIE = range(9)
+SUM, FACTOR, LEAD, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, TIE = range(10)
 # fields of the per-mode work array
-U, V, C, D, CD, KD, Q_NOW, V_NOW, A_NOW = range(9)
-FIELDS = 9
+U, V, C, D, CD, KD = range(6)
+FIELDS = 6
+# fields of the array of corrected modes, which is filled where more than one channel is observed
+Q_NOW, V_NOW, A_NOW = range(3)
 
 
 @piece
-def add_modes(y, work, b, row, field, order):
+def add_modes(y, now, b, row, field, order):
     """y += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours."""
-    for k in range(0, work.shape[0], 4):
+    for k in range(0, now.shape[0], 4):
         r0, r1, r2, r3 = row[k], row[k + 1], row[k + 2], row[k + 3]
         for j in range(LANES):
             y[j] += b[RATE_0 + order, j] * (
-                (r0 * work[k, field, j] + r1 * work[k + 1, field, j])
-                + (r2 * work[k + 2, field, j] + r3 * work[k + 3, field, j])
+                (r0 * now[k, field, j] + r1 * now[k + 1, field, j])
+                + (r2 * now[k + 2, field, j] + r3 * now[k + 3, field, j])
             )
 
 
 @piece
-def observe(y, work, b, watch, n):
-    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force."""
+def observe(y, now, b, watch, n, alone):
+    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force.
+
+    alone: 1 where b[LEAD] already holds the only sum, else 0.
+    """
     for i in range(y.shape[0]):
         offset, order = watch.offset[n, i], watch.offset_order[i]
         for j in range(LANES):
@@ -51,15 +56,19 @@ def observe(y, work, b, watch, n):
                 for j in range(LANES):
                     y[i, j] += missed * (b[TIE + r, j] * b[RATE_2, j])
     of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
-    for c in range(of_q):
+    for c in range(alone):
+        i = watch.signal[c]
+        for j in range(LANES):
+            y[i, j] += b[LEAD, j]
+    for c in range(alone, of_q):
         row = watch.on_q[n if watch.on_q.shape[0] > 1 else 0, c]
-        add_modes(y[watch.signal[c]], work, b, row, Q_NOW, watch.order[c])
+        add_modes(y[watch.signal[c]], now, b, row, Q_NOW, watch.order[c])
     for c in range(of_v):
         row = watch.on_v[n if watch.on_v.shape[0] > 1 else 0, c]
-        add_modes(y[watch.signal[of_q + c]], work, b, row, V_NOW, watch.order[of_q + c])
+        add_modes(y[watch.signal[of_q + c]], now, b, row, V_NOW, watch.order[of_q + c])
     for c in range(of_a):
         row = watch.on_a[n if watch.on_a.shape[0] > 1 else 0, c]
-        add_modes(y[watch.signal[of_q + of_v + c]], work, b, row, A_NOW, watch.order[of_q + of_v + c])
+        add_modes(y[watch.signal[of_q + of_v + c]], now, b, row, A_NOW, watch.order[of_q + of_v + c])
 
 
 @piece

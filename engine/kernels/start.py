@@ -7,7 +7,7 @@ import numpy as np
 
 from engine.kernels.jit import kernel, piece
 from engine.kernels.layout import CURVE, FORCE, LANES, RATE
-from engine.kernels.record import A_NOW, FIELDS, GRAVITY, Q_NOW, RATE_0, RATE_1, RATE_2, TIE, V_NOW, keep, observe
+from engine.kernels.record import A_NOW, GRAVITY, Q_NOW, RATE_0, RATE_1, RATE_2, TIE, V_NOW, keep, observe
 
 
 @piece
@@ -109,7 +109,7 @@ def watch_start(ties, lanes, state, watch, record, count):
     """Observe station 0 of a segment: extremes and samples, but not the sums of squares."""
     rows = ties.rows
     modes, many = rows.shape[1], rows.shape[2]
-    work = np.zeros((4 * ((modes + 3) // 4), FIELDS, LANES))
+    now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
     y = np.empty((watch.offset.shape[1], LANES))
     for block in range(lanes.step.shape[0]):
@@ -122,15 +122,15 @@ def watch_start(ties, lanes, state, watch, record, count):
             b[RATE_1, j] = 1.0 / h
             b[RATE_2, j] = 1.0 / (h * h)
             for k in range(modes):
-                work[k, Q_NOW, j] = state.q[block, k, j]
-                work[k, V_NOW, j] = state.v[block, k, j] * h
-                work[k, A_NOW, j] = state.a[block, k, j] * h * h
+                now[k, Q_NOW, j] = state.q[block, k, j]
+                now[k, V_NOW, j] = state.v[block, k, j] * h
+                now[k, A_NOW, j] = state.a[block, k, j] * h * h
             for r in range(many):
                 motion = ties.drive[0, r] * lanes.gravity[block, j]
                 for k in range(modes):
                     inertial, rate, curve = tie_row(rows, k, r)
-                    motion += inertial * work[k, A_NOW, j] + rate * work[k, V_NOW, j] + curve * work[k, Q_NOW, j]
+                    motion += inertial * now[k, A_NOW, j] + rate * now[k, V_NOW, j] + curve * now[k, Q_NOW, j]
                 b[TIE + r, j] = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
-        observe(y, work, b, watch, 0)
+        observe(y, now, b, watch, 0, 0)
         keep(y, marks, record.history[block], watch, record.sample[0], 0, float(count))
         marks[:, 5] = squares

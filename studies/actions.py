@@ -1,0 +1,93 @@
+"""What each command does; everything heavy is imported here, when it is needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from results_schema.errors import ArchiveError, BadInput
+from studies import catalogue, console
+
+if TYPE_CHECKING:
+    from studies.bench import Throughput
+    from studies.options import RunOptions
+    from studies.runner import Outcome
+
+SOME_NOT_OK = 3
+
+
+def init(kind: str, file: Path | None) -> None:
+    """Write a study file to start from. Raises BadInput where there is a file already."""
+    from results_schema import files
+
+    text, path = catalogue.start_text(kind), file or Path(f"{kind}.toml")
+    files.check_output_place(path)
+    if path.exists():
+        raise BadInput("there is a file already", where=str(path), remedy="choose another name or remove it")
+    files.write_text(path, text)
+    console.say(f"wrote {path}; next: wanderlast check {path}")
+
+
+def check(study: str) -> None:
+    """Validate a study and print what a run would do."""
+    import engine
+    from studies.preview import preview
+    from studies.study import kind_of
+
+    loaded = engine.load(catalogue.find_study(study))
+    plan = engine.make_plan(loaded, reduction=kind_of(loaded).reduction(loaded))
+    console.show_preview(preview(plan, len(os.sched_getaffinity(0))))
+
+
+def run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
+    """Run a study to its archive, with a progress bar; signals stop it with finished work kept."""
+    from studies.stopping import stop_on_signals
+
+    with stop_on_signals() as stop:
+        import engine
+        from studies.runner import run_to_archive
+
+        path = catalogue.find_study(study)
+        loaded = engine.load(path)
+        with console.progress_bar(path.stem) as progress:
+            return run_to_archive(loaded, archive or Path(f"{path.stem}.nc"), options, progress=progress, stop=stop)
+
+
+def exit_code(outcome: Outcome) -> int:
+    """Exit code of a finished run: 3 where some variants are not ok."""
+    from studies.summary import all_ok
+
+    return 0 if all_ok(outcome.results) else SOME_NOT_OK
+
+
+def list_studies() -> None:
+    """Print the built-in studies and the kinds of study."""
+    from studies.study import kind_named, kind_names
+
+    console.show_studies(catalogue.entries(), [(kind, kind_named(kind).summary) for kind in kind_names()])
+
+
+def report(archive: Path, folder: Path | None) -> None:
+    """Write the report of an archive."""
+    from studies.report import write_report
+
+    page = write_report(archive, folder or Path(f"{archive.name.removesuffix('.nc')}-report"))
+    console.say(f"wrote {page}")
+
+
+def info(archive: Path) -> None:
+    """Print what is inside an archive. Raises ArchiveError, after that, where it is not whole."""
+    from results_schema.archive import describe
+
+    summary = describe(archive)
+    console.show_archive(summary)
+    if not summary.whole:
+        raise ArchiveError(summary.damage)
+
+
+def bench(modes: int, steps: int, variants: int, threads: int | None) -> Throughput:
+    """Measure the throughput of the march."""
+    from studies.bench import Scene, measure
+
+    return measure(Scene(modes, steps, variants), threads)

@@ -1,0 +1,113 @@
+"""Throughput of the march that `run` uses, on a fixed scene, so that machines and versions can be compared."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.plan import Plan, make_plan
+from engine.run import execute, warm_up
+from engine.scene import Study
+
+BEST_OF = 7
+MIDSPAN = "midspan"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Size of the fixed scene: a mass crosses the pinned beam of DLR 2012, section 2.3, in `steps` steps.
+
+    Mass 10-500 kg, speed 1-20 m/s and damping 0-5 % of the variants are random with seed 0.
+    """
+
+    modes: int = 10
+    steps: int = 1000
+    variants: int = 16384
+
+    def study(self) -> Study:
+        """The scene as a study whose variants are listed one by one."""
+        random = np.random.default_rng(0)
+        axes = {
+            "speed": ("carriage.mass.motion.speed", random.uniform(1.0, 20.0, self.variants)),
+            "mass": ("carriage.mass.mass", random.uniform(10.0, 500.0, self.variants)),
+            "damping_ratio": ("body.beam.damping_ratio", random.uniform(0.0, 0.05, self.variants)),
+        }
+        return Study(
+            kind="passage",
+            gravity=9.81,
+            body={"beam": _BEAM | {"modes": self.modes}},
+            carriage={"mass": _CARRIAGE},
+            sensor={MIDSPAN: {"body": "beam", "at": 7.5, "quantity": "displacement"}},
+            sweep={"zip": True} | {name: {"of": path, "values": values} for name, (path, values) in axes.items()},
+            solver={"steps": self.steps, "static_correction": False},
+            output={"histories": "none"},
+        )
+
+
+_BEAM = {
+    "kind": "beam",
+    "length": 15.0,
+    "area": 0.01,
+    "second_moment": 8.33e-6,
+    "youngs_modulus": 2.1e11,
+    "density": 7850.0,
+    "supports": "pinned-pinned",
+}
+_CARRIAGE = {
+    "on": "beam",
+    "kind": "mass",
+    "mass": 100.0,
+    "motion": {"kind": "cruise", "start": 0.0, "end": 15.0, "speed": 10.0},
+}
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """The best of several marches of the whole scene; compiling and tabulating the track are left out."""
+
+    case_mode_steps_per_second: float
+    variants_per_second: float
+    seconds: float
+    modes: int
+    steps: int
+    variants: int
+    threads: int
+    best_of: int
+
+    def as_json(self) -> dict[str, Any]:
+        """For `bench --json`."""
+        return asdict(self)
+
+
+def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) -> Throughput:
+    """March the scene several times and take the best; threads: None takes all cores."""
+    plan = make_plan(scene.study())
+    warm_up(plan)
+    seconds = min(_seconds(plan, threads) for _ in range(best_of))
+    rate = scene.variants / seconds
+    threads = threads or os.cpu_count() or 1
+    return Throughput(
+        rate * scene.modes * scene.steps, rate, seconds, scene.modes, scene.steps, scene.variants, threads, best_of
+    )
+
+
+def largest_deflections(scene: Scene) -> NDArray[np.float64]:
+    """(variants,) largest magnitude of the midspan deflection, m: what the march that `measure` times computes."""
+    found = np.empty(scene.variants)
+
+    def take(variants: NDArray[np.int64], arrays: dict[str, NDArray[Any]], selected: object) -> None:
+        found[variants] = np.maximum(arrays[f"{MIDSPAN}_max"], -arrays[f"{MIDSPAN}_min"])
+
+    execute(make_plan(scene.study()), take)
+    return found
+
+
+def _seconds(plan: Plan, threads: int | None) -> float:
+    start = time.perf_counter()
+    execute(plan, lambda variants, arrays, selected: None, threads=threads)
+    return time.perf_counter() - start

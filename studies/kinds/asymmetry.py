@@ -1,0 +1,241 @@
+"""Does the response differ forward and backward? Indices of an out-and-back cycle at equal positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.errors import BadInput
+from results_schema.variables import MARCH, Variable, declare
+from studies import indices, theory
+from studies.results import VARIANT, Results, extreme
+from studies.telling import exceeds, first_carriage, in_words, told_statuses
+from studies.words import listed, percent, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.reduction import Cycle
+    from engine.scene import Study
+    from studies.figures import Figure
+
+LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
+Array = NDArray[np.float64]
+
+NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
+THRESHOLDS = (0.01, 0.05)
+CLOSE = 0.05
+MOST_SENSORS = 3
+STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
+
+RESULTS = (
+    Variable(
+        "lag",
+        ("sensor",),
+        units="m",
+        long_name="lag of the response",
+        meaning="<odd, dw_s/ds> over <dw_s/ds, dw_s/ds> on the cruise part of the last cycle, derivatives along "
+        "forward; negative when the response trails; NaN where the static response does not vary",
+        nan_allowed=True,
+    ),
+    Variable(
+        "loop_area",
+        ("sensor",),
+        long_name="area between forward and backward",
+        meaning="signed integral of forward minus backward over the cruise part's length times the static range R",
+        nan_allowed=True,
+    ),
+    Variable(
+        "odd_rms",
+        ("sensor",),
+        long_name="odd part of the response",
+        meaning="rms of half the difference of forward and backward over the static range R",
+        nan_allowed=True,
+    ),
+    Variable(
+        "even_excess",
+        ("sensor",),
+        long_name="dynamic part common to both ways",
+        meaning="rms of the mean of forward and backward minus the static response over the static range R",
+        nan_allowed=True,
+    ),
+)
+declare("asymmetry", *MARCH, *RESULTS)
+
+
+@dataclass(frozen=True)
+class AsymmetryReduction:
+    """lag, loop_area, odd_rms, even_excess of every sensor from the last cycle."""
+
+    stations: int = 400
+
+    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
+        return {variable.name: variable.dims for variable in RESULTS}
+
+    def sizes(self, study: Study) -> Mapping[str, int]:
+        return {"sensor": len(study.sensor)}
+
+    def __call__(self, cycle: Cycle) -> dict[str, indices.Array]:
+        """The indices, each (V, J)."""
+        from engine.motions import OutAndBack
+
+        motion = cycle.motion
+        assert isinstance(motion, OutAndBack)
+        fields = (indices.evenly(cycle.phase, field) for field in (cycle.history, cycle.static, cycle.static_slope))
+        legs = indices.folded(motion.cruise_part(), *fields)
+        found = indices.asymmetry(legs, 1.0 if motion.end > motion.start else -1.0)
+        return {name: value.T for name, value in found._asdict().items()}
+
+
+class Asymmetry:
+    """The kind "asymmetry"."""
+
+    name = "asymmetry"
+    summary = "forward against backward at equal positions: lag, loop area, odd and even parts of the last cycle"
+    question = "Does the response differ when the carriage comes back?"
+
+    def check(self, study: Study) -> None:
+        """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
+        from engine.motions import OutAndBack
+
+        name, carriage = first_carriage(study)
+        if not isinstance(carriage.motion, OutAndBack):
+            raise BadInput(
+                "forward and backward need a motion that comes back",
+                where=study.source.where(f"carriage.{name}.motion.kind"),
+                expected='"out-and-back"',
+                received=f'"{carriage.motion.kind}"',
+            )
+        _check_cruise(study, name)
+        if not study.sensor:
+            raise BadInput("nothing is measured", where=study.source.where("sensor"), expected="at least one sensor")
+        for sensor, place in study.sensor.items():
+            if place.quantity not in STATIC_QUANTITIES:
+                raise BadInput(
+                    "an asymmetry compares with the static response, which this quantity does not have",
+                    where=study.source.where(f"sensor.{sensor}.quantity"),
+                    expected=" | ".join(STATIC_QUANTITIES),
+                    received=f'"{place.quantity}"',
+                )
+
+    def reduction(self, study: Study) -> AsymmetryReduction:
+        return AsymmetryReduction()
+
+    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+        return dataset
+
+    def findings(self, results: Results) -> list[str]:
+        said = [_answer(results)]
+        for sensor in list(results.sensors)[:MOST_SENSORS]:
+            said += [_lag(results, sensor), _first_beyond(results, sensor)]
+        return [*said, *_mass(results), *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import asymmetry
+
+        return asymmetry.pictures(results)
+
+
+KIND = Asymmetry()
+
+
+def _check_cruise(study: Study, carriage: str) -> None:
+    """Every variant cruises over half of its stroke or more; a turn blends its part of the stroke at either end."""
+    from engine.sweep import expand
+
+    key = f"carriage.{carriage}.motion.turn"
+    swept = [axis.values for axis in expand(study).axes if key in axis.paths]
+    largest = float(max(swept[0])) if swept else float(study.value(key))
+    if 1.0 - 2.0 * largest < LEAST_CRUISE:
+        raise BadInput(
+            "the carriage cruises over less than half of its stroke, too little to compare forward and backward",
+            where=study.source.where(key),
+            expected=f"at most {0.5 * (1.0 - LEAST_CRUISE):g}",
+            received=f"{largest:g}",
+        )
+
+
+def _answer(results: Results) -> str:
+    """Yes or no, by the largest odd part of all sensors."""
+    odd = results.dataset["odd_rms"]
+    place = extreme(odd)
+    if place is None:
+        return "No variant has values, so the question stays open."
+    largest, sensor = float(odd.values[place]), list(results.sensors)[place[-1]]
+    at = in_words(results, place[:-1])
+    if largest < NOTICEABLE:
+        return (
+            f"Hardly: forward and backward differ by at most {percent(largest)} of the static range "
+            f"(rms of the odd part, {sensor}{at})."
+        )
+    return (
+        f"Yes: forward and backward differ by up to {percent(largest)} of the static range "
+        f"(rms of the odd part), at {sensor}{at}."
+    )
+
+
+def _lag(results: Results, sensor: str) -> str:
+    """How far the response trails where damping alone decides, up to where that is, and what comes beyond."""
+    lag = np.asarray(results.of_sensor("lag", sensor).values, dtype=np.float64)
+    expected = results.everywhere(theory.lag(results, sensor))
+    if not np.isfinite(lag).any():
+        return f"{sensor}: no lag is defined, as its static response does not vary or no variant has values."
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.where(expected != 0.0, np.abs(lag / expected - 1.0), np.nan)
+    known, formula = np.isfinite(apart), theory.lag_formula(results, sensor)
+    axis = results.axis(".motion.speed")
+    if axis is None or not known.any():
+        return f"{sensor}: {_largest_lag(results, lag, expected)}."
+    limit = results.holds_up_to(axis, apart <= CLOSE, known)
+    if limit is None:
+        least = percent(float(np.nanmin(apart)))
+        return f"{sensor}: {_largest_lag(results, lag, expected)}; nowhere is it closer to −{formula} than {least}."
+    slow = results.everywhere(results.dataset[axis.name]) <= limit
+    calm = _largest_lag(results, np.where(slow, lag, np.nan), expected)
+    if limit == axis.values.max():
+        return f"{sensor}: {calm}, within {percent(CLOSE)} of −{formula} in every variant."
+    span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
+    return (
+        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of −{formula}, as damping "
+        f"alone would have it: {calm}. Beyond, vibration left over from the turns takes over, and the lag ranges "
+        f"from {span}."
+    )
+
+
+def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
+    """The largest lag of some variants in words, and that of the theory."""
+    place = extreme(np.abs(lag))
+    assert place is not None
+    way = "trails" if lag[place] < 0.0 else "runs ahead"
+    said = f"the response {way} by {quantity(abs(float(lag[place])), 'm')}{in_words(results, place)}"
+    return f"{said} (theory: {quantity(abs(float(expected[place])), 'm')})" if expected[place] else said
+
+
+def _first_beyond(results: Results, sensor: str) -> str:
+    """Where the odd part exceeds each threshold first."""
+    odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    return f"{sensor}: the odd part {listed([exceeds(results, odd, part) for part in THRESHOLDS])}."
+
+
+def _mass(results: Results) -> list[str]:
+    """How much the mass changes the lag at the lowest speed."""
+    mass = results.axis(".mass")
+    if mass is None or mass.dim == VARIANT:
+        return []
+    lag = abs(results.dataset["lag"])
+    speed = results.axis(".motion.speed")
+    if speed is not None and speed.dim != VARIANT:
+        lag = lag.isel({speed.dim: int(np.argmin(speed.values))})
+    high, low = lag.max(mass.dim), lag.min(mass.dim)
+    change = np.asarray(((high - low) / high).where(high > 0.0).values, dtype=np.float64)
+    if not np.isfinite(change).any():
+        return []
+    at = f" at {quantity(float(speed.values.min()), speed.units)}" if speed is not None else ""
+    span = f"{quantity(float(mass.values.min()), mass.units)} to {quantity(float(mass.values.max()), mass.units)}"
+    worst = float(np.nanmax(change))
+    verdict = "hardly feels" if worst < CLOSE else "depends on"
+    return [f"The lag {verdict} the mass: from {span} it changes by {percent(worst)} at most{at}."]

@@ -1,0 +1,200 @@
+"""Figures of an asymmetry: the two ways on one axis, the lag with its theory, the odd and even parts."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+from matplotlib.lines import Line2D
+
+from studies import theory
+from studies.figures import (
+    BESIDE,
+    BLUE,
+    HAIR,
+    INK,
+    MUTED,
+    VERMILION,
+    Figure,
+    banded,
+    colour_bar,
+    draw,
+    logarithmic,
+    zero_line,
+)
+from studies.pictures.traces import odd_part, over_position, picked, there_and_back
+from studies.results import Index, Results, chosen
+from studies.views import DAMPING, MASSES, SPEEDS, Curve, View, along_axis, draw_curves, draw_map, view
+from studies.words import scale_for
+
+MOST_SENSORS = 3
+THRESHOLDS = (0.01, 0.05)
+BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent
+LAGS_SHOWN = 3.0
+
+
+def pictures(results: Results) -> list[Figure]:
+    """All figures that the sweep and the kept histories allow."""
+    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    left_out = len(results.sensors) - len(sensors)
+    more = f"{left_out} more sensors are in the archive." if left_out else ""
+    found = [figure for sensor in sensors for figure in _response(results, sensor)]
+    seen = view(results, SPEEDS, (*DAMPING, *MASSES))
+    if seen.x is not None:
+        found += [_lag(seen, sensors, more), _parts(seen, sensors, more)]
+        by_mass = view(results, SPEEDS, MASSES)
+        if by_mass.y is not None:
+            found.append(_map(by_mass, sensors[0]))
+    return found
+
+
+def _response(results: Results, sensor: str) -> list[Figure]:
+    rank = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    shown = picked(results, rank, 2)
+    if not shown:
+        return []
+    which = (
+        "Of the kept histories, the one with the middle (left) and the one with the largest odd part (right)."
+        if len(shown) == 2
+        else "The last cycle."
+    )
+    caption = (
+        f"{which} Above: the last cycle over the position of the carriage; below: half the difference of forward and "
+        "backward at equal position. Grey: the turns, which no index counts."
+    )
+    title = f"Forward and backward: {sensor}"
+    return [draw(f"response-{sensor}", title, caption, 4.2, partial(_draw_response, results, sensor, shown))]
+
+
+def _draw_response(results: Results, sensor: str, shown: list[Index], drawing: Drawing) -> None:
+    grid = drawing.subplots(2, len(shown), squeeze=False, sharex="col", height_ratios=(3, 2))
+    for column, index in enumerate(shown):
+        _draw_ways(results, sensor, index, grid[:, column])
+        grid[0, column].set_title(results.at(index).replace(", ", "\n", 1) or " ")
+    grid[0, 0].legend(loc="best")
+
+
+def _draw_ways(results: Results, sensor: str, index: Index, axes: tuple[Axes, Axes]) -> None:
+    """The two ways above, the odd part below; displacements downwards, as the body hangs."""
+    units = results.sensors[sensor]
+    out, back = there_and_back(over_position(results, sensor, index))
+    odd = odd_part(out, back)
+    motion = results.carriage_at(index).motion
+    scale = scale_for(float(np.abs(out.values).max()), units)
+    small = scale_for(float(np.abs(odd.values).max()), units)
+    axes[0].plot(out.position, out.values * scale.factor, color=BLUE, label="forward")
+    axes[0].plot(back.position, back.values * scale.factor, color=VERMILION, linestyle=(0, (4, 1.5)), label="backward")
+    axes[1].plot(odd.position, odd.values * small.factor, color=INK, linewidth=1.2)
+    zero_line(axes[1])
+    depth = motion.turn * (motion.end - motion.start)
+    for ax in axes:
+        for edge, inner in ((motion.start, motion.start + depth), (motion.end, motion.end - depth)):
+            ax.axvspan(edge, inner, color=HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
+        ax.set_xlim(min(motion.start, motion.end), max(motion.start, motion.end))
+    if units == "m":
+        axes[0].invert_yaxis()
+    axes[0].set_ylabel(f"{sensor} ({scale.unit})" if scale.unit else sensor)
+    axes[1].set_ylabel(f"odd part ({small.unit})" if small.unit else "odd part")
+    axes[1].set_xlabel(f"position of {results.carriage_name} (m)")
+
+
+def _lag(seen: View, sensors: list[str], more: str) -> Figure:
+    results = seen.results
+    cut = any(_lag_limit(seen, sensor) < _largest(_lags(seen, sensor)) for sensor in sensors)
+    halves = any(theory.lag_factor(results, sensor) == 1 for sensor in sensors)
+    caption = seen.caption(
+        "Lag of the response at equal position; negative: it trails. Dashed: what damping alone gives at low speed"
+        + (", half as much under the carriage, where the place of reading moves too." if halves else "."),
+        f"Lags beyond {LAGS_SHOWN:g} times that are cut off: there vibration left over from the turns decides."
+        if cut
+        else "",
+        more,
+    )
+    height = 0.6 + 2.3 * len(sensors)
+    return draw("lag", "Lag against speed", caption, height, partial(_draw_lag, seen, sensors))
+
+
+def _lags(seen: View, sensor: str) -> list[Curve]:
+    return seen.curves(seen.results.of_sensor("lag", sensor))
+
+
+def _largest(curves: list[Curve]) -> float:
+    return max(float(np.abs(curve.y[np.isfinite(curve.y)]).max(initial=0.0)) for curve in curves)
+
+
+def _lag_limit(seen: View, sensor: str) -> float:
+    """Where the axis ends: all lags, but at most a few times the theory's, beside which a resonance is a spike."""
+    expected = _largest(seen.curves(theory.lag(seen.results, sensor)))
+    largest = _largest(_lags(seen, sensor))
+    return min(largest, LAGS_SHOWN * expected) if expected else largest
+
+
+def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
+    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, sensor in zip(rows, sensors, strict=True):
+        limit = _lag_limit(seen, sensor)
+        scale = scale_for(limit, "m")
+        draw_curves(axes, seen, [curve._replace(y=curve.y * scale.factor) for curve in _lags(seen, sensor)])
+        colours = [line.get_color() for line in axes.get_lines()]
+        for curve, colour in zip(seen.curves(theory.lag(seen.results, sensor)), colours, strict=False):
+            axes.plot(curve.x, curve.y * scale.factor, color=colour, linestyle=(0, (4, 2)), linewidth=0.9)
+        zero_line(axes)
+        if limit > 0.0:
+            axes.set_ylim(-1.08 * limit * scale.factor, 1.08 * limit * scale.factor)
+        axes.set_ylabel(f"lag of {sensor} ({scale.unit})")
+        if colours:
+            _name_theory(axes, f"−{theory.lag_formula(seen.results, sensor)}", seen)
+    along_axis(rows[-1], seen)
+
+
+def _name_theory(axes: Axes, formula: str, seen: View) -> None:
+    """The dashed lines in the legend too."""
+    handles, labels = axes.get_legend_handles_labels()
+    dashes = Line2D([], [], color=MUTED, linestyle=(0, (4, 2)), linewidth=0.9)
+    place = BESIDE | {"title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
+    axes.legend([*handles, dashes], [*labels, formula], **place)
+
+
+def _parts(seen: View, sensors: list[str], more: str) -> Figure:
+    caption = seen.caption(
+        "Left: rms of half the difference of forward and backward; right: rms of their mean minus the static "
+        "response; both over the static range on the cruise part. Dotted: 1 % and 5 %.",
+        more,
+    )
+    height = 0.6 + 2.3 * len(sensors)
+    title = "What differs between the ways, and what they share"
+    return draw("odd-and-even", title, caption, height, partial(_draw_parts, seen, sensors))
+
+
+def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
+    grid = drawing.subplots(len(sensors), 2, squeeze=False, sharex=True, sharey="row")
+    for row, sensor in zip(grid, sensors, strict=True):
+        for axes, name, title in zip(row, ("odd_rms", "even_excess"), ("odd part", "even excess"), strict=True):
+            curves = seen.curves(seen.results.of_sensor(name, sensor))
+            draw_curves(axes, seen, [curve._replace(y=100.0 * curve.y) for curve in curves])
+            if (axes is row[0] or row is not grid[0]) and axes.get_legend() is not None:
+                axes.get_legend().remove()
+            if any((curve.y > 0.0).any() for curve in curves):
+                logarithmic(axes.yaxis)
+            for threshold in THRESHOLDS:
+                axes.axhline(100.0 * threshold, color=MUTED, linestyle=":", linewidth=0.9)
+            axes.set_title(f"{title}, {sensor}")
+        row[0].set_ylabel("% of the static range")
+    for axes in grid[-1]:
+        along_axis(axes, seen)
+
+
+def _map(seen: View, sensor: str) -> Figure:
+    caption = seen.caption("Rms of half the difference of forward and backward.")
+    title = f"Where forward and backward differ: {sensor}"
+    return draw("odd-map", title, caption, 3.0, partial(_draw_map, seen, sensor))
+
+
+def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
+    assert seen.x is not None and seen.y is not None
+    axes = drawing.subplots()
+    mesh = draw_map(axes, seen, 100.0 * seen.results.of_sensor("odd_rms", sensor), **banded(BANDS))
+    axes.set(xlabel=seen.x.title, ylabel=seen.y.title)
+    colour_bar(axes, mesh, "odd part (% of the static range)", spacing="uniform")

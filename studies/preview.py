@@ -1,0 +1,171 @@
+"""What a run would do, from its plan alone: the scene's numbers, the work and its cost, as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.lanes import LaneValues
+from engine.plan import Bucket, Plan, explain
+from studies.words import counted, number, unit_text
+
+Array = NDArray[np.float64]
+
+FREQUENCIES_SHOWN = 6
+BUCKETS_SHOWN = 30
+
+
+class Table(NamedTuple):
+    """A table for people: title, headings, rows of text."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What `check` tells: tables, and a last line with the cost."""
+
+    tables: tuple[Table, ...]
+    cost: str
+
+
+def preview(plan: Plan, threads: int) -> Preview:
+    """The explanation of a plan for so many threads; computes nothing large."""
+    tables = (_study(plan), _bodies(plan), _sweep(plan), _ratios(plan), _work(plan))
+    cost = (
+        f"About {duration(plan.seconds / threads)} on {counted(threads, 'thread')} for the march, at most "
+        f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk."
+    )
+    return Preview(tuple(table for table in tables if table.rows), cost)
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> duration(0.02), duration(42.0), duration(4000.0)
+    ('0.1 s', '42 s', '1.1 h')
+    """
+    if seconds < 100.0:
+        return f"{number(max(seconds, 0.1), 2)} s"
+    return f"{number(seconds / 60, 2)} min" if seconds < 3600 else f"{number(seconds / 3600, 2)} h"
+
+
+def size(count: int) -> str:
+    """A number of bytes as people say it.
+
+    >>> size(2_500), size(300 * 2**20)
+    ('2.44 KiB', '300 MiB')
+    """
+    value, unit = float(count), "bytes"
+    for larger in ("KiB", "MiB", "GiB", "TiB", "PiB"):
+        if value < 1000.0:
+            break
+        value, unit = value / 1024.0, larger
+    return f"{number(value)} {unit}"
+
+
+def _study(plan: Plan) -> Table:
+    study = plan.study
+    shape = " x ".join(f"{length} {dim}" for dim, length in zip(plan.cases.dims, plan.cases.shape, strict=True))
+    variants = f"{plan.size:,} = {shape}" if len(plan.cases.dims) > 1 else f"{plan.size:,}"
+    rows = [("kind", study.kind), ("variants", variants), ("start", _START[study.start])]
+    return Table(study.title or study.source.name, ("", ""), rows)
+
+
+_START = {"rest": "undeformed, at rest", "equilibrium": "static equilibrium of the first position"}
+
+
+def _bodies(plan: Plan) -> Table:
+    values, rows = LaneValues(plan.base.study, {}, 1), []
+    for part in plan.base.bodies:
+        omega = part.modal.omega
+        rates = values.damping_rates(part.name, omega)[:, 0]
+        elastic = omega > 0.0
+        ratios = rates[elastic] / (2.0 * omega[elastic])
+        shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
+        more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
+        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, span(ratios)))
+    return Table("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
+
+
+def _sweep(plan: Plan) -> Table:
+    rows = [
+        (
+            axis.name,
+            str(len(axis.values)),
+            f"{span(axis.values)} {unit_text(axis.units)}".strip(),
+            ", ".join(axis.paths),
+        )
+        for axis in plan.cases.axes
+    ]
+    return Table("Sweep", ("axis", "values", "range", "sets"), rows)
+
+
+def _ratios(plan: Plan) -> Table:
+    """Ratios of the first carriage that decide how dynamic the scene is, over all variants."""
+    name = plan.base.carriages[0].name
+    found: dict[str, list[Array]] = {}
+    for bucket in plan.buckets:
+        for ratio, values in _ratios_of(plan, bucket, name):
+            found.setdefault(ratio, []).append(values)
+    rows = [(ratio, span(np.concatenate(values))) for ratio, values in found.items()]
+    return Table(f"Ratios of {name}", ("ratio", "range"), rows)
+
+
+def _ratios_of(plan: Plan, bucket: Bucket, name: str) -> Iterator[tuple[str, Array]]:
+    scene, values = bucket.scene, plan.values(bucket, bucket.variants)
+    rider, time_scale = scene.carriages[0].rider, values.time_scale(name)
+    critical = scene.first_omega * scene.leading_body.modal.length / np.pi
+    yield "top speed over the critical speed omega_1 L/pi", rider.top_speed / time_scale / critical
+    if rider.motion.period is not None:
+        yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
+    if plan.study.carriage[name].inertial:
+        yield "mass over the body's mass", values.moving_mass(name) / scene.leading_body.modal.mass
+
+
+def _work(plan: Plan) -> Table:
+    """One row per bucket; where there are many, one per combination of model, modes and reason."""
+    rows = [_Work(**{key: cast(Any, row[key]) for key in _Work._fields}) for row in explain(plan)]
+    if len(rows) > BUCKETS_SHOWN:
+        groups: dict[tuple[str, int, str], list[_Work]] = {}
+        for row in rows:
+            groups.setdefault((row.fidelity, row.modes, row.reason), []).append(row)
+        merged = [_joined(group) for group in groups.values()]
+    else:
+        merged = [_joined([row]) for row in rows]
+    return Table("Work", ("variants", "model", "modes", "steps per passage or cycle", "because"), merged)
+
+
+class _Work(NamedTuple):
+    """A row of `engine.plan.explain`."""
+
+    variants: int
+    fidelity: str
+    modes: int
+    steps: int
+    reason: str
+
+
+def _joined(rows: Sequence[_Work]) -> tuple[str, ...]:
+    steps = [row.steps for row in rows]
+    shown = f"{min(steps):,}" if min(steps) == max(steps) else f"{min(steps):,} to {max(steps):,}"
+    first = rows[0]
+    return f"{sum(row.variants for row in rows):,}", first.fidelity, str(first.modes), shown, first.reason
+
+
+def span(values: NDArray[Any]) -> str:
+    """Smallest and largest of some numbers.
+
+    >>> span(np.array([0.5, 2.0, 1.0])), span(np.array([3.0]))
+    ('0.5 to 2', '3')
+    """
+    if values.size == 0:
+        return "none"
+    low, high = number(float(values.min())), number(float(values.max()))
+    return low if low == high else f"{low} to {high}"

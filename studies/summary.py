@@ -1,0 +1,121 @@
+"""A finished run in one table: the range of every result, and which variants it belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.status import Status, label
+from studies.words import quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from studies.runner import Outcome
+
+_BESIDE = ("_position",)  # where something was, shown by nothing but itself
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """One end of a result's range: its value, and the swept numbers of that variant by name, with units."""
+
+    value: float
+    variant: Mapping[str, tuple[float, str]]
+
+    @property
+    def where(self) -> str:
+        """The variant in words."""
+        return ", ".join(f"{name} {quantity(value, unit)}" for name, (value, unit) in self.variant.items())
+
+
+@dataclass(frozen=True)
+class Range:
+    """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor."""
+
+    name: str
+    sensor: str
+    units: str
+    smallest: Extreme
+    largest: Extreme
+
+
+def counts(results: xr.Dataset) -> dict[str, int]:
+    """Number of variants by status, those that occur."""
+    values, found = np.unique(results["status"].values, return_counts=True)
+    return {label(Status(int(value))): int(count) for value, count in zip(values, found, strict=True)}
+
+
+def all_ok(results: xr.Dataset) -> bool:
+    """Whether every variant's status is ok."""
+    return bool((results["status"].values == Status.OK).all())
+
+
+def ranges(results: xr.Dataset) -> Iterator[Range]:
+    """The range of every result that is one number per variant, or one per variant and sensor."""
+    grid = results["status"].dims
+    for name, array in results.data_vars.items():
+        if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
+            continue
+        if array.dims == grid:
+            yield from _range(results, str(name), "", array)
+        elif array.dims == (*grid, "sensor"):
+            for place, sensor in enumerate(results["sensor"].values):
+                yield from _range(results, str(name), str(sensor), array.isel(sensor=place))
+
+
+def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
+    """What `run --json` prints."""
+    results = outcome.results
+    return {
+        "archive": str(outcome.archive),
+        "kind": results.attrs["study_kind"],
+        "title": results.attrs["title"],
+        "variants": int(results["status"].size),
+        "status": counts(results),
+        "was_finished": outcome.was_finished,
+        "resumed": outcome.resumed,
+        "seconds": outcome.seconds,
+        "exit_code": exit_code,
+        "results": [
+            {
+                "name": found.name,
+                "sensor": found.sensor or None,
+                "units": found.units,
+                "smallest": _end_as_json(found.smallest),
+                "largest": _end_as_json(found.largest),
+            }
+            for found in ranges(results)
+        ],
+    }
+
+
+def _end_as_json(end: Extreme) -> dict[str, Any]:
+    return {"value": end.value, "at": {name: value for name, (value, _) in end.variant.items()}}
+
+
+def _range(results: xr.Dataset, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
+    values = array.values
+    if not np.isfinite(values).any():
+        return
+    units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
+    smallest, largest = (_extreme(results, values, pick(values)) for pick in (np.nanargmin, np.nanargmax))
+    yield Range(name, sensor, units, smallest, largest)
+
+
+def _extreme(results: xr.Dataset, values: NDArray[np.float64], flat: np.intp) -> Extreme:
+    place = dict(zip(results["status"].dims, np.unravel_index(flat, values.shape), strict=True))
+    variant = {}
+    for name, coordinate in results.coords.items():
+        swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "if"
+        if swept and name not in _DERIVED:
+            index = place[coordinate.dims[0]]
+            variant[str(name)] = (float(coordinate.values[index]), str(coordinate.attrs.get("units", "1")))
+    return Extreme(float(values.reshape(-1)[flat]), variant)
+
+
+_DERIVED = ("speed_ratio", "mass_ratio")

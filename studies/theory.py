@@ -1,0 +1,120 @@
+"""Closed forms that figures and findings compare with, for every variant of a sweep (mechanics.md, sections 7 and 9)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.model import BodyPart, SceneModel
+
+Array = NDArray[np.float64]
+CYCLE_POINTS = 720
+
+
+def first_omega(results: Results) -> xr.DataArray | float:
+    """Lowest elastic natural frequency (rad/s) of the first carriage's body, over the axes that change that body."""
+    import xarray as xr
+
+    axes = [axis for axis in results.axes if any(_changes_modes(results, path) for path in axis.paths)]
+    dims = list(dict.fromkeys(axis.dim for axis in axes))
+    if not dims:
+        return _model(results, {}).first_omega
+    sizes = [len(results.dataset[dim]) for dim in dims]
+    found = np.empty(sizes)
+    for place in np.ndindex(*sizes):
+        index = dict(zip(dims, place, strict=True))
+        found[place] = _model(results, {path: a.values[index[a.dim]] for a in axes for path in a.paths}).first_omega
+    return xr.DataArray(found, dims=dims)
+
+
+def damping_ratio(results: Results) -> Any:
+    """Damping ratio of that mode: one for all modes, the first of a list, or Rayleigh's a/(2 omega) + b omega/2."""
+    from engine.bodies.beam import Rayleigh
+
+    key = f"body.{results.carriage.on}.damping_ratio"
+    spec = results.study.value(key)
+    if isinstance(spec, Rayleigh) and not _is_swept(results, key):
+        omega = first_omega(results)
+        mass, stiffness = (results.parameter(f"{key}.rayleigh.{i}") for i in (0, 1))
+        return 0.5 * (mass / omega + stiffness * omega)
+    if isinstance(spec, tuple) and not _is_swept(results, key):
+        return results.parameter(f"{key}.{_model(results, {}).leading_body.modal.rigid_modes}")
+    return results.parameter(key)
+
+
+def lag(results: Results, sensor: str) -> Any:
+    """The lag in m that damping alone causes at low speed, -2 zeta v/omega_1 at a fixed place.
+
+    Under the carriage it is half of that: there w = phi(s) q, of which q alone is late, and with w_s = phi^2 q_0 the
+    odd part -(2 zeta v/omega_1) phi phi' q_0 is half as much of dw_s/ds.
+    """
+    speed = results.parameter(f"carriage.{results.carriage_name}.motion.speed")
+    return -lag_factor(results, sensor) * damping_ratio(results) * speed / first_omega(results)
+
+
+def lag_factor(results: Results, sensor: str) -> int:
+    """2 for a sensor at a fixed place, 1 under a carriage."""
+    return 2 if results.study.sensor[sensor].under is None else 1
+
+
+def lag_formula(results: Results, sensor: str) -> str:
+    """The formula in print."""
+    return f"{'2 ' if lag_factor(results, sensor) == 2 else ''}ζ v/ω₁"
+
+
+def frequency_ratio(results: Results) -> Any:
+    """Cycles per second of the first carriage's motion over the body's first natural frequency."""
+    return 2.0 * math.pi * cycle_frequency(results) / first_omega(results)
+
+
+def cycle_frequency(results: Results) -> Any:
+    """Cycles per second of the first carriage's motion."""
+    motion, key = results.carriage.motion, f"carriage.{results.carriage_name}.motion"
+    if hasattr(motion, "frequency"):
+        return results.parameter(f"{key}.frequency")
+    return results.parameter(f"{key}.speed") / motion.max_speed
+
+
+def loaded_frequency(results: Results, mass_ratio: Array) -> Array:
+    """First natural frequency (n,) with the carriage's mass on its way, over that without, for mass ratios (n,).
+
+    omega_eff = omega_1 (1 + m <phi_1^2>)^(-1/2), the mean taken over the cycle; for a shuttle about the middle of a
+    pinned beam <phi_1^2> is (1 + J0(2 pi a/L)) over the beam's mass.
+    """
+    part = _model(results, {}).leading_body
+    tau = np.arange(CYCLE_POINTS) / CYCLE_POINTS
+    first = part.modal.shape(results.carriage.motion.path(tau).S, 0)[:, part.modal.rigid_modes]
+    return np.asarray((1.0 + mass_ratio * part.modal.mass * float(np.mean(first**2))) ** -0.5)
+
+
+def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
+    """Frequency ratios (n,) at which the `order`-th harmonic of the cycle meets the loaded frequency."""
+    return loaded_frequency(results, mass_ratio) / order
+
+
+def leading_body(results: Results) -> BodyPart:
+    """The first carriage's body, without sweep."""
+    return _model(results, {}).leading_body
+
+
+def _is_swept(results: Results, key: str) -> bool:
+    return any(key in axis.paths for axis in results.axes)
+
+
+def _changes_modes(results: Results, path: str) -> bool:
+    here = f"body.{results.carriage.on}."
+    return path.startswith(here) and not path.startswith((f"{here}damping_ratio", f"{here}modes"))
+
+
+def _model(results: Results, values: dict[str, float]) -> SceneModel:
+    from engine.model import build_model
+
+    return build_model(results.study.without_sweep().with_values({k: float(v) for k, v in values.items()}), {}, {})
