@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.histories import phases_shown
 from engine.lanes import LaneValues
 from engine.plan import Plan
 from results_schema.parts import Rows
@@ -195,8 +196,8 @@ def _with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows, declared: d
 
 
 def _stations(plan: Plan, stations: int) -> tuple[str, tuple[str, NDArray[Any], dict[str, Any]]]:
-    """The dimension of histories: the phase of a cycle where all have the same, else a number."""
-    periodic = plan.base.riders[0].motion.period is not None
-    if periodic and plan.window == "last-cycle" and plan.study.output.histories == "auto":
-        return "phase", ("phase", np.arange(stations) / stations, axes()["phase"].attributes())
+    """The dimension of histories: the phase of the cycle where all have the same, else a number."""
+    phases = phases_shown(plan)
+    if phases is not None:
+        return "phase", ("phase", phases, axes()["phase"].attributes())
     return "station", ("station", np.arange(stations, dtype=np.int64), axes()["station"].attributes())

@@ -23,7 +23,7 @@ LEAST_STEPS = 200
 ALIAS_MARGIN = 1.5
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit
 MOST_STEPS = 100_000_000  # over one passage or cycle
-_STAIR = (4, 5, 6, 7)  # step counts are LEAST_STEPS times these, over 4, times a power of two: few tables, little waste
+_STAIR = 4  # step counts are LEAST_STEPS times 1, 2, 3, or 4 to 7 times a power of two: few tables, little waste
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,12 @@ def needed_steps(model: SceneModel, scheme: Scheme, time_scale: Array) -> Needs:
     return Needs(rules)
 
 
+def free_steps(model: SceneModel, scheme: Scheme) -> int:
+    """Steps per first period of free vibration, after the last carriage."""
+    limit = LIMIT_MARGIN * float(model.omega.max()) * 2.0 * math.pi / model.first_omega / scheme.stability_limit
+    return max(STEPS_PER_PERIOD, math.ceil(limit))
+
+
 def alias_steps(wave_number: float, omega: float, top_speed: float, time_scale: Array) -> Array:
     """Steps n (V,) at which k_N s' h = 2 atan(2/(omega_N h)), h = time_scale/n (mechanics section 7.2).
 
@@ -83,12 +89,11 @@ def round_up(steps: Array) -> Counts:
     """The next step count of the stair, so that neighbouring variants share tables.
 
     >>> round_up(np.array([3.0, 200.0, 201.0, 1000.0, 1001.0]))
-    array([ 200,  200,  250, 1000, 1200])
+    array([ 200,  200,  400, 1000, 1200])
     """
     scaled = np.maximum(np.asarray(steps, dtype=np.float64), LEAST_STEPS) / LEAST_STEPS
-    octave = np.floor(np.log2(scaled) + 1e-12)
-    part = np.ceil(scaled / 2.0**octave * _STAIR[0] - 1e-9)
-    return np.rint(LEAST_STEPS / _STAIR[0] * part * 2.0**octave).astype(np.int64)
+    tread = 2.0 ** np.maximum(np.floor(np.log2(scaled / _STAIR) + 1e-12), 0.0)
+    return np.rint(LEAST_STEPS * tread * np.ceil(scaled / tread - 1e-9)).astype(np.int64)
 
 
 def check_fixed_steps(model: SceneModel, scheme: Scheme, time_scale: Array, steps: Array | Counts) -> None:

@@ -34,6 +34,21 @@ def counts_shown(plan: Plan, bucket: Bucket) -> Counts:
     return np.unique(np.rint(np.linspace(first, last, WHOLE_STATIONS)).astype(np.int64))
 
 
+def phases_shown(plan: Plan) -> NDArray[np.float64] | None:
+    """The phases of the kept histories over a cycle, if all variants have the same."""
+    if plan.window != "last-cycle" or plan.base.riders[0].motion.period is None or plan.shown.size == 0:
+        return None
+    found = None
+    for bucket in plan.buckets:
+        if np.isin(bucket.variants, plan.shown).any():
+            first, last = bucket.tables.timeline.window
+            phases = (counts_shown(plan, bucket) - first) / (last - first)
+            if found is not None and not np.array_equal(found, phases):
+                return None
+            found = phases
+    return found
+
+
 def stations_shown(plan: Plan) -> int:
     """The most stations that any kept history has."""
     if plan.shown.size == 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,9 +49,15 @@ class Marched:
     finite: NDArray[np.bool_]
 
 
-def march(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> Marched:
+class Halted(Exception):
+    """The march was asked to stop between two segments."""
+
+
+def march(
+    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+) -> Marched:
     """March variants whose number is a multiple of LANES and sample the sensors at ``counts``; return the first
-    ``size`` of them."""
+    ``size`` of them. ``halted`` is asked after every segment; raises Halted when it says so."""
     model, timeline = tables.model, tables.timeline
     lanes = lane_table(model, values)
     state = initial_state(model, lanes)
@@ -73,6 +80,8 @@ def march(tables: SceneTables, values: LaneValues, counts: Counts, size: int) ->
         )
         _march_segment(tables, segment, lanes, state, (watch, record), unseen)
         before = segment.recorded
+        if halted():
+            raise Halted
     finite = np.isfinite(state.q).all(axis=1) & np.isfinite(state.v).all(axis=1)
     return Marched(
         from_blocks(marks, size), from_blocks(guard, size), from_blocks(history, size), finite.reshape(-1)[:size]
@@ -147,5 +156,7 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     scale = tables.static_scales * DIVERGED
     contact = DIVERGED * np.abs(lanes.weight[:, : len(model.carriages)])
     sensors = scale[None, :, None] * weight[:, None]
+    loose = [model.bodies[sensor.body].modal.rigid_modes > 0 for sensor in tables.sensors]
+    sensors = np.where(np.array(loose)[None, :, None], np.inf, sensors)  # a rigid body may go anywhere
     found = np.concatenate([sensors, contact], axis=1)
     return np.where(found > 0.0, found, np.inf)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,14 +31,19 @@ Counts = NDArray[np.int64]
 Flat = dict[str, NDArray[np.generic]]
 
 
-def run_chunk(plan: Plan, bucket: Bucket, variants: Counts) -> tuple[Flat, Rows | None]:
-    """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept."""
+def run_chunk(
+    plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool] = lambda: False
+) -> tuple[Flat, Rows | None]:
+    """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept.
+
+    Raises Halted when ``halted`` says so between two segments.
+    """
     tables = bucket.tables
     counts = np.zeros(0, dtype=np.int64)
     if plan.reduction is not None:
         counts = counts_reduced(tables.timeline, plan.reduction.stations)
     values = plan.values(bucket, padded(variants))
-    marched = march(tables, values, counts, variants.size)
+    marched = march(tables, values, counts, variants.size, halted)
     values = plan.values(bucket, variants)
     flat: Flat = {
         **_extremes(tables, marched),
@@ -56,7 +63,7 @@ def run_chunk(plan: Plan, bucket: Bucket, variants: Counts) -> tuple[Flat, Rows 
         "modes_used": np.full(variants.size, tables.model.omega.size, dtype=np.int32),
         "steps_used": np.full(variants.size, tables.steps, dtype=np.int32),
     }
-    return flat, _histories(plan, bucket, variants)
+    return flat, _histories(plan, bucket, variants, halted)
 
 
 def _extremes(tables: SceneTables, marched: Marched) -> Flat:
@@ -169,7 +176,7 @@ def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts
     return dict(plan.reduction(cycle))
 
 
-def _histories(plan: Plan, bucket: Bucket, variants: Counts) -> Rows | None:
+def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool]) -> Rows | None:
     """Histories of the kept ones among some variants, marched again with samples."""
     kept = np.intersect1d(variants, plan.shown)
     if kept.size == 0:
@@ -177,7 +184,7 @@ def _histories(plan: Plan, bucket: Bucket, variants: Counts) -> Rows | None:
     tables = bucket.tables.with_accelerations
     counts = counts_shown(plan, bucket)
     values = plan.values(bucket, padded(kept))
-    marched = march(tables, values, counts, kept.size)
+    marched = march(tables, values, counts, kept.size, halted)
     time_scale = plan.values(bucket, kept).time_scale(tables.model.carriages[0].name)
     elapsed = _elapsed(tables, counts, time_scale)
     arrays: dict[str, Array] = {"elapsed": elapsed}

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import queue
 import threading
+from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +29,7 @@ Arrays = dict[str, NDArray[Any]]
 Sink = Callable[[Counts, Arrays, "Rows | None"], object]
 Progress = Callable[[int, int], object]
 
+_COUNTING = threading.Lock()
 WAITING = 4  # finished chunks per thread that may wait for the sink
 
 
@@ -93,18 +96,26 @@ def execute(
 def warm_up(plan: Plan) -> None:
     """Load or compile the kernels once, and rebuild a damaged cache once."""
     from engine.kernels import jit
-    from engine.outcome import run_chunk
 
-    if not plan.buckets:
-        return
-    bucket = min(plan.buckets, key=lambda b: b.seconds_per_variant)
-    try:
-        run_chunk(plan, bucket, bucket.variants[:1])
-    except Exception as error:
-        if not jit.cache_is_damaged(error):
-            raise
-        jit.forget_compiled()
-        run_chunk(plan, bucket, bucket.variants[:1])
+    for kind in {min(bucket.scene.ties, 2): bucket for bucket in plan.buckets}.values():
+        try:
+            _first_steps(plan, kind)
+        except Exception as error:
+            if not jit.cache_is_damaged(error):
+                raise
+            jit.forget_compiled()
+            _first_steps(plan, kind)
+
+
+def _first_steps(plan: Plan, bucket: Bucket) -> None:
+    """March one variant over the first segment of a scene with hardly any steps."""
+    from engine.lanes import padded
+    from engine.march import Halted, march
+    from engine.tables import SceneTables
+
+    tables = SceneTables(bucket.scene, 2, plan.window)
+    with suppress(Halted):
+        march(tables, plan.values(bucket, padded(bucket.variants[:1])), np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 
 def _compute(
@@ -118,24 +129,44 @@ def _compute(
     import dask.threaded
 
     halted = partial(_any_set, halts)
+    left = Counter(id(bucket) for bucket, _ in tasks)
     graph = {
-        ("chunk", i): (partial(_task, plan, bucket, variants, results, halted),)
+        ("chunk", i): (partial(_task, plan, (bucket, variants), left, results, halted),)
         for i, (bucket, variants) in enumerate(tasks)
     }
-    if graph:
+    try:
         dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
+    except BaseException as error:
+        _hand_over(error, results, halted)
 
 
-def _task(plan: Plan, bucket: Bucket, variants: Counts, results: queue.Queue[Any], halted: Callable[[], bool]) -> None:
-    """One chunk; what it raises travels to the caller as its result."""
+def _task(
+    plan: Plan,
+    chunk: tuple[Bucket, Counts],
+    left: Counter[int],
+    results: queue.Queue[Any],
+    halted: Callable[[], bool],
+) -> None:
+    """One chunk; what it raises travels to the caller as its result. The last of a scene drops its tables."""
     from engine.outcome import run_chunk
 
     if halted():
         return
+    bucket, variants = chunk
     try:
-        found: Any = (variants, *run_chunk(plan, bucket, variants))
+        found: Any = (variants, *run_chunk(plan, bucket, variants, halted))
     except BaseException as error:
         found = error
+    with _COUNTING:
+        left[id(bucket)] -= 1
+        last = left[id(bucket)] == 0
+    if last:
+        bucket.tables.forget()
+    _hand_over(found, results, halted)
+
+
+def _hand_over(found: Any, results: queue.Queue[Any], halted: Callable[[], bool]) -> None:
+    """Wait for room in the queue, unless the caller has gone."""
     while not halted():
         try:
             results.put(found, timeout=0.05)

@@ -11,7 +11,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.fidelity import free_steps
 from engine.kernels.layout import Newmark, Ties, Watch
+from engine.kernels.schemes import Scheme
 from engine.model import SceneModel
 from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
 from engine.timeline import Segment, Timeline, build_timeline
@@ -57,13 +59,14 @@ class SceneTables:
     steps: int
     window: Window
     accelerations: Literal["unread", "read"] = "unread"
-    _kept: OrderedDict[tuple[float, float, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
+    _kept: OrderedDict[tuple[float, float, int, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
     def timeline(self) -> Timeline:
         """The scene cut into segments."""
-        return build_timeline(self.model.riders, self.steps, self.window)
+        scheme = Scheme(*self.model.study.solver.newmark)
+        return build_timeline(self.model.riders, self.steps, self.window, free_steps(self.model, scheme))
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -88,7 +91,7 @@ class SceneTables:
     def table(self, segment: Segment) -> SegmentTable:
         """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
         unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
-        key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.active)
+        key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.steps, segment.active)
         with self._lock:
             found = self._kept.pop(key, None)
             if found is None:
@@ -107,11 +110,26 @@ class SceneTables:
             tabulate_watch(self.model, contacts, along),
         )
 
+    def forget(self) -> None:
+        """Drop the tables, when no chunk needs them any more."""
+        with self._lock:
+            self._kept.clear()
+        self.__dict__.pop("with_accelerations", None)
+
     @cached_property
     def static_over_window(self) -> StaticUnit:
-        """Static readings at stations spread over the recorded part, for the largest of them."""
+        """Static readings at stations spread over the recorded part, and where a carriage passes a sensor: there
+        influence lines have their kinks."""
         first, last = self.timeline.window
-        return self.static_at(np.unique(np.rint(np.linspace(first, last, STATIC_STATIONS)).astype(np.int64)))
+        last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
+        counts = np.linspace(first, last, STATIC_STATIONS)
+        passing = [
+            _crossings(counts, self.timeline.positions(rider, counts), sensor.at)
+            for rider in range(len(self.model.carriages))
+            for sensor in self.sensors
+            if sensor.under is None
+        ]
+        return self.static_at(np.unique(np.concatenate([counts, *passing])))
 
     @cached_property
     def static_scales(self) -> Array:
@@ -127,7 +145,7 @@ class SceneTables:
             found.append(largest * part.modal.omega.max() ** sensor.offset_order)
         return np.array(found)
 
-    def ways_at(self, counts: Counts) -> tuple[Way, ...]:
+    def ways_at(self, counts: Array | Counts) -> tuple[Way, ...]:
         """Places of all carriages at stations by their count; ``active`` says whether any of them is on its body."""
         found = []
         for rider in range(len(self.model.carriages)):
@@ -137,7 +155,7 @@ class SceneTables:
             found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any())))
         return tuple(found)
 
-    def static_at(self, counts: Counts) -> StaticUnit:
+    def static_at(self, counts: Array | Counts) -> StaticUnit:
         """Static readings of every sensor with the carriages where they are at stations by their count."""
         along = self.ways_at(counts)
         here = [np.isfinite(self.timeline.positions(rider, counts)) for rider in range(len(along))]
@@ -167,3 +185,11 @@ class SceneTables:
         after = replace(first, s=np.minimum(first.s + SLOPE_STEP * length, length))
         change = self._unit(sensor, (after, *others), 0) - self._unit(sensor, (before, *others), 0)
         return np.asarray(change / (after.s - before.s))
+
+
+def _crossings(counts: Array, places: Array, at: float) -> Array:
+    """Fractional counts at which a carriage passes a place, by interpolation between stations."""
+    gap = places - at
+    before = np.flatnonzero(gap[:-1] * gap[1:] < 0.0)
+    part = gap[before] / (gap[before] - gap[before + 1])
+    return np.asarray(counts[before] + part * (counts[before + 1] - counts[before]))

@@ -7,9 +7,11 @@ off, enters, leaves, reverses at an instant, stops) falls on a step boundary.
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -23,7 +25,6 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
-FREE_STEPS = 200  # per first period of the body in free vibration
 _SAME = 1e-12  # events closer than this part of the scene are one
 
 
@@ -58,8 +59,9 @@ class Rider:
         """Position and its derivatives by scene time on a segment without a break inside, one-sided at its ends."""
         own = (tau - self.delay) * self.pace
         first, last = ((t - self.delay) * self.pace for t in (start, end))
-        if last <= 0.0 or first >= self.motion.duration:
-            place = self.motion.path(0.0 if last <= 0.0 else self.motion.duration).S
+        middle = 0.5 * (first + last)  # and not an end, which rounding may put on the other side
+        if not 0.0 < middle < self.motion.duration:
+            place = self.motion.path(0.0 if middle <= 0.0 else self.motion.duration).S
             return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
         found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
         return Path(found.S, found.dS * self.pace, found.ddS * self.pace**2)
@@ -71,6 +73,17 @@ class Rider:
             return False
         place = float(self.path(np.array([middle]), start, end).S[0])
         return 0.0 <= place <= self.length
+
+    @cached_property
+    def speed_jumps(self) -> tuple[Array, Array]:
+        """Scene times, ascending, at which the speed of a carriage on its place jumps, and by how much per tau: at
+        instant reversals, and where one that stays sets off or stops at once."""
+        found = [(reversal.tau, reversal.after - reversal.before) for reversal in self.motion.reversals()]
+        if self.stays:
+            ends = self.motion.path(np.array([0.0, self.motion.duration])).dS
+            found = [(0.0, float(ends[0])), *found, (self.motion.duration, -float(ends[1]))]
+        jumps = np.array([jump for jump in found if jump[1] != 0.0]).reshape(-1, 2)
+        return self.delay + jumps[:, 0] / self.pace, jumps[:, 1] * self.pace
 
     def events(self) -> Iterator[float]:
         """Scene times that must be step boundaries, in no order."""
@@ -158,13 +171,16 @@ class Timeline:
         body or the count is negative."""
         found = Path(*(np.full(counts.shape, np.nan) for _ in range(3)))
         index, tau = self.moments(counts)
-        for number in np.unique(index[counts >= 0]):
+        on = np.array([segment.active[rider] for segment in self.segments])
+        firsts = np.array([segment.first for segment in self.segments])
+        following = np.minimum(index + 1, len(self.segments) - 1)
+        index = np.where(~on[index] & (counts == firsts[following]), following, index)  # an arrival
+        for number in np.unique(index[(counts >= 0) & on[index]]):
             segment = self.segments[number]
-            if segment.active[rider]:
-                here = (index == number) & (counts >= 0)
-                path = self.riders[rider].path(tau[here], segment.start, segment.end)
-                for part, values in zip(found, path, strict=True):
-                    part[here] = values
+            here = (index == number) & (counts >= 0)
+            path = self.riders[rider].path(tau[here], segment.start, segment.end)
+            for part, values in zip(found, path, strict=True):
+                part[here] = values
         return found
 
     def positions(self, rider: int, counts: Array | Counts) -> Array:
@@ -172,51 +188,71 @@ class Timeline:
         return self.motion(rider, counts).S
 
 
-def build_timeline(riders: tuple[Rider, ...], steps: int, window: Literal["whole", "last-cycle"]) -> Timeline:
-    """Cut the scene at its events and spread the steps; ``steps`` are wanted per unit of scene time.
+def build_timeline(
+    riders: tuple[Rider, ...], steps: int, window: Literal["whole", "last-cycle"], free_steps: int = 200
+) -> Timeline:
+    """Cut the scene at its events and spread the steps.
+
+    steps: wanted per unit of scene time. window: what is recorded. free_steps: per first period of free vibration.
 
     >>> bed = Cruise(kind="cruise", start=-1.0, end=3.0, speed=1.0)
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
     [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
     """
-    repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
+    leading = riders[0]
     end = max(rider.end for rider in riders)
-    last_cycle = end - 1.0 if window == "last-cycle" and riders[0].motion.period is not None else 0.0
-    free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
-    seams = {float(k) for k in range(1, math.ceil(end))} if riders[0].motion.period is not None else set()
     hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
-    cuts = _merged([*hard, *seams], end)
+    recorded = (0.0, end)
+    seams: list[float] = []
+    if leading.motion.period is not None:
+        seams = [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
+        if window == "last-cycle":
+            recorded = (leading.end - leading.motion.period / leading.pace, leading.end)
     segments: list[Segment] = []
-    count, before = 0, tuple(False for _ in riders)
-    for start, stop in pairwise(cuts):
-        active = tuple(rider.touches(start, stop) for rider in riders)
-        fresh = min(abs(start - t) for t in hard) <= _SAME * end
-        strikes = tuple(_strikes(riders, active, before, start, stop)) if fresh else ()
-        total = max(1, math.ceil(steps * (stop - start) - 1e-9 * steps))
-        for first, last in pairwise(_slices(total)):
-            at, to = (start + (stop - start) * n / total for n in (first, last))
-            head = first == 0
-            segments.append(
-                Segment(
-                    at,
-                    stop if last == total else to,
-                    last - first,
-                    count + first,
-                    active,
-                    fresh and head,
-                    strikes if head else (),
-                    start >= last_cycle - _SAME * end,
-                    False,
-                )
-            )
-        count, before = count + total, active
-    beginning = next(s.first for s in segments if s.recorded)
+    before = tuple(False for _ in riders)
+    for start, stop in pairwise(_merged([*hard, *seams, *recorded], end)):
+        count = segments[-1].first + segments[-1].steps if segments else 0
+        part = _between(riders, (start, stop), steps, count)
+        fresh = _near(hard, start, end)
+        seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
+        strikes = tuple(_strikes(riders, part[0].active, before, (start, stop))) if fresh else ()
+        head = part[0]._replace(fresh=fresh, strikes=strikes)
+        segments += [segment._replace(recorded=seen) for segment in (head, *part[1:])]
+        before = head.active
+    free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
     if free > 0.0:
-        gone, total = tuple(False for _ in riders), math.ceil(free * FREE_STEPS)
-        for first, last in pairwise(_slices(total)):
-            segments.append(Segment(end, end, last - first, count + first, gone, first == 0, (), True, True))
-        count += total
-    return Timeline(riders, tuple(segments), (beginning, count), repeats, free)
+        segments += _free_vibration(segments[-1], math.ceil(free * free_steps), recorded[1] == end)
+    kept = [segment for segment in segments if segment.recorded]
+    span = (kept[0].first, kept[-1].first + kept[-1].steps)
+    repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
+    return Timeline(riders, tuple(segments), span, repeats, free)
+
+
+def _between(riders: tuple[Rider, ...], ends: tuple[float, float], steps: int, count: int) -> list[Segment]:
+    """The slices between two neighbouring events; neither fresh nor recorded yet."""
+    start, stop = ends
+    total = max(1, math.ceil(steps * (stop - start) - 1e-9 * steps))
+    active = tuple(rider.touches(start, stop) for rider in riders)
+    at = [start + (stop - start) * n / total for n in _slices(total)[:-1]] + [stop]
+    return [
+        Segment(at[i], at[i + 1], last - first, count + first, active, False, (), False, False)
+        for i, (first, last) in enumerate(pairwise(_slices(total)))
+    ]
+
+
+def _free_vibration(last: Segment, total: int, recorded: bool) -> list[Segment]:
+    """Slices after the end of the scene, with no carriage on any body."""
+    gone, count = tuple(False for _ in last.active), last.first + last.steps
+    return [
+        Segment(last.end, last.end, stop - first, count + first, gone, first == 0, (), recorded, True)
+        for first, stop in pairwise(_slices(total))
+    ]
+
+
+def _near(times: list[float], time: float, end: float) -> bool:
+    """Whether a time is one of some ascending times."""
+    place = bisect.bisect(times, time)
+    return any(abs(time - near) <= _SAME * end for near in times[max(0, place - 1) : place + 1])
 
 
 def _merged(times: list[float], end: float) -> list[float]:
@@ -235,19 +271,22 @@ def _slices(total: int) -> list[int]:
 
 
 def _strikes(
-    riders: tuple[Rider, ...], active: tuple[bool, ...], before: tuple[bool, ...], start: float, stop: float
+    riders: tuple[Rider, ...], active: tuple[bool, ...], before: tuple[bool, ...], ends: tuple[float, float]
 ) -> Iterator[Strike]:
-    """Arrivals and reversals at the beginning of a segment."""
+    """Arrivals and jumps of speed at the beginning of a segment; at time 0 the initial state holds just after."""
+    start, stop = ends
     for number, rider in enumerate(riders):
         if not active[number]:
             continue
-        after = float(rider.path(np.array([start]), start, stop).dS[0])
-        own = (start - rider.delay) * rider.pace
-        if not before[number] and (start > 0.0 or _enters(rider)):
-            yield Strike(number, "arrival", after)
-        for reversal in rider.motion.reversals():
-            if before[number] and abs(reversal.tau - own) <= _SAME * rider.motion.duration:
-                yield Strike(number, "reversal", (reversal.after - reversal.before) * rider.pace)
+        if not before[number]:
+            if start > 0.0 or _enters(rider):
+                yield Strike(number, "arrival", float(rider.path(np.array([start]), start, stop).dS[0]))
+            continue
+        times, jumps = rider.speed_jumps
+        place = int(np.searchsorted(times, start))
+        for near in range(max(0, place - 1), min(place + 1, times.size)):
+            if abs(times[near] - start) <= _SAME * rider.end:
+                yield Strike(number, "reversal", float(jumps[near]))
 
 
 def _enters(rider: Rider) -> bool:

@@ -19,6 +19,7 @@ from results_schema import files
 from results_schema.archive import OutputState, open_archive, output_state, write_archive
 from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
+from studies.gathering import Gatherer
 from studies.options import RunOptions
 from studies.provenance import attributes
 from studies.stopping import Stop
@@ -118,7 +119,8 @@ def _march(
     if done.size == plan.size:
         return
     try:
-        execute(plan, store.write, threads=options.threads, progress=progress, stop=stop.event, done=done)
+        with Gatherer(store.write) as parts:
+            execute(plan, parts.add, threads=options.threads, progress=progress, stop=stop.event, done=done)
     except Interrupted:
         stop.check()
         raise

@@ -37,7 +37,7 @@ def check_sensors(study: Study) -> None:
 def in_words(results: Results, index: Index) -> str:
     """Where in the sweep, as the end of a sentence; "" without a sweep."""
     at = results.at(index)
-    return f" with {at}" if at else ""
+    return f" at {at}" if at else ""
 
 
 def exceeds(results: Results, values: Array, threshold: float) -> str:

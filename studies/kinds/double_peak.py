@@ -1,0 +1,258 @@
+"""How often does the response peak in a cycle? Peaks and harmonics of the last cycle of a periodic motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.errors import BadInput
+from results_schema.variables import AXES, MARCH, Variable, declare
+from studies import indices, theory
+from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.results import Axis, Results, chosen, extreme
+from studies.telling import check_sensors, first_carriage, in_words, told_statuses
+from studies.words import counted, listed, number, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.reduction import Cycle
+    from engine.scene import Study
+    from studies.figures import Figure
+
+Array = NDArray[np.float64]
+
+EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
+ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
+MOST_SENSORS = 3
+MOST_GROUPS = 4
+SYMMETRIC = 0.05  # odd over even harmonics below which the two halves of a cycle are alike
+
+RESULTS = (
+    Variable(
+        "peaks_per_cycle",
+        ("sensor",),
+        long_name="number of peaks in the last cycle",
+        meaning="maxima with a prominence above 2 % of the cycle's range",
+    ),
+    Variable(
+        "peak_value",
+        ("sensor", "peak"),
+        units="{sensor}",
+        long_name="value of the peak",
+        meaning="refined by a parabola; the 8 highest peaks in the order of their phase, NaN beyond their number; "
+        "in the unit of the sensor",
+        nan_allowed=True,
+    ),
+    Variable(
+        "peak_phase",
+        ("sensor", "peak"),
+        long_name="phase of the peak in the cycle",
+        meaning="0 to 1, 0 where the motion's formula starts; NaN beyond the number of peaks",
+        nan_allowed=True,
+    ),
+    Variable(
+        "odd_even_ratio",
+        ("sensor",),
+        long_name="odd over even harmonics",
+        meaning="rms of the odd over rms of the even harmonics (k = 1 to 16) of the last cycle",
+        nan_allowed=True,
+    ),
+    Variable(
+        "harmonic",
+        ("sensor", "harmonic_number"),
+        units="{sensor}",
+        long_name="amplitude of the harmonic",
+        meaning="2 abs(c_k), c_k the mean of w exp(-2 pi i k phase), so twice the mean's size for k = 0; NaN where "
+        "the cycle has too few steps; in the unit of the sensor",
+        nan_allowed=True,
+    ),
+)
+declare("double-peak", *MARCH, *RESULTS, DYNAMIC_AMPLIFICATION)
+declare(
+    AXES,
+    Variable(
+        "harmonic_number", ("harmonic_number",), "int64", "", "number of the harmonic", required=False, lead="none"
+    ),
+    Variable(
+        "frequency_ratio",
+        long_name="frequency ratio",
+        meaning="cycles per second over the first natural frequency of the first carriage's body",
+        required=False,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class DoublePeakReduction:
+    """Peaks and harmonics of every sensor from the last cycle."""
+
+    stations: int = 400
+
+    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
+        return {variable.name: variable.dims for variable in RESULTS}
+
+    def sizes(self, study: Study) -> Mapping[str, int]:
+        return {"sensor": len(study.sensor), "peak": indices.PEAKS, "harmonic_number": indices.HARMONICS + 1}
+
+    def __call__(self, cycle: Cycle) -> dict[str, Array]:
+        """The results, (V, J) and (V, J, K)."""
+        history = indices.evenly(cycle.phase, cycle.history)
+        peaks, amplitudes = indices.peaks(history), indices.harmonics(history)
+        return {
+            "peaks_per_cycle": peaks.count.T,
+            "peak_value": peaks.value.T,
+            "peak_phase": peaks.phase.T,
+            "odd_even_ratio": indices.odd_even_ratio(amplitudes).T,
+            "harmonic": amplitudes.T,
+        }
+
+
+class DoublePeak:
+    """The kind "double-peak"."""
+
+    name = "double-peak"
+    summary = "peaks and harmonics of the last cycle of a carriage that goes to and fro"
+    question = "How often does the response peak while the carriage goes to and fro once?"
+
+    def check(self, study: Study) -> None:
+        """First carriage with a motion that repeats, and sensors."""
+        name, carriage = first_carriage(study)
+        if carriage.motion.period is None:
+            raise BadInput(
+                "peaks per cycle need a motion that repeats",
+                where=study.source.where(f"carriage.{name}.motion.kind"),
+                expected='"sinusoidal" or "out-and-back"',
+                received=f'"{carriage.motion.kind}"',
+            )
+        check_sensors(study)
+
+    def reduction(self, study: Study) -> DoublePeakReduction:
+        return DoublePeakReduction()
+
+    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+        """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
+        dataset = with_amplification(dataset, study)
+        ratio = theory.frequency_ratio(Results(dataset, study))
+        dims = tuple(getattr(ratio, "dims", ()))
+        found = {
+            "peak": ("peak", np.arange(1, indices.PEAKS + 1, dtype=np.int64), _axis("peak")),
+            "harmonic_number": (
+                "harmonic_number",
+                np.arange(indices.HARMONICS + 1, dtype=np.int64),
+                _axis("harmonic_number"),
+            ),
+            "frequency_ratio": (dims, np.asarray(getattr(ratio, "values", ratio)), _axis("frequency_ratio")),
+        }
+        return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
+
+    def findings(self, results: Results) -> list[str]:
+        said = []
+        for sensor in list(results.sensors)[:MOST_SENSORS]:
+            said += [_answer(results, sensor), *_breaks(results, sensor), *_amplified(results, sensor)]
+            said += _halves(results, sensor)
+        return [*said, *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import double_peak
+
+        return double_peak.pictures(results)
+
+
+KIND = DoublePeak()
+
+
+def _axis(name: str) -> dict[str, object]:
+    from results_schema.variables import axes
+
+    return axes()[name].attributes()
+
+
+def _counts(results: Results, sensor: str) -> Array:
+    return np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
+
+
+def _answer(results: Results, sensor: str) -> str:
+    """How many peaks how many variants have."""
+    counts = _counts(results, sensor)
+    known = counts[np.isfinite(counts)]
+    if not known.size:
+        return f"{sensor}: no variant has values, so the question stays open."
+    values, variants = np.unique(known, return_counts=True)
+    if len(values) == 1:
+        every = "in every variant" if known.size > 1 else "in a cycle"
+        return f"{sensor}: {counted(int(values[0]), 'peak')} {every}."
+    ranked = sorted(zip(variants, values, strict=True), reverse=True)
+    parts = [f"{counted(int(value), 'peak')} in {percent(count / known.size)}" for count, value in ranked]
+    return f"{sensor}: {listed(parts)} of the variants."
+
+
+def _breaks(results: Results, sensor: str) -> list[str]:
+    """Up to which frequency ratio there are exactly two peaks, for each mass, and which harmonic breaks the pattern."""
+    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    known = np.isfinite(counts)
+    if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
+        return []
+    group = results.axis(".mass")
+    if group is None:
+        return [f"{sensor}: {_break(results, ratio, counts, known)}."]
+    along = results.everywhere(results.dataset[group.name])
+    said = []
+    for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
+        label = _group_label(results, group, value)
+        said.append(f"{label}: {_break(results, ratio, counts, known & (along == value))}")
+    return [f"{sensor}: " + "; ".join(said) + "."]
+
+
+def _group_label(results: Results, group: Axis, value: float) -> str:
+    place = int(np.flatnonzero(group.values == value)[0])
+    return group.at(place)
+
+
+def _break(results: Results, ratio: Array, counts: Array, among: NDArray[np.bool_]) -> str:
+    """Where among some variants the pattern of two peaks breaks, beside the nearest harmonic of the cycle."""
+    other = among & (counts != EXPECTED)
+    if not other.any():
+        return f"two peaks throughout, up to Ω/ω₁ = {number(float(ratio[among].max()))}"
+    first = float(ratio[other].min())
+    fine = among & (ratio < first)
+    place = tuple(np.argwhere(other & (ratio == first))[0])
+    text = f"{counted(int(counts[place]), 'peak')} at Ω/ω₁ = {number(first)}"
+    text = f"two peaks up to Ω/ω₁ = {number(float(ratio[fine].max()))}, {text}" if fine.any() else f"already {text}"
+    mass = results.dataset.coords.get("mass_ratio")
+    if mass is None:
+        return text
+    own = np.array([float(results.everywhere(mass)[place])])
+    lines = {order: float(theory.breakdown(results, own, order)[0]) for order in ORDERS}
+    near = min(lines, key=lambda order: abs(np.log(lines[order] / first)))
+    return f"{text} ({near} Ω = ω_eff at {number(lines[near])})"
+
+
+def _amplified(results: Results, sensor: str) -> list[str]:
+    """The largest amplification while there are two peaks, or anywhere."""
+    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+    two = _counts(results, sensor) == EXPECTED
+    place = extreme(np.where(two, gain, np.nan)) or extreme(gain)
+    if place is None or not np.isfinite(gain[place]):
+        return []
+    when = "While there are two peaks, it" if two[place] else "It"
+    return [f"{when} reaches at most {number(float(gain[place]), 4)} times the static value{in_words(results, place)}."]
+
+
+def _halves(results: Results, sensor: str) -> list[str]:
+    """Whether the two halves of a cycle are alike."""
+    ratio = results.of_sensor("odd_even_ratio", sensor)
+    place = extreme(ratio)
+    if place is None:
+        return []
+    largest = float(np.asarray(ratio.values)[place])
+    if largest < SYMMETRIC:
+        return [f"{sensor}: the two halves of a cycle are alike; odd harmonics are at most {percent(largest)} of the even."]
+    return [
+        f"{sensor}: the two halves of a cycle differ; odd harmonics reach {number(largest)} times the even"
+        f"{in_words(results, place)}."
+    ]

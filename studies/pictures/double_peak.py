@@ -1,0 +1,233 @@
+"""Figures of a double peak: the cycle, the map of peaks with its resonances, amplification, harmonics."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+
+from studies import theory
+from studies.figures import (
+    BLUE,
+    HAIR,
+    INK,
+    MUTED,
+    VERMILION,
+    Figure,
+    banded,
+    colour_bar,
+    draw,
+    legend_beside,
+    logarithmic,
+    shades,
+)
+from studies.kinds.double_peak import ORDERS
+from studies.pictures.traces import picked
+from studies.results import Index, Results, chosen
+from studies.views import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
+from studies.words import scale_for
+
+Array = NDArray[np.float64]
+
+MOST_SENSORS = 3
+PEAK_BANDS = (0.5, 1.5, 2.5, 3.5, 4.5, 5.5)
+
+
+def pictures(results: Results) -> list[Figure]:
+    """All figures that the sweep and the kept histories allow."""
+    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    shown = picked(results, results.everywhere(theory.frequency_ratio(results)), 3)
+    found = [_cycle(results, sensors, shown)] if shown else []
+    seen = view(results, SPEEDS, MASSES)
+    if seen.x is not None:
+        for sensor in sensors:
+            found.append(_map(seen, sensor) if seen.y is not None else _count(seen, sensor))
+        found += [_gain(seen, sensors), _halves(seen, sensors)]
+    return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
+
+
+def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
+    caption = (
+        "The last cycle of kept histories, from slow to fast; dots: the peaks that count (prominence above 2 % of the "
+        "cycle's range)."
+    )
+    if results.carriage.motion.kind == "sinusoidal":
+        caption += " The carriage is at the centre at phase 0 and 0.5, at its ends at the grey lines."
+    height = 0.7 + 1.9 * len(sensors)
+    return draw("cycle", "Response over a cycle", caption, height, partial(_draw_cycle, results, sensors, shown))
+
+
+def _draw_cycle(results: Results, sensors: list[str], shown: list[Index], drawing: Drawing) -> None:
+    grid = drawing.subplots(len(sensors), len(shown), squeeze=False, sharex=True)
+    for row, sensor in zip(grid, sensors, strict=True):
+        for axes, index in zip(row, shown, strict=True):
+            _draw_one_cycle(axes, results, sensor, index)
+        unit = row[0].get_ylabel()
+        row[0].set_ylabel(f"{sensor} ({unit})" if unit else sensor)
+    for axes, index in zip(grid[0], shown, strict=True):
+        axes.set_title(results.at(index).replace(", ", "\n") or " ")
+    for axes in grid[-1]:
+        axes.set_xlabel("phase of the cycle")
+        axes.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
+
+
+def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> None:
+    trace = results.trace(sensor, index)
+    kept = np.isfinite(trace.values)
+    values = np.append(trace.values[kept], trace.values[kept][:1])
+    scale = scale_for(float(np.abs(values).max()), results.sensors[sensor])
+    axes.plot(np.linspace(0.0, 1.0, len(values)), values * scale.factor, color=BLUE)
+    place = dict(zip(results.dims, index, strict=True))
+    phase, peak = (results.of_sensor(name, sensor).isel(place).values for name in ("peak_phase", "peak_value"))
+    axes.plot(phase, peak * scale.factor, "o", color=VERMILION, zorder=3)
+    if results.carriage.motion.kind == "sinusoidal":
+        for end in (0.25, 0.75):
+            axes.axvline(end, color=MUTED, linewidth=0.7, zorder=1)
+    if results.sensors[sensor] == "m":
+        axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylabel(scale.unit)
+
+
+def _ratio(seen: View) -> tuple[Any, str]:
+    """What stands on the horizontal axis: the frequency ratio where it follows from that axis alone."""
+    ratio = theory.frequency_ratio(seen.results)
+    if depends_on(seen, ratio, seen.x):
+        return ratio, "frequency ratio Ω/ω₁"
+    assert seen.x is not None
+    return None, seen.x.title
+
+
+def _map(seen: View, sensor: str) -> Figure:
+    ways = _ways(seen)
+    lines = ways[0] is not None and "mass_ratio" in seen.results.dataset.coords
+    caption = seen.caption(
+        "Number of peaks in the last cycle.",
+        "Lines: where a harmonic of the cycle meets the natural frequency of the loaded body, n Ω = ω_eff; near them "
+        "the pattern of two peaks breaks."
+        if lines
+        else "",
+    )
+    return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 3.4, partial(_draw_map, seen, sensor, ways))
+
+
+def _ways(seen: View) -> tuple[Any, Any]:
+    """Frequency ratio and mass ratio where each follows from one axis alone."""
+    mass = seen.results.dataset.coords.get("mass_ratio")
+    return _ratio(seen)[0], mass if mass is not None and depends_on(seen, mass, seen.y) else None
+
+
+def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) -> None:
+    assert seen.x is not None and seen.y is not None
+    axes = drawing.subplots()
+    mesh = draw_map(axes, seen, seen.results.of_sensor("peaks_per_cycle", sensor), ways, **banded(PEAK_BANDS))
+    axes.set_xlabel(_ratio(seen)[1])
+    axes.set_ylabel(seen.y.title if ways[1] is None else "mass ratio")
+    bar = colour_bar(axes, mesh, "peaks per cycle", ticks=[1, 2, 3, 4, 5])
+    bar.ax.set_ylim(0.5, 5.5)
+    if ways[0] is not None:
+        _draw_resonances(axes, seen, ways[1])
+
+
+def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
+    """Lines n Ω = ω_eff over the mass ratio; upright where the mass is not on the vertical axis."""
+    results = seen.results
+    left, right = axes.get_xlim()
+    low, high = axes.get_ylim()
+    if mass is not None:
+        own = np.linspace(max(low, 0.0), high, 100)
+        along = own
+    elif "mass_ratio" in results.dataset.coords:
+        held = np.asarray(seen.cut(results.dataset["mass_ratio"]).values, dtype=np.float64)
+        own, along = np.full(2, float(np.median(held))), np.array([low, high])
+    else:
+        return
+    for order in ORDERS:
+        ratio = theory.breakdown(results, own, order)
+        if ratio.max() < left or ratio.min() > right:
+            continue
+        axes.plot(ratio, along, color="white", linewidth=2.6, alpha=0.8)
+        axes.plot(ratio, along, color=INK, linewidth=1.1)
+        if left < ratio[-1] < right:
+            axes.annotate(f"{order} Ω", (ratio[-1], along[-1]), (0, 2), textcoords="offset points", ha="center", va="bottom")
+    axes.set(xlim=(left, right), ylim=(low, high))
+
+
+def _count(seen: View, sensor: str) -> Figure:
+    caption = seen.caption("Number of peaks in the last cycle; lines: n Ω = ω_eff.")
+    return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 2.4, partial(_draw_count, seen, sensor))
+
+
+def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
+    axes = drawing.subplots()
+    way, title = _ratio(seen)
+    (curve,) = seen.curves(seen.results.of_sensor("peaks_per_cycle", sensor), way)
+    order = np.argsort(curve.x)
+    axes.plot(curve.x[order], curve.y[order], "o-", color=BLUE, drawstyle="steps-mid", markersize=3)
+    axes.set_ylim(0.0, max(5.0, float(np.nanmax(curve.y, initial=0.0)) + 1.0))
+    along_axis(axes, seen, title, curve.x)
+    axes.set_ylabel("peaks per cycle")
+    if way is not None:
+        _draw_resonances(axes, seen, None)
+
+
+def _gain(seen: View, sensors: list[str]) -> Figure:
+    caption = seen.caption("Largest absolute value in the last cycle over the largest absolute static value.")
+    height = 0.6 + 2.2 * len(sensors)
+    title = "Dynamic amplification"
+    return draw("amplification", title, caption, height, partial(_draw_rows, seen, sensors, "dynamic_amplification"))
+
+
+def _halves(seen: View, sensors: list[str]) -> Figure:
+    caption = seen.caption(
+        "Rms of the odd over rms of the even harmonics of the last cycle: 0 where its two halves are alike."
+    )
+    height = 0.6 + 2.2 * len(sensors)
+    title = "Odd and even harmonics"
+    return draw("odd-even", title, caption, height, partial(_draw_rows, seen, sensors, "odd_even_ratio"))
+
+
+def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) -> None:
+    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
+    way, title = _ratio(seen)
+    for axes, sensor in zip(rows, sensors, strict=True):
+        curves = seen.curves(seen.results.of_sensor(variable, sensor), way)
+        draw_curves(axes, seen, curves)
+        values = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
+        if values.size and values.min() > 0.0 and values.max() > 30.0 * values.min():
+            logarithmic(axes.yaxis)
+        axes.set_ylabel(sensor)
+        if axes is not rows[0] and axes.get_legend() is not None:
+            axes.get_legend().remove()
+    along_axis(rows[-1], seen, title, curves[0].x)
+
+
+def _harmonics(results: Results, sensor: str, shown: list[Index]) -> Figure:
+    caption = f"Amplitudes 2|c_k| of the last cycle of {sensor}, in the variants of the first figure."
+    title = f"Harmonics: {sensor}"
+    return draw("harmonics", title, caption, 2.4, partial(_draw_harmonics, results, sensor, shown))
+
+
+def _draw_harmonics(results: Results, sensor: str, shown: list[Index], drawing: Drawing) -> None:
+    axes = drawing.subplots()
+    stored = results.of_sensor("harmonic", sensor)
+    order = results.dataset["harmonic_number"].values[1:]
+    rows = [stored.isel(dict(zip(results.dims, index, strict=True))).values[1:] for index in shown]
+    scale = scale_for(float(np.nanmax(rows)), results.sensors[sensor])
+    width = 0.8 / len(shown)
+    for i, (index, row, colour) in enumerate(zip(shown, rows, shades(len(shown)), strict=True)):
+        places = order + (i - 0.5 * (len(shown) - 1)) * width
+        axes.bar(places, row * scale.factor, width, color=colour, label=results.at(index).replace(", ", "\n"))
+    axes.set_xticks(order)
+    axes.grid(visible=False, axis="x")
+    axes.set(xlabel="harmonic k", ylabel=f"amplitude ({scale.unit})" if scale.unit else "amplitude")
+    if np.nanmax(rows) > 0.0:
+        logarithmic(axes.yaxis)
+        axes.set_ylim(bottom=1e-4 * float(np.nanmax(rows)) * scale.factor)
+    if results.at(shown[0]):
+        legend_beside(axes)
+    axes.axhline(0.0, color=HAIR)

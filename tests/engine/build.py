@@ -1,0 +1,81 @@
+"""Studies for the tests of the engine, from a few words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from engine.scene import Study
+
+Table = dict[str, Any]
+
+
+def beam(**changes: Any) -> Table:
+    """A beam with L = E I = rho A = 1, pinned, four modes, undamped; `changes` replace keys."""
+    table: Table = {
+        "kind": "beam",
+        "length": 1.0,
+        "area": 1.0,
+        "second_moment": 1.0,
+        "youngs_modulus": 1.0,
+        "density": 1.0,
+        "supports": "pinned-pinned",
+        "modes": 4,
+    }
+    return table | changes
+
+
+def cruise(start: float, end: float, speed: float, after: float = 0.0) -> Table:
+    """A motion at constant speed."""
+    return {"kind": "cruise", "start": start, "end": end, "speed": speed, "after": after}
+
+
+def shuttle(start: float, end: float, speed: float, turn: float, cycles: int) -> Table:
+    """An out-and-back motion."""
+    return {"kind": "out-and-back", "start": start, "end": end, "speed": speed, "turn": turn, "cycles": cycles}
+
+
+def swing(centre: float, amplitude: float, frequency: float, cycles: int) -> Table:
+    """A sinusoidal motion."""
+    return {
+        "kind": "sinusoidal",
+        "centre": centre,
+        "amplitude": amplitude,
+        "frequency": frequency,
+        "cycles": cycles,
+    }
+
+
+def mass(kilograms: float, motion: Table, **changes: Any) -> Table:
+    """A rigid mass on the bed."""
+    return {"on": "bed", "kind": "mass", "mass": kilograms, "motion": motion} | changes
+
+
+def force(newtons: float, motion: Table, **changes: Any) -> Table:
+    """A moving force on the bed."""
+    return {"on": "bed", "kind": "force", "force": newtons, "motion": motion} | changes
+
+
+def fixed(at: float, quantity: str = "displacement", body: str = "bed") -> Table:
+    """A sensor at a place."""
+    return {"body": body, "at": at, "quantity": quantity}
+
+
+def under(carriage: str, quantity: str = "displacement") -> Table:
+    """A sensor at the point that a carriage touches."""
+    return {"under": carriage, "quantity": quantity}
+
+
+def study(bed: Table, carriages: Table | Mapping[str, Table], **changes: Any) -> Study:
+    """A study of one bed (or of `body` among the changes) with carriages by name, or one carriage called "car"."""
+    riding = {"car": carriages} if "kind" in carriages else dict(carriages)
+    tables: Table = {
+        "schema_version": 1,
+        "kind": "passage",
+        "gravity": 9.81,
+        "body": {"bed": bed},
+        "carriage": riding,
+        "sensor": {"midspan": fixed(0.5 * bed["length"])},
+        "output": {"histories": "none"},
+    }
+    return Study(**(tables | changes))

@@ -1,0 +1,361 @@
+"""The same scenes for the naive twin: phases, modes, statics and readings, with nothing of the engine's march.
+
+Pinned beams come from closed forms; for other supports the modal body is the engine's, which has tests of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
+from engine.scene import Study
+from tests.naive import motions
+from tests.naive import newmark as naive
+from tests.naive import scene as scenes
+from tests.naive.scene import Array, Damper, Load, Phase, Scene, State
+from tests.reference import closed_forms
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True, eq=False)
+class Bed:
+    """A beam as rows phi(x, j), frequencies, and its statics: influence(x, s, j) per N, sag(x, j) per m/s2, 0 where
+    its own weight does not act."""
+
+    length: float
+    stiffness: float
+    omega: Array
+    phi: Callable[[float, int], Array]
+    influence: Callable[[float, float, int], float]
+    sag: Callable[[float, int], float]
+    own_modal: Array
+    dampers: tuple[tuple[float, float], ...]
+
+    def missed(self, x: float, s: float, derivative: int) -> float:
+        """Influence line minus kept modes."""
+        soft = self.omega > 0.0
+        kept = self.phi(x, derivative)[soft] * self.phi(s, 0)[soft] / self.omega[soft] ** 2
+        return self.influence(x, s, derivative) - float(np.sum(kept))
+
+
+def pinned_influence(x: float, s: float, derivative: int, length: float, stiffness: float) -> float:
+    """Derivatives of the influence line of a pinned beam: deflection, -M/EI and -V/EI per unit force."""
+    if derivative == 0:
+        return closed_forms.influence_pinned(x, s, length, stiffness)
+    left = x < s
+    if derivative == 2:
+        return -((length - s) * x if x <= s else s * (length - x)) / (length * stiffness)
+    return -((length - s) if left else -s) / (length * stiffness)
+
+
+def bed_of(study: Study, name: str) -> Bed:
+    """The body of a study without sweep."""
+    table: Any = study.body[name]
+    stiffness, line_mass = table.bending_stiffness, table.mass_per_length
+    if table.supports == "pinned-pinned":
+        beam = closed_forms.PinnedBeam(table.modes, table.length, stiffness, line_mass)
+        phi, omega = beam.phi, beam.omega
+        own = beam.own_weight
+
+        def influence(x: float, s: float, derivative: int) -> float:
+            return pinned_influence(x, s, derivative, table.length, stiffness)
+
+        def sag(x: float, derivative: int) -> float:
+            k, z = line_mass / (24.0 * stiffness), x
+            el = table.length
+            poly = np.polynomial.Polynomial([0.0, el**3, 0.0, -2.0 * el, 1.0])
+            return float(k * poly.deriv(derivative)(z)) if derivative else float(k * poly(z))
+
+        dampers: tuple[tuple[float, float], ...] = ()
+    else:
+        springs = tuple(Spring(s.at, s.stiffness, s.rotational, s.damping) for s in table.springs)
+        modal = uniform_beam(
+            BeamProperties(
+                length=table.length,
+                area=table.area,
+                second_moment=table.second_moment,
+                youngs_modulus=table.youngs_modulus,
+                density=table.density,
+                ends=table.ends,
+                supports=springs,
+            ),
+            table.modes,
+        )
+        omega, own, dampers = modal.omega, modal.participation, modal.dampers
+
+        def phi(s: float, derivative: int) -> Array:
+            return modal.shape([s], derivative)[0]
+
+        def influence(x: float, s: float, derivative: int) -> float:
+            return float(modal.influence([x], [s], derivative)[0, 0])
+
+        def sag(x: float, derivative: int) -> float:
+            return float(modal.own_weight_deflection([x], derivative)[0])
+
+    nothing: Callable[[float, int], float] = lambda x, derivative: 0.0  # noqa: E731
+    return Bed(
+        table.length,
+        stiffness,
+        omega,
+        lru_cache(maxsize=None)(phi),
+        influence,
+        sag if table.own_weight else nothing,
+        own,
+        dampers,
+    )
+
+
+def damping_of(spec: Any, omega: Array) -> Array:
+    """Ratios of all modes."""
+    if hasattr(spec, "rayleigh"):
+        a, b = spec.rayleigh
+        return a / (2.0 * omega) + 0.5 * b * omega
+    return np.broadcast_to(np.array(spec, dtype=np.float64), omega.shape)
+
+
+def cruise_on(start: float, end: float, speed: float, begin: float, length: float) -> tuple[Phase, ...]:
+    """The part of a cruise that lies on the body."""
+    low, high = (min(max(x, 0.0), length) for x in (start, end))
+    return motions.cruise(low, high, speed, begin + abs(low - start) / speed)
+
+
+def spline_on(times: Any, places: Any, begin: float, length: float) -> tuple[Phase, ...]:
+    """The one stretch of a spline's way that lies on the body."""
+    spline = CubicSpline(np.array(times), np.array(places), bc_type=((1, 0.0), (1, 0.0)))
+    fine = np.linspace(times[0], times[-1], 20001)
+    inside = (spline(fine) >= 0.0) & (spline(fine) <= length)
+    edges = [float(times[0])] if inside[0] else []
+    for i in np.flatnonzero(np.diff(inside.astype(int))):
+        end = 0.0 if min(spline(fine[i]), spline(fine[i + 1])) < 0.0 else length
+        edges.append(brentq(lambda t, e=end: spline(t) - e, fine[i], fine[i + 1], xtol=1e-15))
+    edges += [float(times[-1])] if inside[-1] else []
+    assert len(edges) == 2
+    s, ds, dds = spline, spline.derivative(1), spline.derivative(2)
+    return (
+        Phase(
+            begin + edges[0],
+            begin + edges[1],
+            lambda t: min(max(float(s(t - begin)), 0.0), length),
+            lambda t: float(ds(t - begin)),
+            lambda t: float(dds(t - begin)),
+        ),
+    )
+
+
+def phases_of(motion: Any, begin: float, length: float) -> tuple[Phase, ...]:
+    """A motion that sets off at `begin`, on its body."""
+    if motion.kind == "cruise":
+        return cruise_on(motion.start, motion.end, motion.speed, begin, length)
+    if motion.kind == "waypoints":
+        return spline_on(motion.times, motion.positions, begin, length)
+    if motion.kind == "sinusoidal":
+        found = motions.sinusoidal(
+            motion.centre, motion.amplitude, 2.0 * math.pi * motion.frequency, motion.cycles
+        )
+    elif motion.turn == 0.0:
+        found = motions.instant_out_and_back(motion.start, motion.end, motion.speed, motion.cycles)
+    else:
+        found = motions.out_and_back(motion.start, motion.end, motion.speed, motion.turn, motion.cycles)
+    return tuple(motions.shifted(phase, begin) for phase in found)
+
+
+def standing(at: float, start: float, end: float) -> Phase:
+    """A carriage that stands."""
+    return Phase(start, end, lambda t: at, lambda t: 0.0, lambda t: 0.0)
+
+
+def start_of(carriage: Any) -> float:
+    """Seconds after time 0 at which a carriage sets off."""
+    if carriage.headway is not None:
+        return float(carriage.headway / carriage.motion.speed)
+    return float(carriage.delay or 0.0)
+
+
+def load_of(study: Study, name: str, length: float, end: float) -> Load:
+    """A carriage as a load; one that does not cruise stands on its place before and after its motion."""
+    carriage: Any = study.carriage[name]
+    begin = start_of(carriage)
+    phases = phases_of(carriage.motion, begin, length)
+    if carriage.motion.kind != "cruise":
+        if begin > 0.0:
+            phases = (standing(phases[0].s(phases[0].start), 0.0, begin), *phases)
+        if phases[-1].end < end * (1.0 - 1e-12):
+            phases = (*phases, standing(phases[-1].s(phases[-1].end), phases[-1].end, end * (1.0 + 1e-9)))
+        phases = motions.joined(phases)
+    if carriage.kind == "force":
+        return scenes.moving_force(carriage.force, phases)
+    if study.solver.fidelity == "force":
+        return scenes.moving_force(carriage.mass * study.gravity, phases)
+    if study.solver.fidelity == "mass-without-convective":
+        return scenes.mass_without_convective(carriage.mass, study.gravity, phases)
+    return scenes.moving_mass(carriage.mass, study.gravity, phases)
+
+
+class Twin(NamedTuple):
+    """One body with its loads, the names of its carriages, and what the naive march made of it.
+
+    sagging: the coordinates count from the body's own sag, which is exact.
+    """
+
+    bed: Bed
+    scene: Scene
+    riders: tuple[str, ...]
+    gravity: float
+    history: naive.History
+
+
+def march_twin(study: Study, body: str, t: Array) -> Twin:
+    """March one body of a study at the instants t."""
+    bed = bed_of(study, body)
+    riders = tuple(name for name, carriage in study.carriage.items() if carriage.on == body)
+    loads = tuple(load_of(study, name, bed.length, float(t[-1])) for name in riders)
+    dampers = tuple(Damper(bed.phi(at, 0), c) for at, c in bed.dampers)
+    zeta = damping_of(getattr(study.body[body], "damping_ratio"), bed.omega)
+    scene = Scene(bed.phi, bed.omega, zeta, loads, dampers)
+    own = bool(getattr(study.body[body], "own_weight"))
+    start = scenes.equilibrium(scene, 0.0) if study.start == "equilibrium" else scenes.rest(scene)
+    if own and study.start == "rest":
+        start = State(-study.gravity * bed.own_modal / bed.omega**2, start.v)
+    scheme = naive.Newmark(*study.solver.newmark)
+    if own:
+        history = march_on_sag(scene, bed, study.gravity, t, start, scheme)
+    else:
+        history = naive.march(scene, t, start, scheme)
+    return Twin(bed, scene, riders, study.gravity, history)
+
+
+def sagging_weight(bed: Bed, load: Load, gravity: float, t: float, side: scenes.Side) -> float:
+    """Weight of a load less its inertia along the curve of the body's sag."""
+    phase = load.phase(t, side)
+    if phase is None:
+        return 0.0
+    s, ds, dds = phase.s(t), phase.ds(t), phase.dds(t)
+    curve = ds**2 * bed.sag(s, 2) + dds * bed.sag(s, 1)
+    return load.weight - load.convective_mass * gravity * curve
+
+
+def heavy(scene: Scene, bed: Bed, gravity: float, t: float, side: scenes.Side) -> Scene:
+    """The scene of one instant, its loads with the weights that they have along the sag."""
+    loads = tuple(replace(load, weight=sagging_weight(bed, load, gravity, t, side)) for load in scene.loads)
+    return replace(scene, loads=loads)
+
+
+def arrival_on_sag(scene: Scene, bed: Bed, gravity: float, t: float, state: State) -> Array:
+    """Impulse at an event, with the slope of the sag."""
+    jump = scenes.impulse(scene, t, state)
+    extra = np.zeros_like(jump)
+    for load in scene.loads:
+        before, after = load.phase(t, "left"), load.phase(t, "right")
+        if after is not None:
+            change = after.ds(t) - (0.0 if before is None else before.ds(t))
+            slope = gravity * bed.sag(after.s(t), 1)
+            extra += load.convective_mass * bed.phi(after.s(t), 0) * change * slope
+    return jump - np.linalg.solve(scenes.system(scene, t, "right").mass, extra)
+
+
+def march_on_sag(
+    scene: Scene, bed: Bed, gravity: float, times: Array, start: State, scheme: naive.Newmark
+) -> naive.History:
+    """The naive march once more, the coordinates counted from the body's exact own sag."""
+    t, inner = naive.snapped(scene, times)
+    beta, gamma = scheme
+    state = start
+    if any(load.enter == t[0] and load.phases[0].s(t[0]) in (0.0, bed.length) for load in scene.loads):
+        state = State(start.q, start.v + arrival_on_sag(scene, bed, gravity, t[0], start))
+    a = scenes.acceleration(heavy(scene, bed, gravity, t[0], "right"), t[0], state, "right")
+    states, accelerations = [state], [a]
+    forces, before = [], []
+    for n in range(1, len(t)):
+        h, (q, v), a = t[n] - t[n - 1], states[-1], accelerations[-1]
+        u_star, v_star = q + h * v + (0.5 - beta) * h**2 * a, v + (1.0 - gamma) * h * a
+        now = heavy(scene, bed, gravity, t[n], "left")
+        m, c, k, f = scenes.system(now, t[n], "left")
+        a = np.linalg.solve(m + gamma * h * c + beta * h**2 * k, f - c @ v_star - k @ u_star)
+        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
+        if n in inner:
+            force = scenes.contact_forces(now, t[n], state, a, "left")
+            before.append(naive.Event(n, t[n], state.v, a, force))
+            state = State(state.q, state.v + arrival_on_sag(scene, bed, gravity, t[n], state))
+            a = scenes.acceleration(heavy(scene, bed, gravity, t[n], "right"), t[n], state, "right")
+        states.append(state)
+        accelerations.append(a)
+    found = naive.collect(scene, t, states, accelerations, before)
+    for n in range(len(t)):
+        side: scenes.Side = "right" if n < len(t) - 1 else "left"
+        now = heavy(scene, bed, gravity, t[n], side)
+        forces.append(scenes.contact_forces(now, t[n], states[n], accelerations[n], side))
+    return replace(found, contact_force=np.array(forces))
+
+
+DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A sensor of a study on a twin."""
+
+    study: Study
+    twin: Twin
+    sensor: Any
+
+    @cached_property
+    def place(self) -> Array:
+        """Where it reads at every instant, m; NaN where it does not."""
+        if self.sensor.under is None:
+            return np.full(self.twin.history.t.shape, self.sensor.at)
+        return self.twin.history.position[:, self.twin.riders.index(self.sensor.under)]
+
+    @property
+    def values(self) -> Array:
+        """(S,) what it reads."""
+        steps = range(len(self.place))
+        order = DERIVATIVE.get(self.sensor.quantity)
+        read = self._rate if order is None else self._state
+        return np.array([math.nan if math.isnan(self.place[n]) else read(n) for n in steps])
+
+    def _state(self, n: int) -> float:
+        bed, history, order = self.twin.bed, self.twin.history, DERIVATIVE[self.sensor.quantity]
+        x = float(self.place[n])
+        value = float(bed.phi(x, order) @ history.q[n]) + self.twin.gravity * bed.sag(x, order)
+        if self.study.solver.static_correction:
+            for r in range(len(self.twin.riders)):
+                s = float(history.position[n, r])
+                if not math.isnan(s):
+                    value += bed.missed(x, s, order) * float(history.contact_force[n, r])
+            for damper, (at, c) in zip(self.twin.scene.dampers, bed.dampers, strict=True):
+                value -= bed.missed(x, at, order) * c * float(damper.row @ history.v[n])
+        if order == 0:
+            return value
+        table: Any = self.study.body[self.study.body_of(self._name)]
+        lever = table.fibre_distance / table.second_moment if self.sensor.quantity == "stress" else 1.0
+        return -bed.stiffness * lever * value
+
+    @property
+    def _name(self) -> str:
+        return next(name for name, sensor in self.study.sensor.items() if sensor is self.sensor)
+
+    def _rate(self, n: int) -> float:
+        bed, history, x = self.twin.bed, self.twin.history, float(self.place[n])
+        row = bed.phi(x, 0)
+        if self.sensor.under is None:
+            return float(row @ (history.v if self.sensor.quantity == "velocity" else history.a)[n])
+        load = self.twin.scene.loads[self.twin.riders.index(self.sensor.under)]
+        t = float(history.t[n])
+        phase = load.phase(t, "right" if n < len(history.t) - 1 else "left")
+        assert phase is not None
+        ds, dds = phase.ds(t), phase.dds(t)
+        slope, bend = bed.phi(x, 1), bed.phi(x, 2)
+        own = [self.twin.gravity * bed.sag(x, j) for j in (1, 2)]
+        if self.sensor.quantity == "velocity":
+            return float(row @ history.v[n] + ds * (slope @ history.q[n])) + ds * own[0]
+        curve = float((ds**2 * bend + dds * slope) @ history.q[n]) + ds**2 * own[1] + dds * own[0]
+        return float(row @ history.a[n] + 2.0 * ds * (slope @ history.v[n])) + curve
