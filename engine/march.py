@@ -22,7 +22,6 @@ from engine.kernels.layout import (
     SMALLEST_AT,
     Record,
     State,
-    Watch,
 )
 from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
@@ -53,63 +52,75 @@ class Halted(Exception):
     """The march was asked to stop between two segments."""
 
 
-def march(
-    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
-) -> Marched:
-    """March variants whose number is a multiple of LANES and sample the sensors at ``counts``; return the first
-    ``size`` of them. ``halted`` is asked after every segment; raises Halted when it says so."""
-    model, timeline = tables.model, tables.timeline
-    lanes = lane_table(model, values)
-    state = initial_state(model, lanes)
+@dataclass(frozen=True, eq=False)
+class March:
+    """A march that is ready to go: variants of one scene in blocks, their state and what is kept of them."""
+
+    tables: SceneTables
+    lanes: LaneTable
+    counts: Counts
+    state: State
+    marks: Array
+    guard: Array
+    history: Array
+
+    def go(self, halted: Callable[[], bool] = lambda: False) -> None:
+        """All segments, once. ``halted`` is asked after each; raises Halted when it says so."""
+        before = False
+        for segment in self.tables.timeline.segments:
+            self._segment(segment, segment.fresh or (segment.recorded and not before))
+            before = segment.recorded
+            if halted():
+                raise Halted
+
+    def _segment(self, segment: Segment, unseen: bool) -> None:
+        """The impulse and the new accelerations of a segment's event, its first station, its steps."""
+        model, table = self.tables.model, self.tables.table(segment)
+        watch = table.watch if segment.recorded else table.guard
+        record = Record(
+            self.marks if segment.recorded else self.guard,
+            rows_sampled(segment, self.counts if segment.recorded else self.counts[:0]),
+            self.history,
+        )
+        stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
+        if segment.strikes:
+            active = np.array([*segment.active, *([False] * len(model.dampers))])
+            mass = np.where(active[:, None], self.lanes.mass, 0.0)
+            strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
+        if segment.fresh:
+            settle(table.ties, stepped, self.state)
+        if unseen:
+            watch_start(table.ties, stepped, self.state, watch, record, segment.first)
+        kernel = march_one if model.ties == 1 else march_many
+        kernel(table.ties, stepped, self.state, watch, record, self.tables.newmark, segment.first)
+
+    def result(self, size: int) -> Marched:
+        """What the march of the first ``size`` variants left."""
+        finite = np.isfinite(self.state.q).all(axis=1) & np.isfinite(self.state.v).all(axis=1)
+        marks, guard, history = (from_blocks(part, size) for part in (self.marks, self.guard, self.history))
+        return Marched(marks, guard, history, finite.reshape(-1)[:size])
+
+
+def prepare(tables: SceneTables, values: LaneValues, counts: Counts) -> March:
+    """Set up variants whose number is a multiple of LANES, with the sensors sampled at ``counts``."""
+    lanes = lane_table(tables.model, values)
     blocks = lanes.gravity.shape[0]
     sensors = len(tables.sensors)
-    history = np.full((blocks, counts.size, sensors, lanes.gravity.shape[1]), np.nan)
     marks = _blank_marks(blocks, len(tables.signals))
     guard = _blank_marks(blocks, len(tables.signals) - sensors)
     bounds = _bounds(tables, lanes)
     marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, sensors:]
-    before = False
-    for segment in timeline.segments:
-        table = tables.table(segment)
-        watch = table.watch if segment.recorded else table.guard
-        unseen = segment.fresh or (segment.recorded and not before)
-        record = Record(
-            marks if segment.recorded else guard,
-            rows_sampled(segment, counts if segment.recorded else counts[:0]),
-            history,
-        )
-        _march_segment(tables, segment, lanes, state, (watch, record), unseen)
-        before = segment.recorded
-        if halted():
-            raise Halted
-    finite = np.isfinite(state.q).all(axis=1) & np.isfinite(state.v).all(axis=1)
-    return Marched(
-        from_blocks(marks, size), from_blocks(guard, size), from_blocks(history, size), finite.reshape(-1)[:size]
-    )
+    history = np.full((blocks, counts.size, sensors, LANES), np.nan)
+    return March(tables, lanes, counts, initial_state(tables.model, lanes), marks, guard, history)
 
 
-def _march_segment(
-    tables: SceneTables,
-    segment: Segment,
-    lanes: LaneTable,
-    state: State,
-    seen: tuple[Watch, Record],
-    unseen: bool,
-) -> None:
-    """One segment: the impulse and the new accelerations of its event, its first station, its steps."""
-    model, watch, record = tables.model, *seen
-    table = tables.table(segment)
-    stepped = lanes.steps_of(_step(tables, segment, lanes))
-    if segment.strikes:
-        active = np.array([*segment.active, *([False] * len(model.dampers))])
-        blow = tabulate_blow(model, segment, np.where(active[:, None], lanes.mass, 0.0), lanes.time_scale)
-        strike(blow, lanes.gravity, state)
-    if segment.fresh:
-        settle(table.ties, stepped, state)
-    if unseen:
-        watch_start(table.ties, stepped, state, watch, record, segment.first)
-    kernel = march_one if model.ties == 1 else march_many
-    kernel(table.ties, stepped, state, watch, record, tables.newmark, segment.first)
+def march(
+    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+) -> Marched:
+    """Prepare, go, and return the result of the first ``size`` variants. Raises Halted."""
+    prepared = prepare(tables, values, counts)
+    prepared.go(halted)
+    return prepared.result(size)
 
 
 def _step(tables: SceneTables, segment: Segment, lanes: LaneTable) -> Array:

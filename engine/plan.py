@@ -27,7 +27,7 @@ Counts = NDArray[np.int64]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
-LEAST_TASK_SECONDS = 0.02  # of one chunk: less is not worth its overhead
+LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
 MOST_LANES = 65536  # of one chunk
 MOST_HISTORY_BYTES = 48 * 2**20  # of one chunk's histories, of which a reduction makes a few copies

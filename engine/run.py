@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import queue
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -105,6 +106,24 @@ def warm_up(plan: Plan) -> None:
                 raise
             jit.forget_compiled()
             _first_steps(plan, kind)
+
+
+def march_seconds(plan: Plan, threads: int | None = None) -> float:
+    """Wall time of marching every variant once, without compiling, tabulating, and gathering results."""
+    import dask.threaded
+
+    from engine.lanes import padded
+    from engine.march import prepare
+
+    nothing = np.zeros(0, dtype=np.int64)
+    marches = [prepare(b.tables, plan.values(b, padded(variants)), nothing) for b, variants in plan.chunks(None, None)]
+    for march in marches:
+        for segment in march.tables.timeline.segments:
+            march.tables.table(segment)
+    graph = {("march", i): (march.go,) for i, march in enumerate(marches)}
+    start = time.perf_counter()
+    dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
+    return time.perf_counter() - start
 
 
 def _first_steps(plan: Plan, bucket: Bucket) -> None:

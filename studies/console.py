@@ -61,13 +61,14 @@ def say_json(content: Mapping[str, Any]) -> None:
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table of text; columns of numbers stand to the right."""
     cells = [[printable(cell, LONGEST_CELL) for cell in row] for row in rows]
-    shown = Table(title=Text(printable(title, LONGEST_CELL), "bold") if title else None, title_justify="left", box=None)
+    shown = Table(box=None, padding=(0, 2, 0, 0))
     for place, heading in enumerate(headings):
         numeric = all(_NUMBER.fullmatch(row[place]) for row in cells)
         shown.add_column(Text(heading, "dim"), justify="right" if numeric else "left", overflow="fold")
     for row in cells:
         shown.add_row(*map(Text, row))
     console = _output()
+    console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
     console.print(shown)
     console.print()
 

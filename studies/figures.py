@@ -173,3 +173,9 @@ def banded(edges: Sequence[float]) -> dict[str, Any]:
 def legend_beside(axes: Axes, title: str = "") -> None:
     """The legend at the right of the plot, away from the data."""
     axes.legend(title=title or None, **BESIDE)
+
+
+def legend_of_all(drawing: Drawing, axes: Axes) -> None:
+    """One legend at the right of the whole figure, with the curves of `axes`."""
+    handles, labels = axes.get_legend_handles_labels()
+    drawing.legend(handles, labels, loc="outside right upper", alignment="left")

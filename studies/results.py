@@ -136,6 +136,11 @@ class Results:
         return self.dataset["status"] < int(Status.NOT_CONVERGED)
 
     @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Where values are kept and the contact holds, in the sweep's shape: beyond, the equations say no more."""
+        return np.asarray(self.kept.values & (self.dataset["status"].values != int(Status.SEPARATED)))
+
+    @cached_property
     def status_counts(self) -> dict[Status, int]:
         """Number of variants per status, those that occur."""
         counts = Counter(self.dataset["status"].values.ravel().tolist())

@@ -13,10 +13,11 @@ from studies.results import Results
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.model import BodyPart, SceneModel
+    from engine.model import SceneModel
 
 Array = NDArray[np.float64]
 CYCLE_POINTS = 720
+_PLACES = ("centre", "amplitude")
 
 
 def first_omega(results: Results) -> xr.DataArray | float:
@@ -100,9 +101,24 @@ def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
     return loaded_frequency(results, mass_ratio) / order
 
 
-def leading_body(results: Results) -> BodyPart:
-    """The first carriage's body, without sweep."""
-    return _model(results, {}).leading_body
+def shuttle_amplification(results: Results) -> Array | None:
+    """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
+    beam from one end to the other."""
+    from engine.motions import Sinusoidal
+
+    body, motion, mass = results.study.body[results.carriage.on], results.carriage.motion, _coordinate(results, "mass_ratio")
+    swept = {path for axis in results.axes for path in axis.paths}
+    fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
+    if mass is None or swept & fixed or not isinstance(motion, Sinusoidal) or body.supports != "pinned-pinned":
+        return None
+    if abs(motion.centre / body.length - 0.5) > 0.01 or motion.amplitude / body.length < 0.45:
+        return None
+    return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
+
+
+def _coordinate(results: Results, name: str) -> Array | None:
+    found = results.dataset.coords.get(name)
+    return None if found is None else results.everywhere(found)
 
 
 def _is_swept(results: Results, key: str) -> bool:

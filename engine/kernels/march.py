@@ -13,7 +13,7 @@ The pass over the modes corrects step n, observes it, predicts step n + 1 and ga
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE
+from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
 from engine.kernels.record import (
     A_NOW,
     CD,
@@ -28,8 +28,10 @@ from engine.kernels.record import (
     RATE_0,
     RATE_1,
     RATE_2,
+    SECOND,
     SUM,
     TIE,
+    VALUE,
     V_NOW,
     C,
     D,
@@ -102,15 +104,15 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
     """
     rows = ties.rows
     stations, modes = rows.shape[0], rows.shape[1]
-    # a single sum over displacements is gathered in the pass itself, others from the corrected modes kept for them
-    alone = 1 if watch.signal.shape[0] == 1 and watch.on_q.shape[1] == 1 else 0
+    # one or two sums over displacements are gathered in the pass itself, others from the corrected modes kept for them
+    channels = watch.signal.shape[0]
+    leads = channels if channels <= 2 and watch.on_q.shape[1] == channels else 0
     lead_moves = 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, FIELDS, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
-    y = np.empty((watch.offset.shape[1], LANES))
-    marks = np.empty((watch.offset.shape[1], MARKS, LANES))
+    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     force = np.empty(LANES)
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, newmark, block)
@@ -135,6 +137,7 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                 b[SUM, j] = 0.0
                 b[FACTOR, j] = 0.0
                 b[LEAD, j] = 0.0
+                b[SECOND, j] = 0.0
             if n == stations - 1:
                 for k in range(modes):
                     for j in range(LANES):
@@ -151,7 +154,16 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                     rows[m, k, 0, CURVE],
                 )
                 wp = w * p
-                if alone == 1:
+                if leads == 2:
+                    row, second = watch.on_q[at, 0, k], watch.on_q[at, 1, k]
+                    for j in range(LANES):
+                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
+                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        b[LEAD, j] += row * q
+                        b[SECOND, j] += second * q
+                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
+                        b[FACTOR, j] += wp * work[k, D, j]
+                elif leads == 1:
                     row = watch.on_q[at, 0, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
@@ -168,8 +180,8 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                         now[k, A_NOW, j] = a
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
                         b[FACTOR, j] += wp * work[k, D, j]
-            observe(y, now, b, watch, n, alone)
-            keep(y, marks, history, watch, record.sample[n], n, float(count + n))
+            observe(marks, now, b, watch, n, leads)
+            keep(marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)
 
 
@@ -241,8 +253,7 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
     work = np.zeros((modes, FIELDS, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    y = np.empty((watch.offset.shape[1], LANES))
-    marks = np.empty((watch.offset.shape[1], MARKS, LANES))
+    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     force = np.empty(LANES)
     sums = np.zeros((many, LANES))
     factor = np.zeros((many, many, LANES))
@@ -270,6 +281,6 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
                     now[k, V_NOW, j] = v
                     now[k, A_NOW, j] = a
                 gather_ties(sums, factor, work, rows, m, k)
-            observe(y, now, b, watch, n, 0)
-            keep(y, marks, history, watch, record.sample[n], n, float(count + n))
+            observe(marks, now, b, watch, n, 0)
+            keep(marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)

@@ -6,8 +6,21 @@ These run once per segment, so they are written lane by lane for reading, not fo
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CURVE, FORCE, LANES, RATE
-from engine.kernels.record import A_NOW, GRAVITY, Q_NOW, RATE_0, RATE_1, RATE_2, TIE, V_NOW, keep, observe
+from engine.kernels.layout import CURVE, FORCE, LANES, RATE, SQUARES
+from engine.kernels.record import (
+    A_NOW,
+    GRAVITY,
+    Q_NOW,
+    RATE_0,
+    RATE_1,
+    RATE_2,
+    TIE,
+    V_NOW,
+    VALUE,
+    copy_marks,
+    keep,
+    observe,
+)
 
 
 @piece
@@ -111,10 +124,9 @@ def watch_start(ties, lanes, state, watch, record, count):
     modes, many = rows.shape[1], rows.shape[2]
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    y = np.empty((watch.offset.shape[1], LANES))
+    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     for block in range(lanes.step.shape[0]):
-        marks = record.marks[block]
-        squares = marks[:, 5].copy()
+        copy_marks(marks, record.marks[block])
         for j in range(LANES):
             h = lanes.step[block, j]
             b[GRAVITY, j] = lanes.gravity[block, j]
@@ -131,6 +143,9 @@ def watch_start(ties, lanes, state, watch, record, count):
                     inertial, rate, curve = tie_row(rows, k, r)
                     motion += inertial * now[k, A_NOW, j] + rate * now[k, V_NOW, j] + curve * now[k, Q_NOW, j]
                 b[TIE + r, j] = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
-        observe(y, now, b, watch, 0, 0)
-        keep(y, marks, record.history[block], watch, record.sample[0], 0, float(count))
-        marks[:, 5] = squares
+        observe(marks, now, b, watch, 0, 0)
+        keep(marks, record.history[block], watch, record.sample[0], 0, float(count))
+        for i in range(marks.shape[0]):
+            for j in range(LANES):
+                marks[i, SQUARES, j] = record.marks[block, i, SQUARES, j]
+        copy_marks(record.marks[block], marks)

@@ -13,7 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.results import Axis, Results, chosen, extreme
+from studies.results import Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
 from studies.words import counted, listed, number, percent
 
@@ -233,14 +233,27 @@ def _break(results: Results, ratio: Array, counts: Array, among: NDArray[np.bool
 
 
 def _amplified(results: Results, sensor: str) -> list[str]:
-    """The largest amplification while there are two peaks, or anywhere."""
+    """The largest amplification before the pattern breaks anywhere, beside the rule of thumb of a pinned beam."""
     gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-    two = _counts(results, sensor) == EXPECTED
-    place = extreme(np.where(two, gain, np.nan)) or extreme(gain)
-    if place is None or not np.isfinite(gain[place]):
+    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    other = np.isfinite(counts) & (counts != EXPECTED)
+    calm = ratio < ratio[other].min() if other.any() else np.ones_like(other)
+    place, top = extreme(np.where(calm, gain, np.nan)), extreme(gain)
+    if top is None:
         return []
-    when = "While there are two peaks, it" if two[place] else "It"
-    return [f"{when} reaches at most {number(float(gain[place]), 4)} times the static value{in_words(results, place)}."]
+    said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{in_words(results, top)}"
+    if place is None or place == top:
+        return [f"{said}{_rule(results, top)}."]
+    before = f"before the pattern breaks anywhere (Ω/ω₁ < {number(float(ratio[other].min()))})"
+    return [f"{said}; {before} {number(float(gain[place]), 4)} times{in_words(results, place)}{_rule(results, place)}."]
+
+
+def _rule(results: Results, place: Index) -> str:
+    """The rule of thumb for a shuttle about the middle of a pinned beam, where it applies."""
+    expected = theory.shuttle_amplification(results)
+    if expected is None:
+        return ""
+    return f" (rule of thumb 1 + (2.5 + 8.1 μ)(Ω/ω₁)²: {number(float(expected[place]), 4)})"
 
 
 def _halves(results: Results, sensor: str) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
@@ -18,7 +19,6 @@ from studies.figures import (
     MUTED,
     VERMILION,
     Figure,
-    banded,
     colour_bar,
     draw,
     legend_beside,
@@ -34,13 +34,16 @@ from studies.words import scale_for
 Array = NDArray[np.float64]
 
 MOST_SENSORS = 3
-PEAK_BANDS = (0.5, 1.5, 2.5, 3.5, 4.5, 5.5)
+MOST_CYCLES = 3
+LEAST_RATIO = 1e-6  # below, ratios are rounding
+PEAK_BANDS = (0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5)
+PEAK_COLOURS = ("#56b4e9", "#eef0f3", "#e69f00", "#0072b2", "#cc79a7", "#d55e00")
 
 
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow."""
     sensors = list(chosen(list(results.sensors), MOST_SENSORS))
-    shown = picked(results, results.everywhere(theory.frequency_ratio(results)), 3)
+    shown = _typical(results, sensors[0])
     found = [_cycle(results, sensors, shown)] if shown else []
     seen = view(results, SPEEDS, MASSES)
     if seen.x is not None:
@@ -48,6 +51,20 @@ def pictures(results: Results) -> list[Figure]:
             found.append(_map(seen, sensor) if seen.y is not None else _count(seen, sensor))
         found += [_gain(seen, sensors), _halves(seen, sensors)]
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
+
+
+def _typical(results: Results, sensor: str) -> list[Index]:
+    """At most three variants with a history: one of each number of peaks, and others from slow to fast."""
+    ratio = results.everywhere(theory.frequency_ratio(results))
+    counts = np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
+    traced = sorted(results.traced(), key=lambda index: float(ratio[index]))
+    groups: dict[float, list[Index]] = {}
+    for index in traced:
+        groups.setdefault(float(counts[index]), []).append(index)
+    largest = sorted(groups.values(), key=len, reverse=True)
+    found = [group[len(group) // 2] for group in largest[:MOST_CYCLES]]
+    rest = [index for index in picked(results, ratio, MOST_CYCLES) if index not in found]
+    return sorted([*found, *rest[: MOST_CYCLES - len(found)]], key=lambda index: float(ratio[index]))
 
 
 def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
@@ -87,8 +104,6 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
     if results.carriage.motion.kind == "sinusoidal":
         for end in (0.25, 0.75):
             axes.axvline(end, color=MUTED, linewidth=0.7, zorder=1)
-    if results.sensors[sensor] == "m":
-        axes.invert_yaxis()
     axes.set_xlim(0.0, 1.0)
     axes.set_ylabel(scale.unit)
 
@@ -124,11 +139,13 @@ def _ways(seen: View) -> tuple[Any, Any]:
 def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) -> None:
     assert seen.x is not None and seen.y is not None
     axes = drawing.subplots()
-    mesh = draw_map(axes, seen, seen.results.of_sensor("peaks_per_cycle", sensor), ways, **banded(PEAK_BANDS))
+    colours, norm = ListedColormap(PEAK_COLOURS), BoundaryNorm(PEAK_BANDS, len(PEAK_COLOURS))
+    counts = seen.results.of_sensor("peaks_per_cycle", sensor).clip(1.0, float(len(PEAK_COLOURS)))
+    mesh = draw_map(axes, seen, counts, ways, cmap=colours, norm=norm)
     axes.set_xlabel(_ratio(seen)[1])
     axes.set_ylabel(seen.y.title if ways[1] is None else "mass ratio")
-    bar = colour_bar(axes, mesh, "peaks per cycle", ticks=[1, 2, 3, 4, 5])
-    bar.ax.set_ylim(0.5, 5.5)
+    bar = colour_bar(axes, mesh, "peaks per cycle", ticks=range(1, len(PEAK_COLOURS) + 1))
+    bar.ax.set_yticklabels(["0-1", "2", "3", "4", "5", "6 +"])
     if ways[0] is not None:
         _draw_resonances(axes, seen, ways[1])
 
@@ -200,6 +217,7 @@ def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) 
         values = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
         if values.size and values.min() > 0.0 and values.max() > 30.0 * values.min():
             logarithmic(axes.yaxis)
+            axes.set_ylim(bottom=max(0.5 * float(values.min()), LEAST_RATIO))
         axes.set_ylabel(sensor)
         if axes is not rows[0] and axes.get_legend() is not None:
             axes.get_legend().remove()

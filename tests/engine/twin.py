@@ -51,7 +51,7 @@ def pinned_influence(x: float, s: float, derivative: int, length: float, stiffne
     """Derivatives of the influence line of a pinned beam: deflection, -M/EI and -V/EI per unit force."""
     if derivative == 0:
         return closed_forms.influence_pinned(x, s, length, stiffness)
-    left = x < s
+    left = x < s or x >= length  # where it jumps, the limit from the right; at the end from the left
     if derivative == 2:
         return -((length - s) * x if x <= s else s * (length - x)) / (length * stiffness)
     return -((length - s) if left else -s) / (length * stiffness)
@@ -188,7 +188,8 @@ def load_of(study: Study, name: str, length: float, end: float) -> Load:
     if carriage.motion.kind != "cruise":
         if begin > 0.0:
             phases = (standing(phases[0].s(phases[0].start), 0.0, begin), *phases)
-        if phases[-1].end < end * (1.0 - 1e-12):
+        stays = carriage.motion.kind != "waypoints" or 0.0 <= carriage.motion.positions[-1] <= length
+        if stays and phases[-1].end < end * (1.0 - 1e-12):
             phases = (*phases, standing(phases[-1].s(phases[-1].end), phases[-1].end, end * (1.0 + 1e-9)))
         phases = motions.joined(phases)
     if carriage.kind == "force":
@@ -269,7 +270,8 @@ def march_on_sag(
     t, inner = naive.snapped(scene, times)
     beta, gamma = scheme
     state = start
-    if any(load.enter == t[0] and load.phases[0].s(t[0]) in (0.0, bed.length) for load in scene.loads):
+    if scene.loads[0].enter == t[0] and scene.loads[0].phases[0].s(t[0]) in (0.0, bed.length) and len(scene.loads) == 1:
+        # a cruise comes from outside; from rest its body is flat but for the modes left out
         state = State(start.q, start.v + arrival_on_sag(scene, bed, gravity, t[0], start))
     a = scenes.acceleration(heavy(scene, bed, gravity, t[0], "right"), t[0], state, "right")
     states, accelerations = [state], [a]
@@ -317,22 +319,35 @@ class Reading:
     @property
     def values(self) -> Array:
         """(S,) what it reads."""
-        steps = range(len(self.place))
-        order = DERIVATIVE.get(self.sensor.quantity)
-        read = self._rate if order is None else self._state
-        return np.array([math.nan if math.isnan(self.place[n]) else read(n) for n in steps])
+        if self.sensor.quantity in DERIVATIVE:
+            history = self.twin.history
+            read = zip(self.place, history.position, history.q, history.v, history.contact_force, strict=True)
+            return np.array([math.nan if math.isnan(x) else self._state(float(x), *rest) for x, *rest in read])
+        return np.array([math.nan if math.isnan(x) else self._rate(n) for n, x in enumerate(self.place)])
 
-    def _state(self, n: int) -> float:
-        bed, history, order = self.twin.bed, self.twin.history, DERIVATIVE[self.sensor.quantity]
-        x = float(self.place[n])
-        value = float(bed.phi(x, order) @ history.q[n]) + self.twin.gravity * bed.sag(x, order)
+    @property
+    def values_before(self) -> list[float]:
+        """What it reads just before events, where the history has the values just after them."""
+        found = []
+        for event in self.twin.history.before:
+            phases = [load.phase(event.t, "left") for load in self.twin.scene.loads]
+            position = np.array([math.nan if phase is None else phase.s(event.t) for phase in phases])
+            under = self.sensor.under
+            x = self.sensor.at if under is None else float(position[self.twin.riders.index(under)])
+            if not math.isnan(x):
+                q = self.twin.history.q[event.step]
+                found.append(self._state(x, position, q, event.v, event.contact_force))
+        return found
+
+    def _state(self, x: float, position: Array, q: Array, v: Array, contact_force: Array) -> float:
+        bed, order = self.twin.bed, DERIVATIVE[self.sensor.quantity]
+        value = float(bed.phi(x, order) @ q) + self.twin.gravity * bed.sag(x, order)
         if self.study.solver.static_correction:
-            for r in range(len(self.twin.riders)):
-                s = float(history.position[n, r])
+            for s, force in zip(position, contact_force, strict=True):
                 if not math.isnan(s):
-                    value += bed.missed(x, s, order) * float(history.contact_force[n, r])
+                    value += bed.missed(x, float(s), order) * float(force)
             for damper, (at, c) in zip(self.twin.scene.dampers, bed.dampers, strict=True):
-                value -= bed.missed(x, at, order) * c * float(damper.row @ history.v[n])
+                value -= bed.missed(x, at, order) * c * float(damper.row @ v)
         if order == 0:
             return value
         table: Any = self.study.body[self.study.body_of(self._name)]

@@ -1,0 +1,136 @@
+"""How large does it get? Extremes of every sensor and of the contact force, and the dynamic amplification."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.variables import MARCH, declare
+from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.results import Axis, Index, Results, chosen, extreme
+from studies.telling import check_sensors, first_carriage, in_words, told_statuses
+from studies.words import counted, listed, number, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene import Study
+    from studies.figures import Figure
+
+Array = NDArray[np.float64]
+
+MOST_SENSORS = 4
+MOST_GROUPS = 5
+
+declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
+
+
+class Passage:
+    """The kind "passage"."""
+
+    name = "passage"
+    summary = "largest and smallest of every sensor and of the contact force, dynamic amplification"
+    question = "How large does the response get, and does the contact hold?"
+
+    def check(self, study: Study) -> None:
+        """Something moves and something is measured."""
+        first_carriage(study)
+        check_sensors(study)
+
+    def reduction(self, study: Study) -> None:
+        return None
+
+    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+        return with_amplification(dataset, study)
+
+    def findings(self, results: Results) -> list[str]:
+        said = [_largest(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        said += [text for carriage in results.study.carriage for text in _contact(results, carriage)]
+        return [*said, *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import passage
+
+        return passage.pictures(results)
+
+
+KIND = Passage()
+
+
+def _largest(results: Results, sensor: str) -> str:
+    """The largest value and the largest amplification of one sensor, and where they are, while the contact holds."""
+    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+    sides = (results.dataset[f"{sensor}_{side}"] for side in ("max", "min"))
+    size = np.asarray(np.maximum(*(np.abs(side.values) for side in sides)), dtype=np.float64)
+    if np.isnan(size).all():
+        return f"{sensor}: no variant has values."
+    held = results.held if np.isfinite(size[results.held]).any() else np.isfinite(size)
+    top, best = (extreme(np.where(held, values, np.nan)) for values in (size, gain))
+    assert top is not None
+    shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""
+    said = f"{sensor}: {shown}the largest value is {_value(results, sensor, top)}"
+    if best is None:
+        return f"{said}."
+    amplified = f"{number(float(gain[best]), 4)} times the static value"
+    if best == top:
+        return f"{said}, {amplified}."
+    return f"{said}; the largest amplification is {amplified}{in_words(results, best)}."
+
+
+def _value(results: Results, sensor: str, place: Index) -> str:
+    """The extreme of larger size of one variant, and where it and the carriage are."""
+    sides = {side: float(results.dataset[f"{sensor}_{side}"].values[place]) for side in ("max", "min")}
+    side = max(sides, key=lambda name: abs(sides[name]))
+    at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
+    then = f" (with {results.carriage_name} at {quantity(at, 'm')})" if np.isfinite(at) else ""
+    return f"{quantity(sides[side], results.sensors[sensor])}{in_words(results, place)}{then}"
+
+
+def _contact(results: Results, carriage: str) -> list[str]:
+    """Where the contact force turns negative first, for each mass."""
+    if f"{carriage}_contact_force_min" not in results.dataset:
+        return []
+    force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
+    known = np.isfinite(force)
+    if not known.any() or not results.study.carriage[carriage].inertial:
+        return []
+    opened = known & (force < 0.0)
+    if not opened.any():
+        least = extreme(-force)
+        assert least is not None
+        return [
+            f"{carriage}: the contact holds everywhere; its smallest force is {quantity(float(force[least]), 'N')}"
+            f"{in_words(results, least)}."
+        ]
+    return [_onset(results, carriage, opened, known)]
+
+
+def _onset(results: Results, carriage: str, opened: NDArray[np.bool_], known: NDArray[np.bool_]) -> str:
+    """From which speed on the contact opens, for up to five masses."""
+    shown = f"{carriage}: the contact opens in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
+    speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
+    if speed is None:
+        return f"{shown}. The equations assume contact, so that those results end there."
+    if group is None:
+        return f"{shown}, {_first_speed(results, speed, opened)}. The equations assume contact: beyond, they say no more."
+    along = results.everywhere(results.dataset[group.name])
+    parts = []
+    for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
+        label = group.at(int(np.flatnonzero(group.values == value)[0]))
+        parts.append(f"{label}: {_first_speed(results, speed, opened & (along == value))}")
+    return f"{shown} ({listed(parts)}). The equations assume contact: beyond, they say no more."
+
+
+def _first_speed(results: Results, speed: Axis, opened: NDArray[np.bool_]) -> str:
+    """The lowest speed at which the contact opens, with its ratio to the critical speed where that is known."""
+    if not opened.any():
+        return f"not up to {quantity(float(speed.values.max()), speed.units)}"
+    along = results.everywhere(results.dataset[speed.name])
+    first = float(along[opened].min())
+    text = f"first at {quantity(first, speed.units)}"
+    if "speed_ratio" not in results.dataset.coords:
+        return text
+    ratio = results.everywhere(results.dataset["speed_ratio"])
+    return f"{text} (speed ratio {number(float(ratio[opened & (along == first)].min()))})"

@@ -1,0 +1,105 @@
+"""What happens when? Histories of every sensor and of the carriages' own motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.errors import BadInput
+from results_schema.variables import MARCH, Variable, declare
+from studies.results import Results
+from studies.telling import check_sensors, first_carriage, told_statuses
+from studies.words import counted, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene import Study
+    from studies.figures import Figure
+
+MOST_SENSORS = 4
+
+
+def _history(name: str, units: str, words: str) -> Variable:
+    return Variable(
+        f"{{carriage}}_{name}",
+        ("position|phase|station",),
+        units=units,
+        long_name=f"{words} of {{carriage}}",
+        meaning="NaN where it is off the body",
+        required=False,
+        lead="history",
+        nan_allowed=True,
+    )
+
+
+RESULTS = (
+    _history("speed", "m s-1", "speed along the track"),
+    _history("acceleration_along", "m s-2", "acceleration along the track"),
+    _history("acceleration_across", "m s-2", "acceleration in the direction of the deflection"),
+)
+declare("trajectory", *MARCH, *RESULTS)
+
+
+class Trajectory:
+    """The kind "trajectory"."""
+
+    name = "trajectory"
+    summary = "histories of every sensor and of the carriages' motion"
+    question = "What do the sensors and the carriages do over time?"
+
+    def check(self, study: Study) -> None:
+        """Something moves, something is measured, and histories are kept."""
+        first_carriage(study)
+        check_sensors(study)
+        if study.output.histories == "none":
+            raise BadInput(
+                "a trajectory is its histories",
+                where=study.source.where("output.histories"),
+                expected='"auto", "all" or { every = n }',
+                received='"none"',
+            )
+
+    def reduction(self, study: Study) -> None:
+        return None
+
+    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+        return dataset
+
+    def findings(self, results: Results) -> list[str]:
+        traced = results.traced()
+        said = [_kept(results)] if traced else ["No history was kept."]
+        said += [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        return [*said, *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import trajectory
+
+        return trajectory.pictures(results)
+
+
+KIND = Trajectory()
+
+
+def _kept(results: Results) -> str:
+    """How many histories there are, how long and how fine."""
+    traced = results.traced()
+    trace = results.trace(next(iter(results.sensors)), traced[0])
+    points = int(np.isfinite(trace.values).sum())
+    ends = [float(np.nanmax(results.trace(next(iter(results.sensors)), index).elapsed)) for index in traced]
+    spans = quantity(max(ends), "s") if min(ends) == max(ends) else f"{quantity(min(ends), 's')} to {quantity(max(ends), 's')}"
+    return (
+        f"Histories of {counted(len(traced), 'variant')} out of {results.size:,}, each over {spans} "
+        f"on {counted(points, 'station')}."
+    )
+
+
+def _span(results: Results, sensor: str) -> str:
+    """Between which values a sensor moves."""
+    units = results.sensors[sensor]
+    low, high = (results.dataset[f"{sensor}_{side}"].values for side in ("min", "max"))
+    if np.isnan(low).all():
+        return f"{sensor}: no variant has values."
+    over = " over all variants" if results.size > 1 else ""
+    return f"{sensor}: from {quantity(float(np.nanmin(low)), units)} to {quantity(float(np.nanmax(high)), units)}{over}."

@@ -1,0 +1,182 @@
+"""Figures of a passage: amplification, contact force with the line of separation, the response on the way."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from studies.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
+from studies.pictures.traces import over_position, picked
+from studies.results import Index, Results, chosen, extreme
+from studies.views import DAMPING, MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
+from studies.words import scale_for
+
+Array = NDArray[np.float64]
+
+MOST_SENSORS = 3
+MANY = 6  # values of the second axis from which on a map says more than curves
+
+
+def pictures(results: Results) -> list[Figure]:
+    """All figures that the sweep and the kept histories allow."""
+    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    found = []
+    seen = view(results, SPEEDS, (*MASSES, *DAMPING))
+    if seen.x is not None:
+        found.append(_amplification(seen, sensors))
+        if seen.y is not None and len(seen.y.values) > MANY and _amplified(results, sensors[0]):
+            found.append(_map(seen, sensors[0]))
+        found += [_contact(seen, name) for name in results.study.carriage if _has_contact(results, name)]
+    shown = picked(results, _rank(results, sensors), 4)
+    return [*found, *([_response(results, sensors, shown)] if shown else [])]
+
+
+def _rank(results: Results, sensors: list[str]) -> Array | None:
+    """Amplification of the first sensor that has one, of the variants whose contact holds where there are such."""
+    for sensor in sensors:
+        if _amplified(results, sensor):
+            gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+            held = np.where(results.held, gain, np.nan)
+            return held if np.isfinite(held).any() else gain
+    return None
+
+
+def _amplified(results: Results, sensor: str) -> bool:
+    return extreme(results.of_sensor("dynamic_amplification", sensor)) is not None
+
+
+def _has_contact(results: Results, carriage: str) -> bool:
+    name = f"{carriage}_contact_force_min"
+    return name in results.dataset and results.study.carriage[carriage].inertial and extreme(results.dataset[name]) is not None
+
+
+def _ratio(seen: View) -> tuple[Any, str]:
+    """What stands on the horizontal axis: the speed ratio where it follows from that axis alone."""
+    ratio = seen.results.dataset.coords.get("speed_ratio")
+    if ratio is not None and depends_on(seen, ratio, seen.x):
+        return ratio, "speed ratio v/(ω₁ L/π)"
+    assert seen.x is not None
+    return None, seen.x.title
+
+
+def _amplification(seen: View, sensors: list[str]) -> Figure:
+    caption = seen.caption("Largest absolute value over the largest absolute static value of the same model.")
+    height = 0.6 + 2.2 * len(sensors)
+    return draw("amplification", "Dynamic amplification", caption, height, partial(_draw_amplification, seen, sensors))
+
+
+def _draw_amplification(seen: View, sensors: list[str], drawing: Drawing) -> None:
+    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
+    way, title = _ratio(seen)
+    for axes, sensor in zip(rows, sensors, strict=True):
+        name = "dynamic_amplification" if _amplified(seen.results, sensor) else f"{sensor}_max"
+        values = seen.results.dataset[name]
+        curves = seen.curves(values.sel(sensor=sensor) if "sensor" in values.dims else values, way)
+        draw_curves(axes, seen, curves)
+        axes.set_ylabel(f"{sensor}, max/static" if name == "dynamic_amplification" else f"{sensor}, max")
+        if axes is not rows[0] and axes.get_legend() is not None:
+            axes.get_legend().remove()
+    along_axis(rows[-1], seen, title, curves[0].x)
+
+
+def _map(seen: View, sensor: str) -> Figure:
+    caption = seen.caption("Dynamic amplification over the plane of both.")
+    title = f"Where it is amplified: {sensor}"
+    return draw("amplification-map", title, caption, 3.2, partial(_draw_map, seen, sensor))
+
+
+def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
+    axes = drawing.subplots()
+    ways = _ways(seen)
+    mesh = draw_map(axes, seen, seen.results.of_sensor("dynamic_amplification", sensor), ways, cmap="viridis")
+    _name_ways(axes, seen, ways)
+    colour_bar(axes, mesh, f"{sensor}, max/static")
+
+
+def _ways(seen: View) -> tuple[Any, Any]:
+    """Speed ratio and mass ratio where each follows from one axis alone."""
+    mass = seen.results.dataset.coords.get("mass_ratio")
+    return _ratio(seen)[0], mass if mass is not None and depends_on(seen, mass, seen.y) else None
+
+
+def _name_ways(axes: Any, seen: View, ways: tuple[Any, Any]) -> None:
+    assert seen.y is not None
+    axes.set_xlabel(_ratio(seen)[1])
+    axes.set_ylabel(seen.y.title if ways[1] is None else "mass ratio")
+
+
+def _contact(seen: View, carriage: str) -> Figure:
+    caption = seen.caption(
+        "Smallest contact force on 0-98 % of the span over the weight.",
+        "Where it is negative the carriage would lift off; the line is where that begins."
+        if seen.y is not None
+        else "Below zero the carriage would lift off.",
+    )
+    title = f"Contact force: {carriage}"
+    height = 3.2 if seen.y is not None else 2.6
+    return draw(f"contact-{carriage}", title, caption, height, partial(_draw_contact, seen, carriage))
+
+
+def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
+    results = seen.results
+    weight = results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
+    force = results.dataset[f"{carriage}_contact_force_min"] / weight
+    axes = drawing.subplots()
+    if seen.y is None:
+        way, title = _ratio(seen)
+        draw_curves(axes, seen, seen.curves(force, way))
+        zero_line(axes)
+        along_axis(axes, seen, title)
+        axes.set_ylabel("smallest contact force / weight")
+        return
+    ways = _ways(seen)
+    mesh = draw_map(axes, seen, force, ways, cmap="PuOr", vmin=-1.0, vmax=1.0)
+    _name_ways(axes, seen, ways)
+    colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
+    grid = seen.plane(force)
+    known = grid[np.isfinite(grid)]
+    if seen.is_sampled or min(grid.shape) < 2 or not (known.size and known.min() < 0.0 < known.max()):
+        return
+    x, y = (seen.along(axis, way) for axis, way in zip((seen.x, seen.y), ways, strict=True) if axis is not None)
+    axes.contour(x, y, grid.T, [0.0], colors=VERMILION, linewidths=1.8)
+    line = Line2D([], [], color=VERMILION, linewidth=1.8)
+    axes.legend([line], ["contact opens"], loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1)
+
+
+def _response(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
+    caption = (
+        "Kept histories over the position of the carriage, up to the one with the largest amplification while the "
+        "contact holds. Displacements point down, as the body hangs."
+    )
+    height = 0.8 + 2.0 * len(sensors)
+    return draw("response", "Response on the way", caption, height, partial(_draw_response, results, sensors, shown))
+
+
+def _draw_response(results: Results, sensors: list[str], shown: list[Index], drawing: Drawing) -> None:
+    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, sensor in zip(rows, sensors, strict=True):
+        ways = [over_position(results, sensor, index) for index in shown]
+        scale = scale_for(max(float(np.abs(way.values).max(initial=0.0)) for way in ways), results.sensors[sensor])
+        factors, label = [scale.factor] * len(shown), f"{sensor} ({scale.unit})" if scale.unit else sensor
+        if _amplified(results, sensor) and len(shown) > 1:
+            factors, label = [1.0 / _static(results, sensor, index) for index in shown], f"{sensor} / static"
+        for index, way, factor, colour in zip(shown, ways, factors, shades(len(shown)), strict=True):
+            axes.plot(way.position, way.values * factor, color=colour, label=results.at(index).replace(", ", "\n"))
+        zero_line(axes)
+        if results.sensors[sensor] == "m":
+            axes.invert_yaxis()
+        axes.set_ylabel(label)
+    if len(shown) > 1:
+        legend_of_all(drawing, rows[0])
+    rows[-1].set_xlabel(f"position of {results.carriage_name} (m)")
+
+
+def _static(results: Results, sensor: str, index: Index) -> float:
+    """Largest absolute static value of one variant, from its amplification."""
+    largest = max(abs(float(results.dataset[f"{sensor}_{side}"].values[index])) for side in ("max", "min"))
+    return largest / float(np.asarray(results.of_sensor("dynamic_amplification", sensor).values)[index])

@@ -1,0 +1,58 @@
+"""`bench` times the march that `run` uses, and that march computes the right numbers."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from studies import bench
+from studies.bench import Scene, Throughput
+from studies.cli import main
+from tests.naive import motions, newmark, scene
+from tests.reference.closed_forms import PinnedBeam
+
+
+@pytest.mark.parametrize("modes", [1, 10])
+def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
+    size = Scene(modes=modes, steps=300, variants=40)
+    found = bench.largest_deflections(size)
+    random = np.random.default_rng(0)
+    speed, mass = random.uniform(1.0, 20.0, 40), random.uniform(10.0, 500.0, 40)
+    zeta = random.uniform(0.0, 0.05, 40)
+    beam = PinnedBeam(modes, 15.0, 2.1e11 * 8.33e-6, 78.5)
+    expected = []
+    for variant in (0, 17, 39):
+        load = scene.moving_mass(mass[variant], 9.81, motions.cruise(0.0, 15.0, speed[variant]))
+        case = scene.Scene(beam.phi, beam.omega, np.full(modes, zeta[variant]), (load,))
+        times = newmark.grid(case, 0.0, load.leave, size.steps)
+        history = newmark.march(case, times, scene.rest(case))
+        expected.append(np.abs(history.displacement(beam.phi(7.5, 0))).max())
+    np.testing.assert_allclose(found[[0, 17, 39]], expected, rtol=1e-9)
+
+
+def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    marched = []
+    execute = bench.execute
+
+    def spy(plan: object, *rest: object, **options: object) -> None:
+        marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size))  # type: ignore[attr-defined]
+        execute(plan, *rest, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(bench, "execute", spy)
+    found = bench.measure(Scene(modes=4, steps=100, variants=64), threads=1, best_of=3)
+    assert marched == [(64, {100}, 4)] * 3
+    assert found.seconds > 0
+    assert found.variants_per_second == pytest.approx(64 / found.seconds)
+    assert found.case_mode_steps_per_second == pytest.approx(64 * 4 * 100 / found.seconds)
+
+
+def test_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--modes", "3", "--steps", "50", "--variants", "32", "--threads", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) == set(Throughput.__dataclass_fields__)
+    assert (found["modes"], found["steps"], found["variants"], found["threads"]) == (3, 50, 32, 1)
+    assert found["best_of"] >= 3 and found["case_mode_steps_per_second"] > 0
+    assert main(["bench", "--modes", "3", "--steps", "50", "--variants", "32"]) == 0
+    assert "per second" in capsys.readouterr().out

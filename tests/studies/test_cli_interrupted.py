@@ -1,0 +1,177 @@
+"""Runs that are interrupted: exit codes, what is kept, and that what goes on ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import engine
+from results_schema.archive import open_archive
+from results_schema.errors import Interrupted, OutputFailed
+from results_schema.parts import PartStore, Rows
+from studies import gathering
+from studies.cli import main
+from studies.gathering import Gatherer
+from studies.options import RunOptions
+from studies.provenance import OF_TIME_AND_MACHINE
+from studies.runner import run_to_archive
+from studies.stopping import GRACE_SECONDS, Stop, stop_on_signals
+from tests.studies.small import LONG, SMALL, start, write
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder, and a part for every chunk."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
+    write(tmp_path)
+    return tmp_path
+
+
+def after_parts(monkeypatch: pytest.MonkeyPatch, number: int, number_of_signal: int) -> None:
+    """Let a signal arrive when so many parts are written."""
+    written = []
+    write_part = PartStore.write
+
+    def write_and_signal(self: PartStore, variants: np.ndarray, *rest: object) -> Path:
+        path = write_part(self, variants, *rest)  # type: ignore[arg-type]
+        written.append(path)
+        if len(written) == number:
+            os.kill(os.getpid(), number_of_signal)
+        return path
+
+    monkeypatch.setattr(PartStore, "write", write_and_signal)
+
+
+def assert_same_results(first: xr.Dataset, second: xr.Dataset) -> None:
+    """Equal to the last bit, but for the time and the machine."""
+    for dataset in (first, second):
+        assert set(OF_TIME_AND_MACHINE) <= set(dataset.attrs)
+    strip = [d.assign_attrs({key: "" for key in OF_TIME_AND_MACHINE}) for d in (first, second)]
+    xr.testing.assert_identical(*strip)
+    compared = [name for name, array in first.data_vars.items() if array.dtype.kind == "f"]
+    assert len(compared) > 5
+    for name in compared:
+        assert first[name].values.tobytes() == second[name].values.tobytes()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_and_the_next_start_goes_on(
+    number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
+    with monkeypatch.context() as patch:
+        after_parts(patch, 2, number)
+        capsys.readouterr()
+        assert main(["run", "small.toml"]) == code
+    output = capsys.readouterr()
+    assert output.out == "" and "finished work is kept" in output.err
+    assert not Path("small.nc").exists() and len(list(Path("small.nc.parts").glob("*.nc"))) >= 2
+    assert signal.getsignal(number) is not None
+    outcome = run_to_archive(engine.load("small.toml"), Path("small.nc"), RunOptions())
+    assert 2 <= outcome.resumed < 16
+    assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
+    assert not Path("small.nc.parts").exists() and not Path("small.nc.lock").exists()
+
+
+def test_parts_of_another_study_need_overwrite(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patch:
+        after_parts(patch, 1, signal.SIGINT)
+        assert main(["run", "small.toml"]) == 130
+    write(here, SMALL.replace("damping_ratio = 0.02", "damping_ratio = 0.03"))
+    capsys.readouterr()
+    assert main(["run", "small.toml"]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    outcome = run_to_archive(engine.load("small.toml"), Path("small.nc"), RunOptions(overwrite=True))
+    assert outcome.resumed == 0
+
+
+def test_a_part_that_was_damaged_meanwhile_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        after_parts(patch, 3, signal.SIGINT)
+        assert main(["run", "small.toml"]) == 130
+    part = sorted(Path("small.nc.parts").glob("*.nc"))[0]
+    part.write_bytes(part.read_bytes()[:-50])
+    assert main(["run", "small.toml"]) == 0
+    assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
+    assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
+
+
+@pytest.mark.parametrize(("signals", "code"), [([signal.SIGTERM], 143), ([signal.SIGINT] * 2, 130)], ids=str)
+def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code: int) -> None:
+    write(here, LONG, "long.toml")
+    process = start(here, "run", "long.toml")
+    deadline = time.monotonic() + 60
+    while not list(here.glob("long.nc.parts/*.sha256")):
+        assert process.poll() is None and time.monotonic() < deadline, process.communicate()
+        time.sleep(0.02)
+    asked = time.monotonic()
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.05)
+    errors = process.communicate(timeout=30)[1]
+    assert time.monotonic() - asked < (2.0 if len(signals) == 1 else 0.7)
+    assert process.returncode == code and "finished work is kept" in errors and "Traceback" not in errors
+    assert list(here.glob("long.nc.parts/*.sha256")) and not (here / "long.nc").exists()
+
+
+def test_stop_carries_the_code_of_its_signal() -> None:
+    with stop_on_signals() as stop:
+        stop.check()
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert stop.event.wait(GRACE_SECONDS)
+        with pytest.raises(Interrupted, match="finished work is kept") as caught:
+            stop.check()
+    assert caught.value.exit_code == stop.exit_code == 143
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert Stop().exit_code == 130
+
+
+class Written:
+    """Remembers what would have been written."""
+
+    def __init__(self) -> None:
+        self.parts: list[tuple[list[int], list[float], list[int]]] = []
+
+    def __call__(self, variants: np.ndarray, arrays: object, selected: Rows | None) -> None:
+        kept = [] if selected is None else selected.variants.tolist()
+        self.parts.append((variants.tolist(), arrays["x"].tolist(), kept))  # type: ignore[index]
+
+
+def chunk(*variants: int) -> tuple[np.ndarray, dict[str, np.ndarray], Rows]:
+    """A chunk whose results are its variants' numbers, one of which is kept."""
+    numbers = np.array(variants)
+    return numbers, {"x": numbers + 0.5}, Rows(numbers[:1], {"h": np.zeros((1, 3))})
+
+
+def test_chunks_share_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 100.0)
+    written = Written()
+    with Gatherer(written) as parts:
+        parts.add(*chunk(4, 5))
+        parts.add(*chunk(1))
+        assert written.parts == []
+        monkeypatch.setattr(gathering, "BYTES_PER_PART", 1)
+        parts.add(*chunk(2))
+        parts.add(np.array([7]), {"x": np.array([7.5])}, None)
+    assert written.parts == [([4, 5, 1, 2], [4.5, 5.5, 1.5, 2.5], [4, 1, 2]), ([7], [7.5], [])]
+
+
+@pytest.mark.parametrize(("error", "kept"), [(KeyboardInterrupt(), 1), (OutputFailed("full"), 0)], ids=str)
+def test_what_has_gathered_is_kept_unless_the_disk_failed(
+    error: BaseException, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 100.0)
+    written = Written()
+    with pytest.raises(type(error)), Gatherer(written) as parts:
+        parts.add(*chunk(3))
+        raise error
+    assert len(written.parts) == kept

@@ -1,0 +1,147 @@
+"""Imports flow one way, heavy packages stay where they belong, and importing ours costs next to nothing."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("results_schema", "engine", "studies")
+
+# The stages of the engine: a module imports modules of its own stage and of those before.
+STAGES = {
+    "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
+    "bodies bodies.beam",
+    "numbers only": "kernels kernels.jit kernels.layout kernels.schemes kernels.record kernels.start kernels.march",
+    "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics",
+    "scenes as arrays": "timeline model track signals lanes fidelity tables",
+    "all work of a study": "reduction plan histories",
+    "the run": "march outcome dataset run",
+}
+HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"}
+# Packages that only these modules of ours may import.
+ONLY_IN = {
+    "dask": ("engine.run",),
+    "numba": ("engine.kernels",),
+    "netCDF4": ("results_schema",),
+    "click": ("studies",),
+    "rich": ("studies.console",),
+    "matplotlib": ("studies",),
+    "jinja2": ("studies",),
+    "pint": ("engine.units",),
+}
+
+
+def modules() -> dict[str, ast.Module]:
+    """All our modules by name, parsed."""
+    found = {}
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts).removesuffix(".__init__")] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Every module that is imported at run time, anywhere in a module."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0 and node.module, "relative imports hide the direction"
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        yield from imports(node)
+
+
+MODULES = modules()
+IMPORTS = {name: set(imports(tree)) for name, tree in MODULES.items()}
+
+
+def test_everything_is_found() -> None:
+    assert len(MODULES) > 40
+    assert "engine.document" in IMPORTS["engine.scene"] and "results_schema.errors" in IMPORTS["engine.scene"]
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_packages_import_downwards(name: str) -> None:
+    package = name.partition(".")[0]
+    above = PACKAGES[PACKAGES.index(package) + 1 :]
+    assert {found for found in IMPORTS[name] if found.partition(".")[0] in above} == set()
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_module_needs_itself(package: str) -> None:
+    own = {name: {found for found in IMPORTS[name] if found in MODULES and found != name} for name in MODULES}
+    graph = {name: own[name] for name in MODULES if name.partition(".")[0] == package and name != package}
+    order = list(TopologicalSorter(graph).static_order())  # raises CycleError
+    assert set(graph) <= set(order)
+
+
+def test_stages_of_the_engine() -> None:
+    stage = {f"engine.{name}": place for place, names in enumerate(STAGES.values()) for name in names.split()}
+    found = {name for name in MODULES if name.startswith("engine.")}
+    assert found == set(stage), "a new module needs a stage"
+    upwards = [
+        f"{name} imports {other}"
+        for name in found
+        for other in IMPORTS[name] & found
+        if stage[other] > stage[name]
+    ]
+    assert upwards == []
+
+
+def test_kernels_know_numbers_only() -> None:
+    allowed = {"numpy", "numba", "llvmlite", *sys.stdlib_module_names}
+    for name in (name for name in MODULES if name.startswith("engine.kernels")):
+        foreign = {found for found in IMPORTS[name] if not found.startswith("engine.kernels")}
+        assert {found.partition(".")[0] for found in foreign} <= allowed, name
+
+
+@pytest.mark.parametrize("package", sorted(ONLY_IN))
+def test_packages_stay_where_they_belong(package: str) -> None:
+    users = [name for name, found in IMPORTS.items() if package in {other.partition(".")[0] for other in found}]
+    assert users
+    assert [name for name in users if not f"{name}.".startswith(tuple(f"{p}." for p in ONLY_IN[package]))] == []
+
+
+@pytest.mark.parametrize("package", ["results_schema", "engine", "studies", "studies.cli"])
+def test_importing_is_light(package: str) -> None:
+    code = f"import sys, {package}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    loaded = set(python("-c", code).split())
+    assert package.partition(".")[0] in loaded
+    assert loaded & HEAVY == set()
+
+
+def test_importing_takes_no_longer_than_numpy_and_a_fifth_of_a_second() -> None:
+    assert best_seconds("-c", "import engine") < best_seconds("-c", "import numpy") + 0.2
+
+
+def test_help_takes_less_than_three_tenths_of_a_second() -> None:
+    assert best_seconds("-m", "studies", "--help") < 0.3
+
+
+def best_seconds(*arguments: str) -> float:
+    """Seconds of the quickest of five runs of Python."""
+
+    def seconds() -> float:
+        start = time.perf_counter()
+        python(*arguments)
+        return time.perf_counter() - start
+
+    return min(seconds() for _ in range(5))
+
+
+def python(*arguments: str) -> str:
+    """Standard output of Python in the project's folder."""
+    done = subprocess.run([sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout
