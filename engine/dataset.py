@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.histories import phases_shown
 from engine.lanes import LaneValues
 from engine.plan import Plan
 from results_schema.parts import Rows
@@ -197,7 +196,7 @@ def _with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows, declared: d
 
 def _stations(plan: Plan, stations: int) -> tuple[str, tuple[str, NDArray[Any], dict[str, Any]]]:
     """The dimension of histories: the phase of the cycle where all have the same, else a number."""
-    phases = phases_shown(plan)
+    phases = plan.phases_shown
     if phases is not None:
         return "phase", ("phase", phases, axes()["phase"].attributes())
     return "station", ("station", np.arange(stations, dtype=np.int64), axes()["station"].attributes())

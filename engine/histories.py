@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.plan import Bucket, Plan
 from engine.settings import Every
-from engine.timeline import Segment, Timeline
+from engine.timeline import Segment, Timeline, Window
 
 Counts = NDArray[np.int64]
 
@@ -15,45 +16,22 @@ CYCLE_STATIONS = 200  # of a kept history over the last cycle
 WHOLE_STATIONS = 401  # of a kept history over a whole run
 
 
-def counts_shown(plan: Plan, bucket: Bucket) -> Counts:
+def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "none", "all"] | Every) -> Counts:
     """Stations of the kept histories by their count, ascending and distinct.
 
     Over a cycle phase 0 is in and phase 1 is not; over a whole run both ends are.
     """
-    first, last = bucket.tables.timeline.window
-    wanted = plan.study.output.histories
+    first, last = timeline.window
     if wanted == "none":
         return np.zeros(0, dtype=np.int64)
     if isinstance(wanted, Every):
         return np.arange(first, last + 1, wanted.every)
     if wanted == "all":
         return np.arange(first, last + 1)
-    if plan.window == "last-cycle":
+    if window == "last-cycle":
         steps = last - first
         return np.unique(first + np.rint(np.arange(CYCLE_STATIONS) * (steps / CYCLE_STATIONS)).astype(np.int64))
     return np.unique(np.rint(np.linspace(first, last, WHOLE_STATIONS)).astype(np.int64))
-
-
-def phases_shown(plan: Plan) -> NDArray[np.float64] | None:
-    """The phases of the kept histories over a cycle, if all variants have the same."""
-    if plan.window != "last-cycle" or plan.base.riders[0].motion.period is None or plan.shown.size == 0:
-        return None
-    found = None
-    for bucket in plan.buckets:
-        if np.isin(bucket.variants, plan.shown).any():
-            first, last = bucket.tables.timeline.window
-            phases = (counts_shown(plan, bucket) - first) / (last - first)
-            if found is not None and not np.array_equal(found, phases):
-                return None
-            found = phases
-    return found
-
-
-def stations_shown(plan: Plan) -> int:
-    """The most stations that any kept history has."""
-    if plan.shown.size == 0:
-        return 0
-    return max(counts_shown(plan, bucket).size for bucket in plan.buckets)
 
 
 def counts_reduced(timeline: Timeline, stations: int) -> Counts:

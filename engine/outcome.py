@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.histories import counts_reduced, counts_shown, stations_shown
+from engine.histories import counts_reduced
 from engine.kernels.layout import (
     BELOW_AT,
     DIVERGED_AT,
@@ -181,8 +181,8 @@ def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[]
     kept = np.intersect1d(variants, plan.shown)
     if kept.size == 0:
         return None
-    tables = bucket.tables.with_accelerations
-    counts = counts_shown(plan, bucket)
+    tables = bucket.tables.with_accelerations if plan.reads_accelerations else bucket.tables
+    counts = plan.counts_shown(bucket)
     values = plan.values(bucket, padded(kept))
     marched = march(tables, values, counts, kept.size, halted)
     time_scale = plan.values(bucket, kept).time_scale(tables.model.carriages[0].name)
@@ -199,7 +199,7 @@ def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[]
     for name, array in arrays.items():
         if name != "elapsed":
             array[status >= Status.NOT_CONVERGED] = np.nan
-    size = stations_shown(plan)
+    size = plan.stations_shown
     return Rows(kept, {name: _filled(np.ascontiguousarray(array), size) for name, array in arrays.items()})
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.fidelity import Needs, check_fixed_steps, check_most_steps, needed_steps, round_up
+from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.kernels.schemes import Scheme
 from engine.lanes import LANE_KEYS, LaneValues
@@ -20,8 +21,10 @@ from engine.model import SceneModel, build_model
 from engine.reduction import Reduction
 from engine.scene import Study
 from engine.sweep import Cases, expand
-from engine.tables import SceneTables, Window
+from engine.tables import SceneTables
+from engine.timeline import Window
 from results_schema.errors import BadInput
+from results_schema.variables import declarations
 
 Counts = NDArray[np.int64]
 
@@ -104,12 +107,40 @@ class Plan:
             found += sum(int(np.prod([sizes[d] for d in dims])) for dims in self.reduction.outputs(self.study).values())
         return found
 
+    @cached_property
+    def reads_accelerations(self) -> bool:
+        """Whether the kind of study keeps the accelerations of the carriages."""
+        names = {variable.name for variable in declarations(self.study.kind)}
+        return "{carriage}_acceleration_across" in names
+
+    def counts_shown(self, bucket: Bucket) -> Counts:
+        """Stations of the kept histories of a bucket, by their count."""
+        return counts_shown(bucket.tables.timeline, self.window, self.study.output.histories)
+
+    @cached_property
+    def stations_shown(self) -> int:
+        """The most stations that any kept history has."""
+        return max((self.counts_shown(bucket).size for bucket in self._shown_buckets()), default=0)
+
+    @cached_property
+    def phases_shown(self) -> NDArray[np.float64] | None:
+        """The phases of the kept histories over a cycle, if all variants have the same."""
+        if self.window != "last-cycle" or self.base.riders[0].motion.period is None:
+            return None
+        found = []
+        for bucket in self._shown_buckets():
+            first, last = bucket.tables.timeline.window
+            found.append((self.counts_shown(bucket) - first) / (last - first))
+        same = bool(found) and all(np.array_equal(found[0], phases) for phases in found)
+        return found[0] if same else None
+
+    def _shown_buckets(self) -> list[Bucket]:
+        return [bucket for bucket in self.buckets if np.isin(self.shown, bucket.variants).any()]
+
     @property
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
-        from engine.histories import stations_shown
-
-        shown = int(self.shown.size) * stations_shown(self) * (len(self.study.sensor) + 2)
+        shown = int(self.shown.size) * self.stations_shown * (len(self.study.sensor) + 2)
         return 8 * (self.size * self.numbers_per_variant + shown) + 65536
 
     @property

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bodies.modal import ModalBody
 from engine.kernels.layout import Watch
 from engine.model import BodyPart, CarriageTie, SceneModel
 from engine.timeline import Rider
@@ -49,25 +50,28 @@ class Sensor:
         """Where it reads, m: one place, or one per station."""
         return np.array([self.at]) if self.under is None else along[self.under].s
 
+    def shape(self, model: SceneModel, along: tuple[Way, ...], derivative: int) -> Array:
+        """(1 or stations, modes of its body) mode shapes where it reads."""
+        body = model.bodies[self.body].modal
+        return body.shape([self.at], derivative) if self.under is None else along[self.under].shape(body, derivative)
+
     def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
         """Its sums over the modes."""
         part = model.bodies[self.body]
-        x = self.places(along)
         if self.quantity in DERIVATIVE:
-            factor, order = _factor(part, self.quantity), DERIVATIVE[self.quantity]
-            return [Channel("q", 0, _spread(model, part, factor * part.modal.shape(x, order)))]
-        shape = part.modal.shape(x)
+            rows = _factor(part, self.quantity) * self.shape(model, along, DERIVATIVE[self.quantity])
+            return [Channel("q", 0, _spread(model, part, rows))]
+        order, shape = RATE_ORDER[self.quantity], self.shape(model, along, 0)
         if self.under is None:
-            order = RATE_ORDER[self.quantity]
             return [Channel("qva"[order], order, _spread(model, part, shape))]
         way = along[self.under]
         ds, dds = way.ds[:, None], way.dds[:, None]
-        slope = part.modal.shape(x, 1)
-        if self.quantity == "velocity":
-            rows = {"q": ds * slope, "v": shape}
+        slope = self.shape(model, along, 1)
+        if order == RATE_ORDER["velocity"]:
+            material = {"q": ds * slope, "v": shape}
         else:
-            rows = {"q": ds**2 * part.modal.shape(x, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
-        return [Channel(of, RATE_ORDER[self.quantity], _spread(model, part, row)) for of, row in rows.items()]
+            material = {"q": ds**2 * self.shape(model, along, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
+        return [Channel(of, order, _spread(model, part, rows)) for of, rows in material.items()]
 
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations, ties): static response per unit force of each tie that the kept modes miss."""
@@ -76,24 +80,36 @@ class Sensor:
             return found
         for r, (carriage, way) in enumerate(zip(model.carriages, along, strict=True)):
             if way.active and carriage.body == self.body:
-                found[:, r] = self.flexibility(model, self.places(along), way.s, "missed")
+                found[:, r] = self._full(model, along, way.s) - self._kept(model, along, way.shape(self._modal(model)))
         for r, damper in enumerate(model.dampers, start=len(model.carriages)):
             if damper.body == self.body:
-                found[:, r] = self.flexibility(model, self.places(along), np.array([damper.at]), "missed")
+                at = np.array([damper.at])
+                found[:, r] = self._full(model, along, at) - self._kept(model, along, self._modal(model).shape(at))
         return found
 
-    def flexibility(self, model: SceneModel, x: Array, s: Array, share: str) -> Array:
-        """Static reading at x per unit force at s (broadcast); ``share``: "missed", "kept" or "model" (what the
-        march tends to when it is slow: all of it with the static correction, else the kept modes)."""
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...], rider: int) -> Array:
+        """(1 or stations,) static reading per unit force of a carriage, by what the march tends to when it is slow:
+        the whole influence line with the static correction, else the kept modes."""
+        if model.study.solver.static_correction:
+            return self._full(model, along, along[rider].s)
+        return self._kept(model, along, along[rider].shape(self._modal(model)))
+
+    def _modal(self, model: SceneModel) -> ModalBody:
+        return model.bodies[self.body].modal
+
+    def _full(self, model: SceneModel, along: tuple[Way, ...], s: Array) -> Array:
+        """Static reading per unit force at s."""
         part = model.bodies[self.body]
-        factor, order = _factor(part, self.quantity), DERIVATIVE[self.quantity]
-        full = factor * part.modal.influence_at(x, s, order)
-        if share == "model" and model.study.solver.static_correction:
-            return full
-        elastic = part.modal.omega > 0.0
-        soft = part.modal.shape(s)[:, elastic] / part.modal.omega[elastic] ** 2
-        kept = factor * np.sum(part.modal.shape(x, order)[:, elastic] * soft, axis=1)
-        return np.asarray(full - kept if share == "missed" else kept)
+        line = part.modal.influence_at(self.places(along), s, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(part, self.quantity) * line)
+
+    def _kept(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
+        """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
+        part = model.bodies[self.body]
+        omega = part.modal.omega
+        flexible = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0.0)
+        rows = self.shape(model, along, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(part, self.quantity) * np.sum(rows * loaded * flexible, axis=1))
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""

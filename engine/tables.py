@@ -16,7 +16,7 @@ from engine.kernels.layout import Newmark, Ties, Watch
 from engine.kernels.schemes import Scheme
 from engine.model import SceneModel
 from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
-from engine.timeline import Segment, Timeline, build_timeline
+from engine.timeline import Segment, Timeline, Window, build_timeline
 from engine.track import Way, tabulate_ties, ways
 
 Array = NDArray[np.float64]
@@ -25,8 +25,6 @@ Counts = NDArray[np.int64]
 KEPT_BYTES = 96 * 2**20  # tables kept per scene; older ones are built again
 STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
 SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
-
-Window = Literal["whole", "last-cycle"]
 
 
 class SegmentTable(NamedTuple):
@@ -137,12 +135,14 @@ class SceneTables:
         displacement times powers of the highest frequency kept."""
         found = []
         for sensor in self.sensors:
-            part = self.model.bodies[sensor.body]
-            s = np.linspace(0.0, part.modal.length, 65)
-            x = s if sensor.under is not None else np.array([sensor.at])
+            body = self.model.bodies[sensor.body].modal
+            s = np.linspace(0.0, body.length, 65)
+            everywhere = Way(s, np.zeros_like(s), np.zeros_like(s), True)
             reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
-            largest = np.abs(reader.flexibility(self.model, x, s, "model")).max()
-            found.append(largest * part.modal.omega.max() ** sensor.offset_order)
+            if sensor.under is not None:
+                reader = replace(reader, under=0)
+            largest = np.abs(reader.unit_static(self.model, (everywhere,), 0)).max()
+            found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 
     def ways_at(self, counts: Array | Counts) -> tuple[Way, ...]:
@@ -174,15 +174,14 @@ class SceneTables:
         """Static reading of a sensor per unit force of a carriage, at every station."""
         if sensor.offset_order != 0 or self.model.carriages[rider].body != sensor.body:
             return np.zeros(along[0].s.size)
-        reading = sensor.flexibility(self.model, sensor.places(along), along[rider].s, "model")
-        return np.broadcast_to(reading, along[0].s.shape)
+        return np.broadcast_to(sensor.unit_static(self.model, along, rider), along[0].s.shape)
 
     def _unit_slope(self, sensor: Sensor, along: tuple[Way, ...]) -> Array:
         """Derivative of the first carriage's unit reading by its position, from places a little apart."""
         length = self.model.carriages[0].rider.length
         first, others = along[0], along[1:]
-        before = replace(first, s=np.maximum(first.s - SLOPE_STEP * length, 0.0))
-        after = replace(first, s=np.minimum(first.s + SLOPE_STEP * length, length))
+        before = replace(first, _shapes={}, s=np.maximum(first.s - SLOPE_STEP * length, 0.0))
+        after = replace(first, _shapes={}, s=np.minimum(first.s + SLOPE_STEP * length, length))
         change = self._unit(sensor, (after, *others), 0) - self._unit(sensor, (before, *others), 0)
         return np.asarray(change / (after.s - before.s))
 

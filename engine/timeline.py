@@ -24,6 +24,8 @@ from engine.motions import Cruise
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
+Window = Literal["whole", "last-cycle"]
+
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
 _SAME = 1e-12  # events closer than this part of the scene are one
 
@@ -188,9 +190,7 @@ class Timeline:
         return self.motion(rider, counts).S
 
 
-def build_timeline(
-    riders: tuple[Rider, ...], steps: int, window: Literal["whole", "last-cycle"], free_steps: int = 200
-) -> Timeline:
+def build_timeline(riders: tuple[Rider, ...], steps: int, window: Window, free_steps: int = 200) -> Timeline:
     """Cut the scene at its events and spread the steps.
 
     steps: wanted per unit of scene time. window: what is recorded. free_steps: per first period of free vibration.

@@ -5,11 +5,12 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bodies.modal import ModalBody
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Blow, Newmark, Ties
 from engine.model import CarriageTie, SceneModel
 from engine.timeline import Segment
@@ -26,6 +27,14 @@ class Way:
     ds: Array
     dds: Array
     active: bool
+    _shapes: dict[tuple[int, int], Array] = field(default_factory=dict)
+
+    def shape(self, body: ModalBody, derivative: int = 0) -> Array:
+        """(S, N) mode shapes of its body along the way, evaluated once."""
+        key = (id(body), derivative)
+        if key not in self._shapes:
+            self._shapes[key] = body.shape(self.s, derivative)
+        return self._shapes[key]
 
 
 def ways(model: SceneModel, segment: Segment) -> tuple[Way, ...]:
@@ -68,10 +77,10 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], newmark: Newmark) -
 def _tabulate_carriage(model: SceneModel, carriage: CarriageTie, way: Way, rows: Array, drive: Array) -> None:
     """p = phi;  A = 2 s' phi';  B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28), the sag's own curve as the drive."""
     part = model.bodies[carriage.body]
-    rows[:, part.modes, FORCE] = part.modal.shape(way.s)
+    rows[:, part.modes, FORCE] = way.shape(part.modal)
     if carriage.inertia != "mass":
         return
-    slope, bend = part.modal.shape(way.s, 1), part.modal.shape(way.s, 2)
+    slope, bend = way.shape(part.modal, 1), way.shape(part.modal, 2)
     ds, dds = way.ds[:, None], way.dds[:, None]
     rows[:, part.modes, RATE] = 2.0 * ds * slope
     rows[:, part.modes, CURVE] = ds**2 * bend + dds * slope

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure as Drawing
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from studies.words import number
@@ -27,6 +27,7 @@ INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
 DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 SEQUENTIAL = "viridis"
+FEW_DECADES = 300.0
 
 BESIDE: Mapping[str, Any] = {
     "loc": "upper left",
@@ -108,7 +109,8 @@ def svg(figure: Figure) -> str:
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": figure.name}):
         figure.drawing.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
-    element = text[text.index("<svg") :]
+    # matplotlib repeats every text as a comment.
+    element = re.sub(r"<!--.*?-->\n?", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Identifiers must differ between the figures of one page.
     element = re.sub(r'\bid="', f'id="{figure.name}-', element)
     return re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{figure.name}-", element)
@@ -129,10 +131,18 @@ def shades(count: int) -> list[Any]:
 
 
 def logarithmic(axis: Any) -> None:
-    """A logarithmic axis with plain numbers at its ticks."""
+    """A logarithmic axis with plain numbers at its ticks: at 1, 2, 5 of each decade while there are few of them."""
     axis._set_axes_scale("log")
-    axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+    low, high = axis.get_view_interval()
+    few = 0.0 < low < high < FEW_DECADES * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: printed(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def printed(value: float) -> str:
+    """A number as figures print it, with a true minus sign."""
+    return number(value).replace("-", "\N{MINUS SIGN}")
 
 
 def is_logarithmic(values: NDArray[np.float64]) -> bool:
@@ -157,7 +167,7 @@ def note(axes: Axes, text: str) -> None:
 
 def colour_bar(axes: Axes, mesh: Any, label: str, **options: Any) -> Any:
     """The bar of a map, with plain numbers."""
-    plain = FuncFormatter(lambda value, _: number(value))
+    plain = FuncFormatter(lambda value, _: printed(value))
     bar = axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, format=plain, **options)
     bar.outline.set_visible(False)
     bar.ax.minorticks_off()

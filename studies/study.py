@@ -94,6 +94,9 @@ def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     # The engine offers static values to every summary; they are results only where the kind says so.
     offered = [f"{sensor}_static" for sensor in study.sensor]
     finished = finished.drop_vars([name for name in offered if name not in declared], errors="ignore")
+    if "sensor" in finished.dims:
+        units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
+        finished = finished.assign_coords(sensor_unit=units)
     missing = {key: value for key, value in study_attributes(study).items() if key not in finished.attrs}
     finished = finished.assign_attrs(missing)
     validate(finished, kind.name, sensor_units(study), tuple(study.carriage))

@@ -183,7 +183,7 @@ def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None,
     else:
         rasterized = grid.size > VECTOR_CELLS
         mesh = axes.pcolormesh(x, y, grid.T, shading="nearest", rasterized=rasterized, edgecolors="face", **style)
-        mesh.set_linewidth(0.15)
+        mesh.set_linewidth(0.7)  # covers the seams that browsers show between cells
     for axis, way in ((axes.xaxis, x), (axes.yaxis, y)):
         if is_logarithmic(way):
             logarithmic(axis)

@@ -92,10 +92,7 @@ def test_stages_of_the_engine() -> None:
     found = {name for name in MODULES if name.startswith("engine.")}
     assert found == set(stage), "a new module needs a stage"
     upwards = [
-        f"{name} imports {other}"
-        for name in found
-        for other in IMPORTS[name] & found
-        if stage[other] > stage[name]
+        f"{name} imports {other}" for name in found for other in IMPORTS[name] & found if stage[other] > stage[name]
     ]
     assert upwards == []
 

@@ -169,12 +169,12 @@ def _answer(results: Results) -> str:
     at = in_words(results, place[:-1])
     if largest < NOTICEABLE:
         return (
-            f"Hardly: forward and backward differ by at most {percent(largest)} of the static range "
-            f"(rms of the odd part, {sensor}{at})."
+            f"Hardly: at {sensor}, where they differ most, forward and backward differ by {percent(largest)} of the "
+            f"static range (rms of the odd part){at}."
         )
     return (
-        f"Yes: forward and backward differ by up to {percent(largest)} of the static range "
-        f"(rms of the odd part), at {sensor}{at}."
+        f"Yes: at {sensor} forward and backward differ by up to {percent(largest)} of the static range "
+        f"(rms of the odd part){at}."
     )
 
 
@@ -200,9 +200,9 @@ def _lag(results: Results, sensor: str) -> str:
         return f"{sensor}: {calm}, within {percent(CLOSE)} of −{formula} in every variant."
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
     return (
-        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of −{formula}, as damping "
-        f"alone would have it: {calm}. Beyond, vibration left over from the turns takes over, and the lag ranges "
-        f"from {span}."
+        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of −{formula}, as "
+        f"damping alone would have it: {calm}. Beyond, vibration left over from the turns takes over, and the lag "
+        f"ranges from {span}."
     )
 
 

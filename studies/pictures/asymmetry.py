@@ -27,12 +27,13 @@ from studies.figures import (
 from studies.pictures.traces import odd_part, over_position, picked, there_and_back
 from studies.results import Index, Results, chosen
 from studies.views import DAMPING, MASSES, SPEEDS, Curve, View, along_axis, draw_curves, draw_map, view
-from studies.words import scale_for
+from studies.words import percent, scale_for
 
 MOST_SENSORS = 3
 THRESHOLDS = (0.01, 0.05)
 BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent
-LAGS_SHOWN = 3.0
+LAGS_SHOWN = 1.6
+VISIBLE = 0.03  # odd part that an eye sees in the response
 
 
 def pictures(results: Results) -> list[Figure]:
@@ -51,19 +52,22 @@ def pictures(results: Results) -> list[Figure]:
 
 
 def _response(results: Results, sensor: str) -> list[Figure]:
-    rank = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
-    shown = picked(results, rank, 2)
-    if not shown:
+    odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    ranked = picked(results, odd, results.size)
+    if not ranked:
         return []
+    modest = min(ranked, key=lambda index: abs(float(odd[index]) - VISIBLE))
+    shown = list(dict.fromkeys([modest, ranked[-1]]))
     which = (
-        "Of the kept histories, the one with the middle (left) and the one with the largest odd part (right)."
+        f"Of the kept histories, the one whose odd part is closest to {percent(VISIBLE)} of the static range (left) and "
+        "the one with the largest (right)."
         if len(shown) == 2
-        else "The last cycle."
+        else ""
     )
     caption = (
         f"{which} Above: the last cycle over the position of the carriage; below: half the difference of forward and "
         "backward at equal position. Grey: the turns, which no index counts."
-    )
+    ).strip()
     title = f"Forward and backward: {sensor}"
     return [draw(f"response-{sensor}", title, caption, 4.2, partial(_draw_response, results, sensor, shown))]
 
@@ -146,7 +150,8 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
         axes.set_ylabel(f"lag of {sensor} ({scale.unit})")
         if colours:
             _name_theory(axes, f"−{theory.lag_formula(seen.results, sensor)}", seen)
-    along_axis(rows[-1], seen)
+    assert seen.x is not None
+    rows[-1].set_xlabel(seen.x.title)
 
 
 def _name_theory(axes: Axes, formula: str, seen: View) -> None:

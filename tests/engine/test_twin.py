@@ -132,6 +132,19 @@ SCENES: dict[str, Callable[[], Study]] = {
         {"car": mass(0.5, cruise(0.0, 0.97, 0.4)), "next": mass(0.4, shuttle(0.3, 0.8, 1.1, 0.2, 2))},
         steps=150,
     ),
+    "delayed instant turns": lambda: case(
+        beam(supports=DAMPED),
+        {
+            "car": force(0.126, shuttle(1.0, 0.072, 1.227, 0.205, 2)),
+            "next": mass(0.641, shuttle(0.863, 0.292, 1.958, 0.0, 2), delay=0.468),
+        },
+        **scheme("linear-acceleration"),
+    ),
+    "sets off at once, stops at once": lambda: case(
+        beam(supports=SPRINGS),
+        {"car": mass(0.3, cruise(0.0, 1.0, 0.5)), "next": mass(0.4, swing(0.4, 0.3, 1.3, 1), delay=0.4)},
+        steps=150,
+    ),
     "two bodies": two_bodies,
     "own weight from rest": lambda: case(beam(own_weight=True), HALF),
     "own weight from equilibrium": lambda: case(

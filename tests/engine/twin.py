@@ -270,9 +270,6 @@ def march_on_sag(
     t, inner = naive.snapped(scene, times)
     beta, gamma = scheme
     state = start
-    if scene.loads[0].enter == t[0] and scene.loads[0].phases[0].s(t[0]) in (0.0, bed.length) and len(scene.loads) == 1:
-        # a cruise comes from outside; from rest its body is flat but for the modes left out
-        state = State(start.q, start.v + arrival_on_sag(scene, bed, gravity, t[0], start))
     a = scenes.acceleration(heavy(scene, bed, gravity, t[0], "right"), t[0], state, "right")
     states, accelerations = [state], [a]
     forces, before = [], []

@@ -130,7 +130,13 @@ def test_bad_input_is_refused_and_nothing_written(
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run"], ["frobnicate"], ["run", "asymmetry", "--fast"], ["bench", "--modes", "0"], ["run", "x", "--threads", "0"]],
+    [
+        ["run"],
+        ["frobnicate"],
+        ["run", "asymmetry", "--fast"],
+        ["bench", "--modes", "0"],
+        ["run", "x", "--threads", "0"],
+    ],
     ids=str,
 )
 def test_usage_errors_are_bad_input(capsys: Captured, arguments: list[str]) -> None:

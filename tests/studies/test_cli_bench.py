@@ -34,13 +34,13 @@ def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
 
 def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     marched = []
-    execute = bench.execute
+    from engine.run import execute
 
     def spy(plan: object, *rest: object, **options: object) -> None:
         marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size))  # type: ignore[attr-defined]
         execute(plan, *rest, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(bench, "execute", spy)
+    monkeypatch.setattr("studies.bench.execute", spy)
     found = bench.measure(Scene(modes=4, steps=100, variants=64), threads=1, best_of=3)
     assert marched == [(64, {100}, 4)] * 3
     assert found.seconds > 0

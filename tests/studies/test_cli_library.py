@@ -44,7 +44,7 @@ def test_built_in_studies_are_planned_without_a_complaint(name: str) -> None:
     assert catalogue.find_study(name) == BUILT_IN[name]
 
 
-@pytest.mark.parametrize(("name", "mutation"), SPOILT, ids=lambda part: str(part))
+@pytest.mark.parametrize(("name", "mutation"), SPOILT, ids=str)
 def test_every_key_of_every_built_in_study(name: str, mutation: Mutation) -> None:
     accepted = survives(mutation, read)
     if mutation.how == "drop" and mutation.path[-1] in ("kind", "length", "on", "start", "end", "of", "centre"):

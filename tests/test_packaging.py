@@ -1,0 +1,54 @@
+"""What is shipped, and that README, constraints and continuous integration say the same."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from studies import catalogue
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def tested_versions() -> dict[str, str]:
+    """Versions of the constraints file by normalised name."""
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {canonicalize_name(name): version for name, version in pairs}
+
+
+def test_tested_versions_lie_in_the_ranges() -> None:
+    tested = tested_versions()
+    wanted = [Requirement(text) for text in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"])]
+    assert len(wanted) >= 16
+    for requirement in wanted:
+        version = tested[canonicalize_name(requirement.name)]
+        assert requirement.specifier.contains(version), requirement
+        assert len(requirement.specifier) > 0, requirement
+
+
+def test_extras() -> None:
+    assert set(PROJECT["optional-dependencies"]) == {"test", "nastran", "ansys", "robots"}
+
+
+def test_the_readme_has_the_command_that_ci_runs() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    command = re.search(r"^(\.ci/venv && .*)\Z", script, re.DOTALL | re.MULTILINE)
+    assert command is not None
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert _one_line(command[1]) in _one_line(readme)
+
+
+def test_data_files_lie_inside_their_package() -> None:
+    found = {path.name for path in (ROOT / "studies").rglob("*") if path.suffix in (".toml", ".part")}
+    shipped = {path.name for path in (*catalogue.built_in().values(), *catalogue.starts().values())}
+    assert shipped | {catalogue.EVERY_STUDY.name} == found
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
