@@ -59,14 +59,27 @@ class Rider:
 
     def path(self, tau: Array, start: float, end: float) -> Path:
         """Position and its derivatives by scene time on a segment without a break inside, one-sided at its ends."""
-        own = (tau - self.delay) * self.pace
-        first, last = ((t - self.delay) * self.pace for t in (start, end))
+        first, last = (self._own(t) for t in (start, end))
+        own = first + (tau - start) / (end - start) * (last - first)
         middle = 0.5 * (first + last)  # and not an end, which rounding may put on the other side
         if not 0.0 < middle < self.motion.duration:
             place = self.motion.path(0.0 if middle <= 0.0 else self.motion.duration).S
             return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
         found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
         return Path(found.S, found.dS * self.pace, found.ddS * self.pace**2)
+
+    def _own(self, tau: float) -> float:
+        """The motion's own time; exactly that of an event where rounding puts it beside one."""
+        own = (tau - self.delay) * self.pace
+        place = int(np.searchsorted(self._own_events, own))
+        near = self._own_events[max(0, place - 1) : place + 1]
+        closest = float(near[np.argmin(np.abs(near - own))])
+        return closest if abs(closest - own) <= 1e-9 * self.motion.duration else own
+
+    @cached_property
+    def _own_events(self) -> Array:
+        """The motion's own times at which its law changes, ascending."""
+        return np.array([0.0, *self.motion.breaks(), self.motion.duration])
 
     def touches(self, start: float, end: float) -> bool:
         """Whether the carriage is on the body between two neighbouring events."""
@@ -279,7 +292,7 @@ def _strikes(
         if not active[number]:
             continue
         if not before[number]:
-            if start > 0.0 or _enters(rider):
+            if start > 0.0:
                 yield Strike(number, "arrival", float(rider.path(np.array([start]), start, stop).dS[0]))
             continue
         times, jumps = rider.speed_jumps
@@ -287,9 +300,3 @@ def _strikes(
         for near in range(max(0, place - 1), min(place + 1, times.size)):
             if abs(times[near] - start) <= _SAME * rider.end:
                 yield Strike(number, "reversal", float(jumps[near]))
-
-
-def _enters(rider: Rider) -> bool:
-    """Whether a carriage comes onto the body at time 0 from outside, rather than having been there."""
-    place = float(rider.motion.path(0.0).S)
-    return not rider.stays and (place <= 0.0 or place >= rider.length)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.plan import Plan, make_plan
-from engine.run import execute, warm_up
+from engine.plan import make_plan
+from engine.run import execute, march_seconds, warm_up
 from engine.scene import Study
 
 BEST_OF = 7
@@ -68,7 +67,7 @@ _CARRIAGE = {
 
 @dataclass(frozen=True)
 class Throughput:
-    """The best of several marches of the whole scene; compiling and tabulating the track are left out."""
+    """The best of several marches of the whole scene; compiling, tabulating and gathering are left out."""
 
     case_mode_steps_per_second: float
     variants_per_second: float
@@ -88,7 +87,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
     """March the scene several times and take the best; threads: None takes all cores."""
     plan = make_plan(scene.study())
     warm_up(plan)
-    seconds = min(_seconds(plan, threads) for _ in range(best_of))
+    seconds = min(march_seconds(plan, threads) for _ in range(best_of))
     rate = scene.variants / seconds
     threads = threads or os.cpu_count() or 1
     return Throughput(
@@ -105,9 +104,3 @@ def largest_deflections(scene: Scene) -> NDArray[np.float64]:
 
     execute(make_plan(scene.study()), take)
     return found
-
-
-def _seconds(plan: Plan, threads: int | None) -> float:
-    start = time.perf_counter()
-    execute(plan, lambda variants, arrays, selected: None, threads=threads)
-    return time.perf_counter() - start

@@ -229,6 +229,10 @@ def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> R
 def _plain(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        return ("; " if any(isinstance(item, dict) for item in value) else ", ").join(map(_plain, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
     return number(value, 9) if isinstance(value, float) else str(value)
 
 

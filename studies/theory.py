@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 CYCLE_POINTS = 720
+ONE_PEAK = 1 / 8
+NEARLY = 0.01  # of the length: what counts as the middle
+LONG_SWING = 0.45  # of the length: an amplitude that reaches the ends
 _PLACES = ("centre", "amplitude")
 
 
@@ -101,9 +104,9 @@ def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
     return loaded_frequency(results, mass_ratio) / order
 
 
-def shuttle_amplification(results: Results) -> Array | None:
+def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
-    beam from one end to the other."""
+    beam from one end to the other and the sensor is at midspan."""
     from engine.motions import Sinusoidal
 
     body, motion, mass = results.study.body[results.carriage.on], results.carriage.motion, _coordinate(results, "mass_ratio")
@@ -111,9 +114,29 @@ def shuttle_amplification(results: Results) -> Array | None:
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
     if mass is None or swept & fixed or not isinstance(motion, Sinusoidal) or body.supports != "pinned-pinned":
         return None
-    if abs(motion.centre / body.length - 0.5) > 0.01 or motion.amplitude / body.length < 0.45:
+    at = results.study.sensor[sensor].at
+    if at is None or max(abs(place / body.length - 0.5) for place in (at, motion.centre)) > NEARLY or motion.amplitude < LONG_SWING * body.length:
         return None
     return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
+
+
+def end_spring_difference(results: Results, sensor: str) -> Array | None:
+    """(E I/L^3)|1/k_a - 1/k_b| for every variant; None unless a beam stands on two springs at its ends and the sensor
+    is at midspan. One peak per slow cycle instead of two where it is above 1/8."""
+    name = results.carriage.on
+    body, at = results.study.body[name], results.study.sensor[sensor].at
+    key = f"body.{name}"
+    varied = any(path == f"{key}.length" or path.endswith(".at") for axis in results.axes for path in axis.paths)
+    if isinstance(body.supports, str) or len(body.supports) != 2 or varied or at is None:
+        return None
+    ends = sorted(spring.at for spring in body.supports)
+    if ends != [0.0, body.length] or abs(at / body.length - 0.5) > NEARLY:
+        return None
+    if any(spring.rotational for spring in body.supports):
+        return None
+    first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
+    bending = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
+    return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
 
 
 def _coordinate(results: Results, name: str) -> Array | None:

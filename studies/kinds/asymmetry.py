@@ -192,8 +192,9 @@ def _lag(results: Results, sensor: str) -> str:
         return f"{sensor}: {_largest_lag(results, lag, expected)}."
     limit = results.holds_up_to(axis, apart <= CLOSE, known)
     if limit is None:
-        least = percent(float(np.nanmin(apart)))
-        return f"{sensor}: {_largest_lag(results, lag, expected)}; nowhere is it closer to −{formula} than {least}."
+        slowest = apart[known & (results.everywhere(results.dataset[axis.name]) == axis.values.min())]
+        away = f"; even at the lowest speed it is up to {percent(float(slowest.max()))} away from −{formula}" if slowest.size else ""
+        return f"{sensor}: {_largest_lag(results, lag, expected)}{away}."
     slow = results.everywhere(results.dataset[axis.name]) <= limit
     calm = _largest_lag(results, np.where(slow, lag, np.nan), expected)
     if limit == axis.values.max():

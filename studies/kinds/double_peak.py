@@ -13,7 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.results import Axis, Index, Results, chosen, extreme
+from studies.results import VARIANT, Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
 from studies.words import counted, listed, number, percent
 
@@ -30,6 +30,9 @@ EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 MOST_SENSORS = 3
 MOST_GROUPS = 4
+PACES = (".motion.frequency", ".motion.speed")
+NEAR = 0.15  # how close a harmonic must be to be named as the cause
+SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
 SYMMETRIC = 0.05  # odd over even harmonics below which the two halves of a cycle are alike
 
 RESULTS = (
@@ -154,7 +157,7 @@ class DoublePeak:
         said = []
         for sensor in list(results.sensors)[:MOST_SENSORS]:
             said += [_answer(results, sensor), *_breaks(results, sensor), *_amplified(results, sensor)]
-            said += _halves(results, sensor)
+            said += [*_halves(results, sensor), *_end_springs(results, sensor)]
         return [*said, *told_statuses(results)]
 
     def figures(self, results: Results) -> list[Figure]:
@@ -177,18 +180,44 @@ def _counts(results: Results, sensor: str) -> Array:
 
 
 def _answer(results: Results, sensor: str) -> str:
-    """How many peaks how many variants have."""
-    counts = _counts(results, sensor)
-    known = counts[np.isfinite(counts)]
-    if not known.size:
+    """How often the response peaks, up to where, and how many variants have how many peaks."""
+    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    known = np.isfinite(counts)
+    if not known.any():
         return f"{sensor}: no variant has values, so the question stays open."
-    values, variants = np.unique(known, return_counts=True)
+    values, variants = np.unique(counts[known], return_counts=True)
     if len(values) == 1:
-        every = "in every variant" if known.size > 1 else "in a cycle"
-        return f"{sensor}: {counted(int(values[0]), 'peak')} {every}."
+        every = f" in every one of {counted(int(known.sum()), 'variant')}" if known.sum() > 1 else ""
+        return f"{sensor}: {counted(int(values[0]), 'peak')} per cycle{every}."
     ranked = sorted(zip(variants, values, strict=True), reverse=True)
-    parts = [f"{counted(int(value), 'peak')} in {percent(count / known.size)}" for count, value in ranked]
-    return f"{sensor}: {listed(parts)} of the variants."
+    share = listed([f"{counted(int(value), 'peak')} in {percent(count / known.sum())}" for count, value in ranked])
+    other = known & (counts != EXPECTED)
+    first = float(ratio[other].min())
+    if (_slowest(results, ratio) & other).any() or not (known & (ratio < first)).any():
+        return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
+    place = tuple(int(i) for i in np.argwhere(other & (ratio == first))[0])
+    return (
+        f"{sensor}: two peaks per cycle below Ω/ω₁ = {number(first)}, whatever else is varied; there the pattern first "
+        f"breaks, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: {share} of the variants."
+    )
+
+
+def _slowest(results: Results, ratio: Array) -> NDArray[np.bool_]:
+    """Variants at the lowest frequency of the motion."""
+    axis = results.axis(*PACES)
+    along = ratio if axis is None else results.everywhere(results.dataset[axis.name])
+    return np.asarray(along == along.min())
+
+
+def deciding_axis(results: Results, sensor: str) -> Axis | None:
+    """The axis, other than the pace of the motion, along which the number of peaks changes most; the mass in doubt."""
+    counts = results.of_sensor("peaks_per_cycle", sensor)
+    pace = results.axis(*PACES)
+    axes = [axis for axis in results.axes if axis is not pace and len(axis.values) > 1]
+    if not axes or VARIANT in results.dims:
+        return results.axis(".mass")
+    axes.sort(key=lambda axis: not axis.sets(".mass"))
+    return max(axes, key=lambda axis: float((counts.max(axis.dim) - counts.min(axis.dim)).mean()))
 
 
 def _breaks(results: Results, sensor: str) -> list[str]:
@@ -197,7 +226,7 @@ def _breaks(results: Results, sensor: str) -> list[str]:
     known = np.isfinite(counts)
     if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
         return []
-    group = results.axis(".mass")
+    group = deciding_axis(results, sensor)
     if group is None:
         return [f"{sensor}: {_break(results, ratio, counts, known)}."]
     along = results.everywhere(results.dataset[group.name])
@@ -222,36 +251,54 @@ def _break(results: Results, ratio: Array, counts: Array, among: NDArray[np.bool
     fine = among & (ratio < first)
     place = tuple(np.argwhere(other & (ratio == first))[0])
     text = f"{counted(int(counts[place]), 'peak')} at Ω/ω₁ = {number(first)}"
-    text = f"two peaks up to Ω/ω₁ = {number(float(ratio[fine].max()))}, {text}" if fine.any() else f"already {text}"
+    if not fine.any():
+        return f"{counted(int(counts[place]), 'peak')} already at the lowest Ω/ω₁ = {number(first)}"
+    text = f"two peaks up to Ω/ω₁ = {number(float(ratio[fine].max()))}, {text}"
     mass = results.dataset.coords.get("mass_ratio")
     if mass is None:
         return text
     own = np.array([float(results.everywhere(mass)[place])])
     lines = {order: float(theory.breakdown(results, own, order)[0]) for order in ORDERS}
     near = min(lines, key=lambda order: abs(np.log(lines[order] / first)))
-    return f"{text} ({near} Ω = ω_eff at {number(lines[near])})"
+    if abs(lines[near] / first - 1.0) > NEAR:
+        return text
+    return f"{text} ({near} Ω = ωₑ at {number(lines[near])})"
+
+
+def _end_springs(results: Results, sensor: str) -> list[str]:
+    """From which difference of the end springs on a slow shuttle gives one peak, beside the rule 1/8."""
+    softness = theory.end_spring_difference(results, sensor)
+    if softness is None:
+        return []
+    counts = _counts(results, sensor)
+    slow = _slowest(results, results.everywhere(theory.frequency_ratio(results)))
+    one, two = (softness[slow & (counts == count)] for count in (1, EXPECTED))
+    if not (one.size and two.size and two.max() < one.min()):
+        return []
+    return [
+        f"{sensor}: at the lowest frequency there are two peaks up to (E I/L³)|1/kₐ − 1/k_b| = {number(two.max())} of the "
+        f"end springs and one from {number(one.min())} on; the rule says {number(theory.ONE_PEAK)}."
+    ]
 
 
 def _amplified(results: Results, sensor: str) -> list[str]:
-    """The largest amplification before the pattern breaks anywhere, beside the rule of thumb of a pinned beam."""
+    """The largest amplification, and at low frequency beside the rule of thumb of a pinned beam."""
     gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
-    other = np.isfinite(counts) & (counts != EXPECTED)
-    calm = ratio < ratio[other].min() if other.any() else np.ones_like(other)
-    place, top = extreme(np.where(calm, gain, np.nan)), extreme(gain)
+    ratio = results.everywhere(theory.frequency_ratio(results))
+    top, slow = extreme(gain), extreme(np.where(ratio <= SLOW, gain, np.nan))
     if top is None:
         return []
     said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{in_words(results, top)}"
-    if place is None or place == top:
-        return [f"{said}{_rule(results, top)}."]
-    before = f"before the pattern breaks anywhere (Ω/ω₁ < {number(float(ratio[other].min()))})"
-    return [f"{said}; {before} {number(float(gain[place]), 4)} times{in_words(results, place)}{_rule(results, place)}."]
+    if slow is None or slow == top:
+        return [f"{said}{_rule(results, sensor, top)}."]
+    below = f"up to Ω/ω₁ = {number(SLOW)} at most {number(float(gain[slow]), 4)} times"
+    return [f"{said}; {below}{in_words(results, slow)}{_rule(results, sensor, slow)}."]
 
 
-def _rule(results: Results, place: Index) -> str:
-    """The rule of thumb for a shuttle about the middle of a pinned beam, where it applies."""
-    expected = theory.shuttle_amplification(results)
-    if expected is None:
+def _rule(results: Results, sensor: str, place: Index) -> str:
+    """The rule of thumb for midspan and a slow shuttle about the middle of a pinned beam, where it applies."""
+    expected = theory.shuttle_amplification(results, sensor)
+    if expected is None or float(results.everywhere(theory.frequency_ratio(results))[place]) > SLOW:
         return ""
     return f" (rule of thumb 1 + (2.5 + 8.1 μ)(Ω/ω₁)²: {number(float(expected[place]), 4)})"
 

@@ -25,7 +25,7 @@ from studies.figures import (
     logarithmic,
     shades,
 )
-from studies.kinds.double_peak import ORDERS
+from studies.kinds.double_peak import ORDERS, deciding_axis
 from studies.pictures.traces import picked
 from studies.results import Index, Results, chosen
 from studies.views import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 MOST_SENSORS = 3
 MOST_CYCLES = 3
+ALIKE = 1e-3  # odd over even harmonics below which there is nothing to show
 LEAST_RATIO = 1e-6  # below, ratios are rounding
 PEAK_BANDS = (0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5)
 PEAK_COLOURS = ("#56b4e9", "#eef0f3", "#e69f00", "#0072b2", "#cc79a7", "#d55e00")
@@ -48,8 +49,12 @@ def pictures(results: Results) -> list[Figure]:
     seen = view(results, SPEEDS, MASSES)
     if seen.x is not None:
         for sensor in sensors:
-            found.append(_map(seen, sensor) if seen.y is not None else _count(seen, sensor))
-        found += [_gain(seen, sensors), _halves(seen, sensors)]
+            axis = deciding_axis(results, sensor)
+            own = view(results, SPEEDS, axis.paths) if axis is not None else seen
+            found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
+        found.append(_gain(seen, sensors))
+        if float(np.nanmax(results.dataset["odd_even_ratio"].values, initial=0.0)) > ALIKE:
+            found.append(_halves(seen, sensors))
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
 
 
@@ -119,10 +124,10 @@ def _ratio(seen: View) -> tuple[Any, str]:
 
 def _map(seen: View, sensor: str) -> Figure:
     ways = _ways(seen)
-    lines = ways[0] is not None and "mass_ratio" in seen.results.dataset.coords
+    lines = ways[0] is not None and _held_mass(seen, ways[1]) is not None
     caption = seen.caption(
         "Number of peaks in the last cycle.",
-        "Lines: where a harmonic of the cycle meets the natural frequency of the loaded body, n Ω = ω_eff; near them "
+        "Lines: where a harmonic of the cycle meets the natural frequency of the loaded body, n Ω = ωₑ; near them "
         "the pattern of two peaks breaks."
         if lines
         else "",
@@ -151,18 +156,14 @@ def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) 
 
 
 def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
-    """Lines n Ω = ω_eff over the mass ratio; upright where the mass is not on the vertical axis."""
-    results = seen.results
+    """Lines n Ω = ωₑ over the mass ratio; upright where the mass is not on the vertical axis."""
+    results, held = seen.results, _held_mass(seen, mass)
     left, right = axes.get_xlim()
     low, high = axes.get_ylim()
-    if mass is not None:
-        own = np.linspace(max(low, 0.0), high, 100)
-        along = own
-    elif "mass_ratio" in results.dataset.coords:
-        held = np.asarray(seen.cut(results.dataset["mass_ratio"]).values, dtype=np.float64)
-        own, along = np.full(2, float(np.median(held))), np.array([low, high])
-    else:
+    if held is None:
         return
+    along = np.linspace(max(low, 0.0), high, 100) if mass is not None else np.array([low, high])
+    own = along if mass is not None else np.full(2, held)
     for order in ORDERS:
         ratio = theory.breakdown(results, own, order)
         if ratio.max() < left or ratio.min() > right:
@@ -174,8 +175,17 @@ def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
     axes.set(xlim=(left, right), ylim=(low, high))
 
 
+def _held_mass(seen: View, mass: Any) -> float | None:
+    """The one mass ratio of a view (any number where it stands on an axis); None where there is none."""
+    if mass is not None:
+        return 0.0
+    found = seen.results.dataset.coords.get("mass_ratio")
+    held = np.unique(seen.cut(found).values) if found is not None else np.zeros(0)
+    return float(held[0]) if held.size == 1 else None
+
+
 def _count(seen: View, sensor: str) -> Figure:
-    caption = seen.caption("Number of peaks in the last cycle; lines: n Ω = ω_eff.")
+    caption = seen.caption("Number of peaks in the last cycle; lines: n Ω = ωₑ.")
     return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 2.4, partial(_draw_count, seen, sensor))
 
 

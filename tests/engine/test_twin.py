@@ -144,12 +144,11 @@ SCENES: dict[str, Callable[[], Study]] = {
         beam(supports=SPRINGS),
         {"car": mass(0.3, cruise(0.0, 1.0, 0.5)), "next": mass(0.4, swing(0.4, 0.3, 1.3, 1), delay=0.4)},
         steps=150,
+        initial="rest",
     ),
     "two bodies": two_bodies,
     "own weight from rest": lambda: case(beam(own_weight=True), HALF),
-    "own weight from equilibrium": lambda: case(
-        beam(own_weight=True, damping_ratio=0.02), HALF, initial="equilibrium"
-    ),
+    "own weight from equilibrium": lambda: case(beam(own_weight=True, damping_ratio=0.02), HALF, initial="equilibrium"),
     "own weight, springs, arriving": lambda: case(
         beam(own_weight=True, supports=SPRINGS), mass(0.5, cruise(-0.2, 1.1, 0.8))
     ),

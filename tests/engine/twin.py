@@ -158,9 +158,7 @@ def phases_of(motion: Any, begin: float, length: float) -> tuple[Phase, ...]:
     if motion.kind == "waypoints":
         return spline_on(motion.times, motion.positions, begin, length)
     if motion.kind == "sinusoidal":
-        found = motions.sinusoidal(
-            motion.centre, motion.amplitude, 2.0 * math.pi * motion.frequency, motion.cycles
-        )
+        found = motions.sinusoidal(motion.centre, motion.amplitude, 2.0 * math.pi * motion.frequency, motion.cycles)
     elif motion.turn == 0.0:
         found = motions.instant_out_and_back(motion.start, motion.end, motion.speed, motion.cycles)
     else:
@@ -220,17 +218,16 @@ def march_twin(study: Study, body: str, t: Array) -> Twin:
     riders = tuple(name for name, carriage in study.carriage.items() if carriage.on == body)
     loads = tuple(load_of(study, name, bed.length, float(t[-1])) for name in riders)
     dampers = tuple(Damper(bed.phi(at, 0), c) for at, c in bed.dampers)
-    zeta = damping_of(getattr(study.body[body], "damping_ratio"), bed.omega)
+    table: Any = study.body[body]
+    zeta = damping_of(table.damping_ratio, bed.omega)
     scene = Scene(bed.phi, bed.omega, zeta, loads, dampers)
-    own = bool(getattr(study.body[body], "own_weight"))
+    own = bool(table.own_weight)
     start = scenes.equilibrium(scene, 0.0) if study.start == "equilibrium" else scenes.rest(scene)
     if own and study.start == "rest":
         start = State(-study.gravity * bed.own_modal / bed.omega**2, start.v)
     scheme = naive.Newmark(*study.solver.newmark)
-    if own:
-        history = march_on_sag(scene, bed, study.gravity, t, start, scheme)
-    else:
-        history = naive.march(scene, t, start, scheme)
+    on_sag = march_on_sag(scene, bed, study.gravity, t, start, scheme) if own else None
+    history = naive.march(scene, t, start, scheme) if on_sag is None else on_sag
     return Twin(bed, scene, riders, study.gravity, history)
 
 

@@ -7,6 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from engine.plan import Plan
+from engine.run import march_seconds
 from studies import bench
 from studies.bench import Scene, Throughput
 from studies.cli import main
@@ -34,15 +36,14 @@ def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
 
 def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     marched = []
-    from engine.run import execute
 
-    def spy(plan: object, *rest: object, **options: object) -> None:
-        marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size))  # type: ignore[attr-defined]
-        execute(plan, *rest, **options)  # type: ignore[arg-type]
+    def spy(plan: Plan, threads: int | None) -> float:
+        marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size, threads))
+        return march_seconds(plan, threads)
 
-    monkeypatch.setattr("studies.bench.execute", spy)
+    monkeypatch.setattr("studies.bench.march_seconds", spy)
     found = bench.measure(Scene(modes=4, steps=100, variants=64), threads=1, best_of=3)
-    assert marched == [(64, {100}, 4)] * 3
+    assert marched == [(64, {100}, 4, 1)] * 3
     assert found.seconds > 0
     assert found.variants_per_second == pytest.approx(64 / found.seconds)
     assert found.case_mode_steps_per_second == pytest.approx(64 * 4 * 100 / found.seconds)
