@@ -123,7 +123,8 @@ def _coordinates(plan: Plan) -> dict[str, Any]:
         attributes = {"units": axis.units or "1", "long_name": f"{axis.name} ({', '.join(axis.paths)})"}
         found[axis.name] = (axis.dim, axis.values, attributes)
     if "variant" in plan.cases.dims:
-        found["variant"] = ("variant", np.arange(plan.size, dtype=np.int64), axes()["variant"].attributes())
+        count = plan.cases.shape[plan.cases.dims.index("variant")]
+        found["variant"] = ("variant", np.arange(count, dtype=np.int64), axes()["variant"].attributes())
     return found
 
 

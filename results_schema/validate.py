@@ -90,7 +90,10 @@ def _value_findings(dataset: xr.Dataset, name: str, variable: Variable) -> Itera
     failed = _failed(dataset, array)
     if failed is None:
         return
-    unexplained = np.isnan(values) & ~failed
+    missing = np.isnan(values)
+    if variable.gaps_allowed:
+        missing &= missing.all(axis=-1, keepdims=True)
+    unexplained = missing & ~failed
     if unexplained.any():
         yield f"{name}: expected numbers where the status keeps them, received NaN at {_places(unexplained)}"
     unwanted = ~np.isnan(values) & failed

@@ -33,7 +33,7 @@ _RESERVED_WORDS = """
     dynamic_amplification lag loop_area odd_rms even_excess peaks_per_cycle peak_value peak_phase odd_even_ratio
     harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
-    tool_centre_point_error robot component sensor_unit diverged_step
+    tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
 """
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
@@ -48,6 +48,7 @@ class Variable:
     lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
         (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
+    gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Variable:
     flags: type[IntEnum] | None = None
     required: bool = True
     nan_allowed: bool = False
+    gaps_allowed: bool = False
     lead: Literal["grid", "history", "none"] = "grid"
 
     def attributes(self) -> dict[str, Any]:
@@ -182,7 +184,6 @@ declare(
     _axis("sensor", "sensor", dtype="str"),
     Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
     _axis("peak", "number of the peak in the cycle", dtype="int64"),
-    _axis("harmonic", "number of the harmonic of the cycle", dtype="int64"),
     _axis("mode", "number of the mode, from 1", dtype="int64"),
     _axis("sample", "number of the variant that was run again", dtype="int64"),
     _axis("scheme", "time integration scheme", dtype="str"),
@@ -293,10 +294,10 @@ HISTORIES: tuple[Variable, ...] = (
         ("position|phase|station",),
         units="{sensor}",
         long_name="history of {sensor}",
-        meaning="at the instants of `elapsed`",
+        meaning="at the instants of `elapsed`; NaN where a sensor under a carriage is off the body",
         required=False,
         lead="history",
-        nan_allowed=True,
+        gaps_allowed=True,
     ),
     Variable(
         "{carriage}_position",
@@ -306,7 +307,7 @@ HISTORIES: tuple[Variable, ...] = (
         meaning="NaN where it is off the body",
         required=False,
         lead="history",
-        nan_allowed=True,
+        gaps_allowed=True,
     ),
 )
 MARCH: tuple[Variable, ...] = (*EXTREMES, *ROOT_MEAN_SQUARES, *CONTACT_FORCES, *HISTORIES)

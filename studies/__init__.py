@@ -7,6 +7,6 @@
 
 from __future__ import annotations
 
-from studies.study import Kind, kind_names, kind_named, run
+from studies.study import Kind, kind_named, kind_names, run
 
 __all__ = ["Kind", "kind_named", "kind_names", "run"]

@@ -94,6 +94,13 @@ def draw(name: str, title: str, caption: str, height: float, fill: Callable[[Dra
     return Figure(plain_name(name), title, caption, drawing)
 
 
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once and keep that: every further layout would differ in the last digit."""
+    if figure.drawing.get_layout_engine() is not None:
+        figure.drawing.draw_without_rendering()
+        figure.drawing.set_layout_engine("none")
+
+
 def plain_name(text: str) -> str:
     """A file name of small letters, digits and dashes, whatever the text holds.
 
@@ -107,6 +114,7 @@ def svg(figure: Figure) -> str:
     """The figure as an SVG element that may stand in a page beside others; the same figure gives the same text."""
     stream = io.StringIO()
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": figure.name}):
+        _settle(figure)
         figure.drawing.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
     # matplotlib repeats every text as a comment.
@@ -120,6 +128,7 @@ def png(figure: Figure) -> bytes:
     """The figure as PNG, 200 dots per inch."""
     stream = io.BytesIO()
     with matplotlib.rc_context(dict(STYLE)):
+        _settle(figure)
         figure.drawing.savefig(stream, format="png", dpi=200, metadata={"Software": None})
     return stream.getvalue()
 

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from markupsafe import Markup, escape
 
 from results_schema import files
@@ -122,7 +123,11 @@ def _template() -> Template:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters |= {"soft": _soft, "minus": _minus}
     return environment.get_template(PAGE)
@@ -194,10 +199,11 @@ def _scene(results: Results) -> dict[str, list[Row]]:
             continue
         if name in ("body", "carriage", "sensor"):
             for own, table in value.items():
-                found[f"{name} {own}"] = list(_rows(results, f"{name}.{own}", table, swept))
+                found[f"{name} {own}"] = _rows(results, f"{name}.{own}", table, swept)
+        elif isinstance(value, dict):
+            found[name] = _rows(results, name, value, swept)
         else:
-            rows = _rows(results, name, value, swept) if isinstance(value, dict) else [_row(results, name, value, swept)]
-            found.setdefault(name if isinstance(value, dict) else "whole scene", []).extend(rows)
+            found.setdefault("whole scene", []).append(_row(results, name, value, swept))
     return found
 
 
@@ -249,7 +255,7 @@ def _sweep_row(results: Results, place: int) -> Row:
 
 def _results(results: Results) -> list[tuple[str, ...]]:
     """Name, sensor, smallest and largest with their places, of every result that is a number per variant."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for found in ranges(results.dataset):
         ends = [quantity(end.value, found.units, 4) for end in (found.smallest, found.largest)]
         rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where))
@@ -269,7 +275,7 @@ def _declaration(results: Results, variable: Variable) -> tuple[str, ...]:
     dims = ", ".join(("variant", *own[len(results.dims) :]) if swept else own)
     units = "" if variable.flags is not None else unit_text(str(results.dataset[variable.name].attrs.get("units", "1")))
     words = variable.long_name + (f": {variable.meaning}" if variable.meaning else "")
-    return (variable.name, dims, units or "–", words)
+    return (variable.name, dims, units, words)
 
 
 def _provenance(source: Archive) -> list[Row]:
@@ -295,6 +301,6 @@ def _provenance(source: Archive) -> list[Row]:
 def _attribute(key: str, value: Any) -> str:
     if isinstance(value, str):
         return value
-    parts = list(value) if isinstance(value, list | tuple) or getattr(value, "ndim", 0) else [value]
+    parts = [value] if np.ndim(value) == 0 else list(value)
     text = ", ".join(part if isinstance(part, str) else number(float(part), 6) for part in parts)
     return f"{text} s" if key == "run_seconds" else text

@@ -28,7 +28,7 @@ Index = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along the dimension."""
+    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along it."""
 
     name: str
     dim: str
@@ -66,6 +66,16 @@ class Trace(NamedTuple):
     along: Array
     values: Array
     elapsed: Array | None
+
+    @property
+    def times(self) -> Array:
+        """Seconds where they are known, else the stations."""
+        return self.along if self.elapsed is None else self.elapsed
+
+    @property
+    def end(self) -> float:
+        """The last of the times."""
+        return float(np.nanmax(self.times))
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,6 +116,8 @@ def _march(
 ) -> None:
     from engine.run import execute
 
+    if progress is not None:
+        progress(int(done.size), plan.size)
     if done.size == plan.size:
         return
     try:

@@ -1,4 +1,4 @@
-"""Closed forms that figures and findings compare with, for every variant of a sweep (mechanics.md, sections 7 and 9)."""
+"""Closed forms that figures and findings compare with, for every variant of a sweep (mechanics.md, 7 and 9)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.results import Results
+from studies.words import MINUS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,8 +71,8 @@ def lag_factor(results: Results, sensor: str) -> int:
 
 
 def lag_formula(results: Results, sensor: str) -> str:
-    """The formula in print."""
-    return f"{'2 ' if lag_factor(results, sensor) == 2 else ''}ζ v/ω₁"
+    """The formula in print, with its sign."""
+    return f"{MINUS}{'2 ' if lag_factor(results, sensor) == 2 else ''}ζ v/ω₁"
 
 
 def frequency_ratio(results: Results) -> Any:
@@ -109,13 +110,16 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     beam from one end to the other and the sensor is at midspan."""
     from engine.motions import Sinusoidal
 
-    body, motion, mass = results.study.body[results.carriage.on], results.carriage.motion, _coordinate(results, "mass_ratio")
+    body, motion = results.study.body[results.carriage.on], results.carriage.motion
+    mass = _coordinate(results, "mass_ratio")
     swept = {path for axis in results.axes for path in axis.paths}
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
     if mass is None or swept & fixed or not isinstance(motion, Sinusoidal) or body.supports != "pinned-pinned":
         return None
     at = results.study.sensor[sensor].at
-    if at is None or max(abs(place / body.length - 0.5) for place in (at, motion.centre)) > NEARLY or motion.amplitude < LONG_SWING * body.length:
+    if at is None or motion.amplitude < LONG_SWING * body.length:
+        return None
+    if max(abs(place / body.length - 0.5) for place in (at, motion.centre)) > NEARLY:
         return None
     return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
 

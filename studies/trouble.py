@@ -23,9 +23,10 @@ def exit_code_of(command: Callable[[], int]) -> int:
     """Run a command; its own exit code, or that of the error that it raised."""
     try:
         code = command()
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader (`| head`) has seen enough.
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (BrokenPipeError, SystemExit):
+        # The reader (`| head`) has seen enough. click turns that into SystemExit, which nothing else raises.
         drop_stdout()
         return 0
     except click.exceptions.Exit as error:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+MINUS = "\N{MINUS SIGN}"
 _PREFIXED = ("m", "N", "N m", "Pa")
 _METRES = (-9, -6, -3, 0)
 

@@ -15,15 +15,15 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def tested_versions() -> dict[str, str]:
+def versions_tried() -> dict[str, str]:
     """Versions of the constraints file by normalised name."""
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
     return {canonicalize_name(name): version for name, version in pairs}
 
 
-def test_tested_versions_lie_in_the_ranges() -> None:
-    tested = tested_versions()
+def test_versions_tried_lie_in_the_ranges() -> None:
+    tested = versions_tried()
     wanted = [Requirement(text) for text in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"])]
     assert len(wanted) >= 16
     for requirement in wanted:

@@ -108,7 +108,7 @@ class Asymmetry:
                 "forward and backward need a motion that comes back",
                 where=study.source.where(f"carriage.{name}.motion.kind"),
                 expected='"out-and-back"',
-                received=f'"{carriage.motion.kind}"',
+                received=f'"{study.value(f"carriage.{name}.motion.kind")}"',
             )
         _check_cruise(study, name)
         if not study.sensor:
@@ -193,15 +193,15 @@ def _lag(results: Results, sensor: str) -> str:
     limit = results.holds_up_to(axis, apart <= CLOSE, known)
     if limit is None:
         slowest = apart[known & (results.everywhere(results.dataset[axis.name]) == axis.values.min())]
-        away = f"; even at the lowest speed it is up to {percent(float(slowest.max()))} away from −{formula}" if slowest.size else ""
-        return f"{sensor}: {_largest_lag(results, lag, expected)}{away}."
+        off = f"up to {percent(float(slowest.max()))} away from {formula}" if slowest.size else "not known"
+        return f"{sensor}: {_largest_lag(results, lag, expected)}; at the lowest speed it is {off}."
     slow = results.everywhere(results.dataset[axis.name]) <= limit
     calm = _largest_lag(results, np.where(slow, lag, np.nan), expected)
     if limit == axis.values.max():
-        return f"{sensor}: {calm}, within {percent(CLOSE)} of −{formula} in every variant."
+        return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in every variant."
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
     return (
-        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of −{formula}, as "
+        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of {formula}, as "
         f"damping alone would have it: {calm}. Beyond, vibration left over from the turns takes over, and the lag "
         f"ranges from {span}."
     )

@@ -15,7 +15,7 @@ from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.results import VARIANT, Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
-from studies.words import counted, listed, number, percent
+from studies.words import MINUS, counted, listed, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,7 +130,7 @@ class DoublePeak:
                 "peaks per cycle need a motion that repeats",
                 where=study.source.where(f"carriage.{name}.motion.kind"),
                 expected='"sinusoidal" or "out-and-back"',
-                received=f'"{carriage.motion.kind}"',
+                received=f'"{study.value(f"carriage.{name}.motion.kind")}"',
             )
         check_sensors(study)
 
@@ -197,8 +197,9 @@ def _answer(results: Results, sensor: str) -> str:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
     place = tuple(int(i) for i in np.argwhere(other & (ratio == first))[0])
     return (
-        f"{sensor}: two peaks per cycle below Ω/ω₁ = {number(first)}, whatever else is varied; there the pattern first "
-        f"breaks, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: {share} of the variants."
+        f"{sensor}: two peaks per cycle below Ω/ω₁ = {number(first)}, whatever else is varied; there the pattern "
+        f"breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: {share} of the "
+        "variants."
     )
 
 
@@ -276,8 +277,9 @@ def _end_springs(results: Results, sensor: str) -> list[str]:
     if not (one.size and two.size and two.max() < one.min()):
         return []
     return [
-        f"{sensor}: at the lowest frequency there are two peaks up to (E I/L³)|1/kₐ − 1/k_b| = {number(two.max())} of the "
-        f"end springs and one from {number(one.min())} on; the rule says {number(theory.ONE_PEAK)}."
+        f"{sensor}: at the lowest frequency there are two peaks up to (E I/L³)|1/k_a {MINUS} 1/k_b| = "
+        f"{number(float(two.max()))} of the end springs and one from {number(float(one.min()))} on; the rule says "
+        f"{number(theory.ONE_PEAK)}."
     ]
 
 
@@ -311,7 +313,8 @@ def _halves(results: Results, sensor: str) -> list[str]:
         return []
     largest = float(np.asarray(ratio.values)[place])
     if largest < SYMMETRIC:
-        return [f"{sensor}: the two halves of a cycle are alike; odd harmonics are at most {percent(largest)} of the even."]
+        alike = f"odd harmonics are at most {percent(largest)} of the even"
+        return [f"{sensor}: the two halves of a cycle are alike; {alike}."]
     return [
         f"{sensor}: the two halves of a cycle differ; odd harmonics reach {number(largest)} times the even"
         f"{in_words(results, place)}."

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5
+BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
@@ -112,15 +113,15 @@ def _onset(results: Results, carriage: str, opened: NDArray[np.bool_], known: ND
     shown = f"{carriage}: the contact opens in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
     speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
     if speed is None:
-        return f"{shown}. The equations assume contact, so that those results end there."
+        return f"{shown}. {BEYOND}"
     if group is None:
-        return f"{shown}, {_first_speed(results, speed, opened)}. The equations assume contact: beyond, they say no more."
+        return f"{shown}, {_first_speed(results, speed, opened)}. {BEYOND}"
     along = results.everywhere(results.dataset[group.name])
     parts = []
     for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
         label = group.at(int(np.flatnonzero(group.values == value)[0]))
         parts.append(f"{label}: {_first_speed(results, speed, opened & (along == value))}")
-    return f"{shown} ({listed(parts)}). The equations assume contact: beyond, they say no more."
+    return f"{shown} ({listed(parts)}). {BEYOND}"
 
 
 def _first_speed(results: Results, speed: Axis, opened: NDArray[np.bool_]) -> str:

@@ -87,8 +87,8 @@ def _kept(results: Results) -> str:
     traced = results.traced()
     trace = results.trace(next(iter(results.sensors)), traced[0])
     points = int(np.isfinite(trace.values).sum())
-    ends = [float(np.nanmax(results.trace(next(iter(results.sensors)), index).elapsed)) for index in traced]
-    spans = quantity(max(ends), "s") if min(ends) == max(ends) else f"{quantity(min(ends), 's')} to {quantity(max(ends), 's')}"
+    ends = [results.trace(next(iter(results.sensors)), index).end for index in traced]
+    spans = " to ".join(dict.fromkeys(quantity(end, "s") for end in (min(ends), max(ends))))
     return (
         f"Histories of {counted(len(traced), 'variant')} out of {results.size:,}, each over {spans} "
         f"on {counted(points, 'station')}."
@@ -102,4 +102,5 @@ def _span(results: Results, sensor: str) -> str:
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
     over = " over all variants" if results.size > 1 else ""
-    return f"{sensor}: from {quantity(float(np.nanmin(low)), units)} to {quantity(float(np.nanmax(high)), units)}{over}."
+    span = f"{quantity(float(np.nanmin(low)), units)} to {quantity(float(np.nanmax(high)), units)}"
+    return f"{sensor}: from {span}{over}."

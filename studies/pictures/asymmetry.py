@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
+from engine.motions import OutAndBack
 from studies import theory
 from studies.figures import (
     BESIDE,
@@ -59,8 +61,8 @@ def _response(results: Results, sensor: str) -> list[Figure]:
     modest = min(ranked, key=lambda index: abs(float(odd[index]) - VISIBLE))
     shown = list(dict.fromkeys([modest, ranked[-1]]))
     which = (
-        f"Of the kept histories, the one whose odd part is closest to {percent(VISIBLE)} of the static range (left) and "
-        "the one with the largest (right)."
+        f"Of the kept histories, the one whose odd part is closest to {percent(VISIBLE)} of the static range (left) "
+        "and the one with the largest (right)."
         if len(shown) == 2
         else ""
     )
@@ -75,17 +77,18 @@ def _response(results: Results, sensor: str) -> list[Figure]:
 def _draw_response(results: Results, sensor: str, shown: list[Index], drawing: Drawing) -> None:
     grid = drawing.subplots(2, len(shown), squeeze=False, sharex="col", height_ratios=(3, 2))
     for column, index in enumerate(shown):
-        _draw_ways(results, sensor, index, grid[:, column])
+        _draw_ways(results, sensor, index, list(grid[:, column]))
         grid[0, column].set_title(results.at(index).replace(", ", "\n", 1) or " ")
     grid[0, 0].legend(loc="best")
 
 
-def _draw_ways(results: Results, sensor: str, index: Index, axes: tuple[Axes, Axes]) -> None:
+def _draw_ways(results: Results, sensor: str, index: Index, axes: Sequence[Axes]) -> None:
     """The two ways above, the odd part below; displacements downwards, as the body hangs."""
     units = results.sensors[sensor]
     out, back = there_and_back(over_position(results, sensor, index))
     odd = odd_part(out, back)
     motion = results.carriage_at(index).motion
+    assert isinstance(motion, OutAndBack)
     scale = scale_for(float(np.abs(out.values).max()), units)
     small = scale_for(float(np.abs(odd.values).max()), units)
     axes[0].plot(out.position, out.values * scale.factor, color=BLUE, label="forward")
@@ -149,7 +152,7 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
             axes.set_ylim(-1.08 * limit * scale.factor, 1.08 * limit * scale.factor)
         axes.set_ylabel(f"lag of {sensor} ({scale.unit})")
         if colours:
-            _name_theory(axes, f"−{theory.lag_formula(seen.results, sensor)}", seen)
+            _name_theory(axes, theory.lag_formula(seen.results, sensor), seen)
     assert seen.x is not None
     rows[-1].set_xlabel(seen.x.title)
 
@@ -158,7 +161,7 @@ def _name_theory(axes: Axes, formula: str, seen: View) -> None:
     """The dashed lines in the legend too."""
     handles, labels = axes.get_legend_handles_labels()
     dashes = Line2D([], [], color=MUTED, linestyle=(0, (4, 2)), linewidth=0.9)
-    place = BESIDE | {"title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
+    place = {**BESIDE, "title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
     axes.legend([*handles, dashes], [*labels, formula], **place)
 
 

@@ -11,6 +11,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
+from engine.motions import Sinusoidal
 from studies import theory
 from studies.figures import (
     BLUE,
@@ -77,7 +78,7 @@ def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
         "The last cycle of kept histories, from slow to fast; dots: the peaks that count (prominence above 2 % of the "
         "cycle's range)."
     )
-    if results.carriage.motion.kind == "sinusoidal":
+    if isinstance(results.carriage.motion, Sinusoidal):
         caption += " The carriage is at the centre at phase 0 and 0.5, at its ends at the grey lines."
     height = 0.7 + 1.9 * len(sensors)
     return draw("cycle", "Response over a cycle", caption, height, partial(_draw_cycle, results, sensors, shown))
@@ -106,7 +107,7 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
     place = dict(zip(results.dims, index, strict=True))
     phase, peak = (results.of_sensor(name, sensor).isel(place).values for name in ("peak_phase", "peak_value"))
     axes.plot(phase, peak * scale.factor, "o", color=VERMILION, zorder=3)
-    if results.carriage.motion.kind == "sinusoidal":
+    if isinstance(results.carriage.motion, Sinusoidal):
         for end in (0.25, 0.75):
             axes.axvline(end, color=MUTED, linewidth=0.7, zorder=1)
     axes.set_xlim(0.0, 1.0)
@@ -171,7 +172,8 @@ def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
         axes.plot(ratio, along, color="white", linewidth=2.6, alpha=0.8)
         axes.plot(ratio, along, color=INK, linewidth=1.1)
         if left < ratio[-1] < right:
-            axes.annotate(f"{order} Ω", (ratio[-1], along[-1]), (0, 2), textcoords="offset points", ha="center", va="bottom")
+            above: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
+            axes.annotate(f"{order} Ω", (ratio[-1], along[-1]), (0, 2), **above)
     axes.set(xlim=(left, right), ylim=(low, high))
 
 

@@ -52,7 +52,8 @@ def _amplified(results: Results, sensor: str) -> bool:
 
 def _has_contact(results: Results, carriage: str) -> bool:
     name = f"{carriage}_contact_force_min"
-    return name in results.dataset and results.study.carriage[carriage].inertial and extreme(results.dataset[name]) is not None
+    inertial = results.study.carriage[carriage].inertial
+    return inertial and name in results.dataset and extreme(results.dataset[name]) is not None
 
 
 def _ratio(seen: View) -> tuple[Any, str]:

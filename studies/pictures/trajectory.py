@@ -6,13 +6,10 @@ from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.figures import Figure, draw, legend_of_all, shades
-from studies.results import Index, Results, Trace, chosen
+from studies.results import Index, Results, chosen
 from studies.words import scale_for
-
-Array = NDArray[np.float64]
 
 MOST_ROWS = 4
 MOST_CURVES = 5
@@ -49,14 +46,14 @@ def _histories(
 
 def _draw(results: Results, units: dict[str, str], shown: list[Index], drawing: Drawing) -> None:
     rows = drawing.subplots(len(units), 1, squeeze=False, sharex=True)[:, 0]
-    ends = [_end(results.trace(next(iter(units)), index)) for index in shown]
+    ends = [results.trace(next(iter(units)), index).end for index in shown]
     relative = max(ends) > MOST_ALIKE * min(ends)
     for axes, (name, unit) in zip(rows, units.items(), strict=True):
         traces = [results.trace(name, index) for index in shown]
         sizes = [float(np.abs(trace.values[np.isfinite(trace.values)]).max(initial=0.0)) for trace in traces]
         scale = scale_for(max(sizes), unit)
         for index, trace, colour in zip(shown, traces, shades(len(shown)), strict=True):
-            times = _times(trace) / (_end(trace) if relative else 1.0)
+            times = trace.times / (trace.end if relative else 1.0)
             label = results.at(index).replace(", ", "\n")
             axes.plot(times, trace.values * scale.factor, color=colour, label=label, linewidth=1.3)
         words = name.replace("_", " ")
@@ -65,11 +62,3 @@ def _draw(results: Results, units: dict[str, str], shown: list[Index], drawing: 
     drawing.align_ylabels()
     if len(shown) > 1:
         legend_of_all(drawing, rows[0])
-
-
-def _times(trace: Trace) -> Array:
-    return trace.along if trace.elapsed is None else trace.elapsed
-
-
-def _end(trace: Trace) -> float:
-    return float(np.nanmax(_times(trace)))

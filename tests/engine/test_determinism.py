@@ -1,0 +1,319 @@
+"""Bits that do not depend on chunks, threads, order or neighbours; statuses; stopping, resuming, and where the sink
+is called."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import engine.march
+from engine.dataset import Collector, build
+from engine.lanes import LaneTable, LaneValues, to_blocks
+from engine.model import SceneModel
+from engine.plan import Plan, make_plan
+from engine.run import execute, run
+from engine.scene import Study
+from results_schema.errors import BadInput, Interrupted
+from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
+from tests.reference import closed_forms, values
+
+Array = NDArray[np.float64]
+
+
+def mixed() -> Study:
+    """150 variants: several step counts, two scenes, statuses ok and separated, histories of all."""
+    springs = [{"at": 0.0, "stiffness": 300.0}, {"at": 1.0, "stiffness": 300.0, "damping": 0.5}]
+    carriages = {"car": mass(0.5, cruise(-0.1, 1.1, 1.0, after=0.3)), "next": force(2.0, cruise(0.0, 1.0, 1.0))}
+    sensors = {"midspan": fixed(0.5), "below": under("car", "acceleration"), "moment": fixed(0.3, "bending_moment")}
+    sweep = {
+        "speed": {"of": ["carriage.car.motion.speed", "carriage.next.motion.speed"], "values": [0.2, 0.5, 1.0, 2.5, 4]},
+        "weight": {"of": "carriage.car.mass", "from": 0.05, "to": 2.0, "count": 5},
+        "zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.01, 0.05]},
+        "stiffness": {"of": "body.bed.supports.0.stiffness", "values": [100.0, 300.0]},
+    }
+    bed = beam(supports=springs)
+    return study(bed, carriages, sensor=sensors, sweep=sweep, output={"histories": "auto"})
+
+
+def digest(plan: Plan, chunk: int | None, threads: int) -> str:
+    """SHA-256 over every number of the results and histories."""
+    collector = Collector(plan.size)
+    execute(plan, collector.add, threads=threads, chunk=chunk)
+    found = hashlib.sha256()
+    for name in sorted(collector.arrays):
+        found.update(name.encode() + collector.arrays[name].tobytes())
+    selected = collector.selected
+    assert selected is not None
+    assert selected.variants.size == 64
+    for name in sorted(selected.arrays):
+        found.update(name.encode() + np.ascontiguousarray(selected.arrays[name]).tobytes())
+    return found.hexdigest()
+
+
+def test_the_mixed_study_is_mixed() -> None:
+    plan = make_plan(mixed())
+    ds = run(mixed())
+    assert plan.size == 150
+    assert len({bucket.steps for bucket in plan.buckets}) >= 3
+    assert len({id(bucket.scene) for bucket in plan.buckets}) == 2
+    assert {0, 1} <= set(ds.status.values.ravel().tolist())
+    assert np.isfinite(ds.midspan_max.values).sum() == 150
+
+
+def test_same_bits_for_any_chunks_and_threads() -> None:
+    plan = make_plan(mixed())
+    digests = {(chunk, threads): digest(plan, chunk, threads) for chunk in (1, 7, 64, None) for threads in (1, 2)}
+    assert len(digests) == 8
+    assert len(set(digests.values())) == 1
+
+
+def test_same_bits_for_any_order_and_company() -> None:
+    """A variant alone, and the sweep in another order."""
+    whole = run(mixed())
+    data = mixed().data
+    turned = data["sweep"] | {"zeta": data["sweep"]["zeta"] | {"values": [0.05, 0.0]}}
+    other = run(Study(**(data | {"sweep": turned, "output": {"histories": "none"}})))
+    compared = 0
+    for name in ("midspan_max", "below_min", "moment_rms", "car_contact_force_min", "car_separation_position"):
+        if name not in whole:
+            continue
+        one, two = whole[name].sel(zeta=[0.05, 0.0]).values, other[name].transpose(*whole[name].dims).values
+        assert one.tobytes() == two.tobytes()
+        compared += one.size
+    assert compared >= 400
+
+
+Poison = Callable[[LaneTable, NDArray[np.bool_]], LaneTable]
+
+
+def nan_mass(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
+    return replace(lanes, mass=np.where(bad[:, None], np.nan, lanes.mass))
+
+
+def infinite_weight(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
+    return replace(lanes, weight=np.where(bad[:, None], np.inf, lanes.weight))
+
+
+def nan_damping(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
+    return replace(lanes, rates=np.where(bad[:, None], np.nan, lanes.rates))
+
+
+def negative_damping(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
+    return replace(lanes, rates=np.where(bad[:, None], -200.0, lanes.rates))
+
+
+def nan_weight(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
+    return replace(lanes, weight=np.where(bad[:, None], np.nan, lanes.weight))
+
+
+@pytest.mark.parametrize("poison", [nan_mass, infinite_weight, nan_damping, negative_damping, nan_weight])
+@pytest.mark.parametrize("carriages", ["one", "two"])
+def test_one_bad_lane_leaves_its_neighbours_alone(
+    poison: Poison, carriages: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    riding = {"car": mass(0.5, cruise(0.0, 1.0, 1.0)), "next": mass(0.2, cruise(0.0, 1.0, 1.0), headway=0.3)}
+    riding = riding if carriages == "two" else {"car": riding["car"]}
+    sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 37}}
+    given = study(beam(), riding, sweep=sweep, output={"histories": "all"}, solver={"steps": 300})
+    clean = run(given)
+    table = engine.march.lane_table
+
+    def poisoned(model: SceneModel, lane_values: LaneValues) -> LaneTable:
+        bad = np.isclose(lane_values.of("carriage.car.mass"), clean.weight.values[20])
+        return poison(table(model, lane_values), to_blocks(bad))
+
+    monkeypatch.setattr(engine.march, "lane_table", poisoned)
+    found = run(given, threads=2)
+    compared = 0
+    for name, variable in clean.data_vars.items():
+        if "weight" not in variable.dims:
+            continue
+        rest, bad = (found[name].drop_isel(weight=20), found[name].isel(weight=20))
+        assert rest.values.tobytes() == variable.drop_isel(weight=20).values.tobytes(), name
+        compared += rest.size
+        if variable.dtype == np.float64 and not str(name).endswith("_position"):
+            assert np.isnan(bad.values).all(), name
+    assert compared > 36 * 300
+    assert int(found.status[20]) == 5
+    assert 0 <= int(found.diverged_step[20]) <= 300
+    assert np.all(np.delete(found.diverged_step.values, 20) == -1)
+
+
+def test_a_diverging_variant_among_others() -> None:
+    """Parametric resonance without damping grows until nothing is left; light carriages beside it do not."""
+    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
+    sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
+    ds = run(study(beam(modes=3), mass(0.5, way), sweep=sweep))
+    assert ds.status.values.tolist() == [0, 5, 0]
+    assert ds.diverged_step.values[0] == ds.diverged_step.values[2] == -1
+    assert 400 < ds.diverged_step.values[1] < 200 * int(ds.steps_used[1])
+    assert np.isnan(ds.midspan_max.values[1])
+    assert np.isfinite(ds.midspan_max.values[[0, 2]]).all()
+
+
+def test_resonance_without_damping_is_no_alarm() -> None:
+    """A force at alpha = 1, whose every mode but the first is quiet, and 20 forces in step with mode 1."""
+    model = closed_forms.PinnedBeam(5)
+    given = study(
+        beam(modes=5),
+        force(values.WEIGHT, cruise(0.0, 1.0, math.pi)),
+        solver={"scheme": "fox-goodwin", "steps": 4000, "static_correction": False},
+        output={"histories": "all"},
+    )
+    ds = run(given)
+    expected = closed_forms.moving_force(model, values.WEIGHT, math.pi, 0.5, ds.elapsed.values)
+    np.testing.assert_allclose(ds.midspan.values, expected, rtol=0, atol=1e-6, equal_nan=False)
+    assert int(ds.status) == 0
+    speed = 0.3 * math.pi
+    way = cruise(0.0, 1.0, speed)
+    many = {f"axle{n}": force(1.0, way, headway=n * 2.0 * speed / math.pi) for n in range(20)}
+    train = run(study(beam(modes=1), many, sensor={"rate": fixed(0.5, "velocity")}, solver={"steps": 400}))
+    one = run(study(beam(modes=1), many["axle0"], sensor={"rate": fixed(0.5, "velocity")}, solver={"steps": 400}))
+    assert int(train.status) == 0
+    assert float(train.rate_max) > 10.0 * float(one.rate_max)
+
+
+SEPARATION = {0.1: 1.275, 0.25: 0.47, 0.5: 0.325, 1.0: 0.245, 2.0: 0.175}
+
+
+@pytest.mark.parametrize("mu", SEPARATION)
+def test_separation(mu: float) -> None:
+    """The contact opens first at the speed of mechanics 7.6, near the exit; values stay."""
+    speeds = [math.pi * SEPARATION[mu] * factor for factor in (0.9, 0.97, 1.02, 1.05)]
+    sweep = {"speed": {"of": "carriage.car.motion.speed", "values": speeds}}
+    plan = make_plan(study(beam(modes=20), mass(mu, cruise(0.0, 1.0, 1.0)), gravity=values.WEIGHT / mu, sweep=sweep))
+    collector = Collector(plan.size)
+    execute(plan, collector.add)
+    arrays = collector.arrays
+    assert arrays["status"].tolist() == [0, 0, 1, 1]
+    places = arrays["car_separation_position"]
+    assert np.isnan(places[:2]).all()
+    assert np.all((places[2:] > 0.85) & (places[2:] <= 0.98))
+    assert np.all(arrays["car_contact_force_min"][2:] < 0.0)
+    assert np.all(arrays["car_contact_force_min"][:2] > 0.0)
+    assert np.isfinite(arrays["midspan_max"]).all()
+
+
+class Recorder:
+    """A sink that remembers."""
+
+    def __init__(self) -> None:
+        self.variants: list[int] = []
+        self.threads: set[int] = set()
+
+    def __call__(self, variants: NDArray[np.int64], arrays: Any, selected: Any) -> None:
+        self.variants += variants.tolist()
+        self.threads.add(threading.get_ident())
+
+
+def test_sink_and_progress_are_called_on_the_calling_thread() -> None:
+    plan, sink, progress = make_plan(mixed()), Recorder(), []
+
+    def count(finished: int, total: int) -> None:
+        assert threading.get_ident() in sink.threads
+        progress.append((finished, total))
+
+    execute(plan, sink, chunk=10, threads=2, progress=count)
+    assert sink.threads == {threading.get_ident()}
+    assert sorted(sink.variants) == list(range(150))
+    assert progress[-1] == (150, 150)
+    assert [finished for finished, _ in progress] == sorted({finished for finished, _ in progress})
+
+
+def test_done_variants_are_left_out() -> None:
+    plan = make_plan(mixed())
+    whole = Collector(plan.size)
+    execute(plan, whole.add)
+    done = np.arange(0, 150, 3)
+    rest, resumed = Recorder(), Collector(plan.size)
+    execute(plan, lambda *found: (rest(*found), resumed.add(*found)), done=done, chunk=11)
+    assert sorted(rest.variants) == sorted(set(range(150)) - set(done.tolist()))
+    for name, array in whole.arrays.items():
+        left = np.setdiff1d(np.arange(150), done)
+        assert resumed.arrays[name][left].tobytes() == array[left].tobytes()
+    nothing = Recorder()
+    execute(plan, nothing, done=np.arange(150))
+    assert nothing.variants == []
+
+
+class Broken(Exception):
+    """What a test raises."""
+
+
+def test_what_the_sink_raises_reaches_the_caller() -> None:
+    calls = []
+
+    def sink(*found: Any) -> None:
+        calls.append(found)
+        if len(calls) == 3:
+            raise Broken
+
+    before = threading.active_count()
+    with pytest.raises(Broken):
+        execute(make_plan(mixed()), sink, chunk=5, threads=2)
+    assert len(calls) == 3
+    time.sleep(0.2)
+    assert threading.active_count() <= before + 2
+
+
+def test_what_a_chunk_raises_reaches_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = make_plan(mixed())
+
+    def broken(*anything: Any) -> None:
+        raise Broken
+
+    monkeypatch.setattr("engine.outcome.run_chunk", broken)
+    with pytest.raises(Broken):
+        execute(plan, Recorder(), chunk=5, threads=2)
+
+
+@pytest.mark.parametrize("steps", [400, 20_000_000])
+def test_stop_is_heard_within_two_seconds(steps: int) -> None:
+    """In a study of many chunks, and within one variant that would take minutes."""
+    sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 400_000 if steps == 400 else 2}}
+    plan = make_plan(study(beam(modes=10), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep, solver={"steps": steps}))
+    stop = threading.Event()
+    set_at: list[float] = []
+
+    def ask() -> None:
+        set_at.append(time.monotonic())
+        stop.set()
+
+    timer = threading.Timer(0.7, ask)
+    timer.start()
+    with pytest.raises(Interrupted):
+        execute(plan, Recorder(), stop=stop)
+    assert time.monotonic() - set_at[0] < 2.0
+
+
+def test_stop_before_the_start() -> None:
+    stop = threading.Event()
+    stop.set()
+    sink = Recorder()
+    with pytest.raises(Interrupted):
+        execute(make_plan(mixed()), sink, stop=stop)
+    assert sink.variants == []
+
+
+def test_no_threads_is_bad_input() -> None:
+    with pytest.raises(BadInput, match="threads"):
+        run(mixed(), threads=0)
+
+
+def test_dataset_of_a_subset_in_chunks_has_the_grid() -> None:
+    plan = make_plan(mixed())
+    collector = Collector(plan.size)
+    execute(plan, collector.add, chunk=13)
+    ds = build(plan, collector.arrays, collector.selected)
+    assert dict(ds.sizes)["speed"] == 5
+    assert ds.status.dims == ("speed", "weight", "zeta", "stiffness")
+    np.testing.assert_allclose(ds.mass_ratio.values, ds.weight.values)

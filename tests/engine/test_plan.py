@@ -1,0 +1,305 @@
+"""How many steps, which scenes and buckets: rules with numbers, refusals with their texts, sweeps of anything."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from engine.fidelity import MOST_STEPS, alias_steps, round_up
+from engine.plan import Plan, explain, make_plan
+from engine.run import run
+from engine.scene import Study
+from results_schema.errors import BadInput
+from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study
+
+OMEGA_1 = math.pi**2
+MODES = 6
+
+
+def steps_of(plan: Plan) -> NDArray[np.int64]:
+    """(V,) steps of every variant."""
+    found = np.zeros(plan.size, dtype=np.int64)
+    for bucket in plan.buckets:
+        found[bucket.variants] = bucket.steps
+    return found
+
+
+def swept(path: str, values: list[float], carriage: Any, bed: Any = None, **changes: Any) -> Study:
+    sweep = {"axis": {"of": path, "values": values}}
+    return study(bed or beam(modes=MODES), carriage, sweep=sweep, **changes)
+
+
+def least_alias_steps(speed: float, modes: int) -> float:
+    """n with k_N v h = 2 atan(2/(omega_N h)), h = 1/(n v), on the unit beam."""
+
+    def gap(log_steps: float) -> float:
+        h = 1.0 / (speed * math.exp(log_steps))
+        return modes * math.pi * speed * h - 2.0 * math.atan(2.0 / ((modes * math.pi) ** 2 * h))
+
+    return math.exp(brentq(gap, -5.0, 30.0, xtol=1e-12))
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.3, 1.0, 3.0, 20.0])
+@pytest.mark.parametrize("modes", [1, 6, 20])
+def test_alias_steps_are_the_root(speed: float, modes: int) -> None:
+    found = alias_steps(modes * math.pi, (modes * math.pi) ** 2, 1.0, np.array([1.0 / speed]))
+    assert found[0] == pytest.approx(least_alias_steps(speed, modes), rel=1e-9)
+
+
+SPEEDS = [0.02, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0]
+
+
+def test_auto_steps_of_a_force() -> None:
+    """200 per first period and 200 per passage, rounded up to the stair; nothing about aliases."""
+    plan = make_plan(swept("carriage.car.motion.speed", SPEEDS, force(1.0, cruise(0.0, 1.0, 1.0))))
+    wanted = np.array([max(200.0, 200.0 * OMEGA_1 / (2.0 * math.pi) / speed) for speed in SPEEDS])
+    steps = steps_of(plan)
+    assert steps.tolist() == round_up(wanted).tolist()
+    assert np.all(steps >= wanted)
+    assert np.all(steps <= 2.0 * wanted)
+    reasons = {int(v): bucket.reason for bucket in plan.buckets for v in bucket.variants}
+    assert reasons[0] == "200 per first period"
+    assert reasons[6] == "200 per passage or cycle"
+
+
+def test_auto_steps_of_a_mass() -> None:
+    """1.5 times the alias rule where that is most."""
+    modes = 30
+    plan = make_plan(swept("carriage.car.motion.speed", SPEEDS, mass(0.1, cruise(0.0, 1.0, 1.0)), beam(modes=modes)))
+    rules = {
+        "200 per first period": [200.0 * OMEGA_1 / (2.0 * math.pi) / speed for speed in SPEEDS],
+        "200 per passage or cycle": [200.0] * len(SPEEDS),
+        "the alias rule of the highest mode": [1.5 * least_alias_steps(speed, modes) for speed in SPEEDS],
+    }
+    wanted = np.max(list(rules.values()), axis=0)
+    assert steps_of(plan).tolist() == round_up(wanted).tolist()
+    reasons = {int(v): bucket.reason for bucket in plan.buckets for v in bucket.variants}
+    assert "the alias rule of the highest mode" in reasons.values()
+    for v, reason in reasons.items():
+        if len([u for u in reasons if steps_of(plan)[u] == steps_of(plan)[v]]) == 1:
+            assert rules[reason][v] == wanted[v]
+
+
+@pytest.mark.parametrize(
+    ("scheme", "limit"), [("linear-acceleration", 12**0.5), ("fox-goodwin", 6**0.5), ("central-difference", 2.0)]
+)
+def test_auto_steps_stay_inside_the_stability_limit(scheme: str, limit: float) -> None:
+    modes = 16
+    given = swept(
+        "carriage.car.motion.speed",
+        SPEEDS,
+        mass(0.1, cruise(0.0, 1.0, 1.0, after=1.0)),
+        beam(modes=modes),
+        solver={"scheme": scheme},
+    )
+    plan = make_plan(given)
+    highest = (modes * math.pi) ** 2
+    assert np.all(highest / (np.array(SPEEDS) * steps_of(plan)) <= limit / 1.05 * (1 + 1e-12))
+    ds = run(given)
+    assert set(ds.status.values.tolist()) <= {0, 1}
+    assert np.isfinite(ds.midspan_max.values).all()
+
+
+def test_stair_of_step_counts() -> None:
+    wanted = np.concatenate([np.linspace(1.0, 5000.0, 3001), np.geomspace(5e3, 9e7, 500)])
+    found = round_up(wanted)
+    assert np.all(found >= np.maximum(wanted, 200) - 1e-6)
+    assert np.all(found <= 2 * np.maximum(wanted, 200))
+    assert np.all(np.diff(found) >= 0)
+    assert np.all(found % 200 == 0)
+    assert len(set(found.tolist())) < 100
+    assert round_up(found.astype(float)).tolist() == found.tolist()
+
+
+def test_a_step_beyond_the_limit_is_refused() -> None:
+    """Fault 12: limit, what was found, and a suggestion that is then accepted."""
+
+    def given(steps: int) -> Study:
+        solver = {"scheme": "central-difference", "steps": steps}
+        return study(beam(modes=10), mass(0.1, cruise(0.0, 1.0, 1.0)), solver=solver)
+
+    with pytest.raises(BadInput) as caught:
+        make_plan(given(300))
+    error = caught.value
+    assert error.exit_code == 2
+    assert error.where == "solver.steps"
+    assert "omega h <= 2 " in error.expected
+    assert f"{(10 * math.pi) ** 2 / 300:.4g}" in error.received
+    enough = int(error.remedy.split()[2])
+    assert (10 * math.pi) ** 2 / enough < 2.0
+    assert 'steps = "auto"' in error.remedy
+    make_plan(given(enough))
+
+
+def test_the_worst_variant_decides_whether_a_fixed_step_is_refused() -> None:
+    given = swept(
+        "carriage.car.motion.speed",
+        [5.0, 0.05, 1.0],
+        mass(0.1, cruise(0.0, 1.0, 1.0)),
+        solver={"scheme": "fox-goodwin", "steps": 400},
+    )
+    with pytest.raises(BadInput, match="beyond the scheme's stability limit"):
+        make_plan(given)
+
+
+def test_too_many_steps_are_refused() -> None:
+    """Fault 13: asked for, or needed by a carriage that hardly moves."""
+    with pytest.raises(BadInput) as caught:
+        study(beam(), mass(0.1, cruise(0.0, 1.0, 1.0)), solver={"steps": MOST_STEPS + 1})
+    assert caught.value.where == "solver.steps"
+    with pytest.raises(BadInput) as caught:
+        make_plan(study(beam(), mass(0.1, cruise(0.0, 1.0, 1e-9))))
+    assert caught.value.where == "solver.steps"
+    assert "too many steps" in caught.value.what
+    assert str(MOST_STEPS) in caught.value.expected
+    with pytest.raises(BadInput):
+        make_plan(study(beam(), mass(0.1, cruise(0.0, 1.0, 1e-300))))
+
+
+def test_buckets_are_functions_of_a_variant() -> None:
+    """The plan of a subset is the subset of the plan."""
+    speeds = np.geomspace(0.05, 20.0, 40).tolist()
+    masses = [0.1, 0.5, 2.0]
+    carriage = mass(0.5, cruise(0.0, 1.0, 1.0))
+    sweep = {"speed": {"of": "carriage.car.motion.speed", "values": speeds}}
+    sweep["mass"] = {"of": "carriage.car.mass", "values": masses}
+    whole = steps_of(make_plan(study(beam(modes=MODES), carriage, sweep=sweep))).reshape(40, 3)
+    chosen = [3, 17, 22, 39]
+    sweep["speed"] = {"of": "carriage.car.motion.speed", "values": [speeds[i] for i in chosen]}
+    sweep["mass"] = {"of": "carriage.car.mass", "values": masses[1:2]}
+    part = steps_of(make_plan(study(beam(modes=MODES), carriage, sweep=sweep))).reshape(4, 1)
+    np.testing.assert_array_equal(part, whole[chosen, 1:2])
+    for i in chosen:
+        alone = study(beam(modes=MODES), mass(masses[2], cruise(0.0, 1.0, speeds[i])))
+        assert steps_of(make_plan(alone))[0] == whole[i, 2]
+    assert len(np.unique(whole)) > 5
+
+
+def test_every_variant_is_in_one_bucket() -> None:
+    sweep = {
+        "speed": {"of": "carriage.car.motion.speed", "from": 0.1, "to": 5.0, "count": 9},
+        "length": {"of": "body.bed.length", "values": [1.0, 1.5]},
+        "steps": {"of": "solver.steps", "values": [100, 300]},
+    }
+    plan = make_plan(study(beam(), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep))
+    assert sorted(v for bucket in plan.buckets for v in bucket.variants.tolist()) == list(range(36))
+    assert {bucket.steps for bucket in plan.buckets} == {100, 300}
+    assert [row["variants"] for row in explain(plan)] == [bucket.variants.size for bucket in plan.buckets]
+
+
+SPRINGS = [{"at": 0.0, "stiffness": 300.0}, {"at": 1.0, "stiffness": 300.0, "damping": 0.5}]
+ON_SPRINGS = beam(supports=SPRINGS, damping_ratio=0.01)
+PASSING = mass(0.5, cruise(0.0, 1.0, 1.0))
+RETURNING = mass(0.5, shuttle(0.3, 0.9, 1.0, 0.1, 2))
+STRUCTURAL: dict[str, tuple[str, list[float], Any, Any]] = {
+    "length": ("body.bed.length", [1.0, 1.2, 1.7], ON_SPRINGS, PASSING),
+    "modes": ("body.bed.modes", [1, 3, 7], ON_SPRINGS, PASSING),
+    "support": ("body.bed.supports.0.stiffness", [10.0, 300.0], ON_SPRINGS, PASSING),
+    "damper": ("body.bed.supports.1.damping", [0.1, 5.0], ON_SPRINGS, PASSING),
+    "modulus": ("body.bed.youngs_modulus", [0.5, 2.0], ON_SPRINGS, PASSING),
+    "density": ("body.bed.density", [0.5, 2.0], ON_SPRINGS, PASSING),
+    "turn": ("carriage.car.motion.turn", [0.0, 0.1, 0.5], ON_SPRINGS, RETURNING),
+    "end": ("carriage.car.motion.end", [0.5, 0.8], ON_SPRINGS, RETURNING),
+    "cycles": ("carriage.car.motion.cycles", [1, 3], ON_SPRINGS, RETURNING),
+    "place": ("sensor.midspan.at", [0.2, 0.7], ON_SPRINGS, PASSING),
+    "mass": ("carriage.car.mass", [0.1, 0.9], ON_SPRINGS, PASSING),
+    "speed": ("carriage.car.motion.speed", [0.4, 2.0], ON_SPRINGS, PASSING),
+    "gravity": ("gravity", [1.0, 9.0], ON_SPRINGS, PASSING),
+    "damping": ("body.bed.damping_ratio", [0.0, 0.3], ON_SPRINGS, PASSING),
+    "delay": ("carriage.car.delay", [0.0, 0.2], ON_SPRINGS, PASSING),
+    "steps": ("solver.steps", [150, 333], ON_SPRINGS, PASSING),
+    "Rayleigh": ("body.bed.damping_ratio.rayleigh.1", [0.0, 0.01], {"rayleigh": [0.1, 0.0]}, PASSING),
+    "list": ("body.bed.damping_ratio.2", [0.0, 0.2], [0.0, 0.1, 0.2, 0.3], PASSING),
+    "beta": ("solver.beta", [0.25, 0.3], ON_SPRINGS, PASSING),
+}
+
+
+@pytest.mark.parametrize("name", STRUCTURAL)
+def test_a_swept_number_gives_the_same_as_a_study_of_its_own(name: str) -> None:
+    path, listed, bed, carriage = STRUCTURAL[name]
+    bed = bed if "kind" in bed else beam(supports=SPRINGS, damping_ratio=bed)
+    changes: dict[str, Any] = {"sensor": {"midspan": fixed(0.5), "moment": fixed(0.4, "bending_moment")}}
+    if name == "beta":
+        changes["solver"] = {"scheme": "newmark", "beta": 0.25, "gamma": 0.55}
+    if name == "delay":
+        carriage = {"car": PASSING, "next": force(1.0, cruise(0.0, 1.0, 0.9))}
+    given = swept(path, listed, carriage, bed, **changes)
+    whole = run(given)
+    names = [str(key) for key, array in whole.data_vars.items() if "axis" in array.dims]
+    assert {"midspan_max", "moment_min", "status", "car_contact_force_min", "steps_used"} <= set(names)
+    lines: set[tuple[float, float]] = set()
+    for i, value in enumerate(listed):
+        alone = run(given.without_sweep().with_values({path: value}))
+        for key in names:
+            assert whole[key].values[i].tobytes() == alone[key].values.tobytes(), (key, value)
+        lines.add((float(alone.midspan_max), float(alone.midspan_rms)))
+    assert len(lines) == len(listed)
+
+
+def test_zipped_axes() -> None:
+    sweep = {
+        "zip": True,
+        "speed": {"of": "carriage.car.motion.speed", "values": [0.5, 1.0, 2.0]},
+        "load": {"of": "carriage.car.mass", "values": [0.3, 0.2, 0.1]},
+        "length": {"of": "body.bed.length", "values": [1.0, 1.1, 1.0]},
+    }
+    ds = run(study(beam(), PASSING, sweep=sweep))
+    assert ds.midspan_max.dims == ("variant",)
+    for i in range(3):
+        bed = beam(length=sweep["length"]["values"][i])  # type: ignore[index]
+        speed, load = (sweep[key]["values"][i] for key in ("speed", "load"))  # type: ignore[index]
+        alone = run(study(bed, mass(load, cruise(0.0, 1.0, speed)), sensor={"midspan": fixed(0.5)}))
+        assert float(ds.midspan_max[i]) == float(alone.midspan_max)
+        assert float(ds.speed[i]) == speed
+
+
+def test_sampled_axes() -> None:
+    sweep = {
+        "speed": {"of": "carriage.car.motion.speed", "sobol": 32, "from": 0.3, "to": 2.0},
+        "cargo": {"of": "carriage.car.mass", "sobol": 32, "from": 0.1, "to": 0.9},
+        "zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.05]},
+    }
+    ds = run(study(beam(), PASSING, sweep=sweep))
+    assert set(ds.midspan_max.dims) == {"variant", "zeta"}
+    assert np.unique(ds.speed.values).size == 32
+    assert np.isfinite(ds.midspan_max.values).all()
+    for i in (0, 13, 31):
+        way = cruise(0.0, 1.0, float(ds.speed[i]))
+        alone = run(study(beam(damping_ratio=0.05), mass(float(ds.cargo[i]), way)))
+        assert float(ds.midspan_max.sel(zeta=0.05)[i]) == float(alone.midspan_max)
+
+
+def test_headway_keeps_one_scene_and_delay_does_not() -> None:
+    """With a headway the timing scales with the speed, so all speeds share one table."""
+    speed = {"speed": {"of": [f"carriage.{name}.motion.speed" for name in ("car", "next")], "values": [0.5, 0.7, 1.1]}}
+    way = cruise(0.0, 1.0, 1.0)
+    with_headway = {"car": PASSING, "next": mass(0.2, way, headway=0.3)}
+    with_delay = {"car": PASSING, "next": mass(0.2, way, delay=0.3)}
+    plans = [
+        make_plan(study(beam(), riding, sweep=speed, solver={"steps": 100})) for riding in (with_headway, with_delay)
+    ]
+    assert [len(plan.buckets) for plan in plans] == [1, 3]
+
+
+def test_fixed_steps_are_over_one_passage_or_cycle() -> None:
+    ds = run(study(beam(), RETURNING, solver={"steps": 60}, output={"histories": "all"}))
+    assert ds.midspan.size == 2 * 60 + 1
+    assert int(ds.steps_used) == 60
+    every = run(study(beam(), RETURNING, solver={"steps": 60}, output={"histories": {"every": 7}}))
+    np.testing.assert_array_equal(every.midspan.values, ds.midspan.values[::7])
+
+
+def test_a_study_without_sensors_or_sweep() -> None:
+    ds = run(study(beam(), PASSING, sensor={}))
+    assert ds.status.dims == ()
+    assert np.isfinite(float(ds.car_contact_force_min))
+
+
+def test_nothing_moves() -> None:
+    with pytest.raises(BadInput, match="nothing moves"):
+        make_plan(study(beam(), {}))

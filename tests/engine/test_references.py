@@ -1,0 +1,299 @@
+"""Every reference number that a passage, a shuttle or a train of the engine can produce."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.run import run
+from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.naive import indices
+from tests.reference import closed_forms, values
+
+Array = NDArray[np.float64]
+
+STEPS = 20000
+SPAN = cruise(0.0, 1.0, 1.0)
+
+
+def passing(mu: float, alpha: float, end: float = 1.0, **changes: Any) -> Any:
+    """A mass of weight 48 on the unit beam of 20 modes, Fox-Goodwin; histories at the quarters of the way."""
+    solver: Table = {"scheme": "fox-goodwin", "steps": STEPS, "static_correction": False} | changes.pop("solver", {})
+    bed = beam(modes=values.MODES_MOVING_MASS, damping_ratio=changes.pop("zeta", 0.0))
+    sensors = {"midspan": fixed(0.5), "below": under("car")}
+    way = cruise(0.0, end, math.pi * alpha)
+    given = {"gravity": values.WEIGHT / mu, "sensor": sensors, "solver": solver}
+    return study(bed, mass(mu, way), output={"histories": {"every": STEPS // 4}}, **given)
+
+
+@pytest.mark.parametrize("row", values.MOVING_MASS, ids=lambda row: f"mu={row.mu}-alpha={row.alpha}")
+def test_moving_mass(row: values.MovingMass) -> None:
+    ds = run(passing(row.mu, row.alpha))
+    assert float(ds.midspan_max) == pytest.approx(row.largest, abs=1.5e-7)
+    assert float(ds.midspan_max_position) == pytest.approx(row.largest_at, abs=5e-5)
+    np.testing.assert_allclose(ds.below.values[1:4], row.under, rtol=0, atol=1.5e-7, equal_nan=False)
+    assert ds.midspan.values[4] == pytest.approx(row.at_exit, abs=5e-7)
+
+
+@pytest.mark.parametrize("row", values.MOVING_MASS, ids=lambda row: f"mu={row.mu}-alpha={row.alpha}")
+def test_smallest_contact_force_of_a_moving_mass(row: values.MovingMass) -> None:
+    """The cruise ends at s = 0.95, so that the extremes cover just that part. The contact force feels the phase of the
+    highest mode, whose error (omega h)^4/480 per radian must add up to nothing: 80000 steps."""
+    ds = run(passing(row.mu, row.alpha, 0.95, solver={"steps": 80000}))
+    assert float(ds.car_contact_force_min) / values.WEIGHT == pytest.approx(row.smallest_force, abs=1.5e-6)
+    assert float(ds.car_contact_force_min_position) == pytest.approx(row.smallest_force_at, abs=1e-4)
+    assert int(ds.status) == (1 if row.smallest_force < 0.0 else 0)
+
+
+def test_average_acceleration_reaches_the_same_numbers() -> None:
+    """2e-6 at 40000 steps."""
+    compared = 0
+    for row in values.MOVING_MASS:
+        ds = run(passing(row.mu, row.alpha, solver={"scheme": "average-acceleration", "steps": 40000}))
+        assert float(ds.midspan_max) == pytest.approx(row.largest, abs=2e-6)
+        compared += 1
+    assert compared == 5
+
+
+@pytest.mark.parametrize("row", values.MOVING_MASS_DAMPED_2_PERCENT)
+def test_moving_mass_with_damping(row: values.LargestMidspan) -> None:
+    ds = run(passing(row.mu, row.alpha, zeta=0.02))
+    assert float(ds.midspan_max) == pytest.approx(row.largest, abs=2e-7)
+
+
+@pytest.mark.parametrize("row", values.MOVING_MASS_WITHOUT_CONVECTIVE)
+def test_moving_mass_without_convective_terms(row: values.LargestMidspan) -> None:
+    ds = run(passing(row.mu, row.alpha, solver={"fidelity": "mass-without-convective"}))
+    assert float(ds.midspan_max) == pytest.approx(row.largest, abs=2e-7)
+    assert int(ds.fidelity_used) == 2
+
+
+def test_moving_force() -> None:
+    """20 modes and the static correction, Fox-Goodwin, 20000 steps: all speeds of the table within 1e-6."""
+    alphas = list(values.MOVING_FORCE)
+    given = study(
+        beam(modes=20),
+        force(values.WEIGHT, SPAN),
+        sweep={"speed": {"of": "carriage.car.motion.speed", "values": [math.pi * alpha for alpha in alphas]}},
+        solver={"scheme": "fox-goodwin", "steps": STEPS},
+    )
+    ds = run(given)
+    expected = list(values.MOVING_FORCE.values())
+    np.testing.assert_allclose(ds.midspan_max.values, expected, rtol=0, atol=1e-6, equal_nan=False)
+    np.testing.assert_allclose(ds.speed_ratio.values, alphas, rtol=1e-12)
+    assert np.all(ds.status.values == 0)
+    plain = study(beam(), force(values.WEIGHT, SPAN), sweep=given.data["sweep"])
+    short = np.abs(run(plain).midspan_max.values - expected)
+    assert values.MOVING_FORCE_N20_ERROR < short.max() < 1e-3  # what "auto" promises
+
+
+def test_dynamic_amplification_has_the_exact_static_value() -> None:
+    """The largest static midspan deflection is 1, and the moment PL/4."""
+    from engine.outcome import run_chunk
+    from engine.plan import make_plan
+
+    sensors = {"midspan": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "quarter": fixed(0.25, "bending_moment")}
+    given = study(beam(), force(values.WEIGHT, cruise(0.0, 1.0, 1.7, after=40.0)), sensor=sensors)
+    plan = make_plan(given)
+    found, _ = run_chunk(plan, plan.buckets[0], plan.buckets[0].variants)
+    assert found["midspan_static"] == pytest.approx(1.0, abs=1e-5)
+    assert found["moment_static"] == pytest.approx(values.WEIGHT / 4.0, rel=1e-5)
+    assert found["quarter_static"] == pytest.approx(values.WEIGHT * 3.0 / 16.0, rel=1e-5)
+
+
+def in_units_of(case: values.MovingForceCase, modes: int) -> Table:
+    """A pinned beam of a published case."""
+    return beam(
+        length=case.length,
+        youngs_modulus=case.bending_stiffness,
+        density=case.mass_per_length,
+        modes=modes,
+    )
+
+
+def test_stem() -> None:
+    case = values.STEM
+    given = study(
+        in_units_of(case, 20),
+        force(case.force, cruise(0.0, 25.0, case.speed)),
+        solver={"scheme": "fox-goodwin", "steps": 10000},
+    )
+    ds = run(given)
+    assert float(ds.midspan_max) == pytest.approx(values.STEM_LARGEST, abs=6e-8)
+    assert float(ds.midspan_max_position) / case.speed == pytest.approx(values.STEM_LARGEST_AT, abs=5e-4)
+
+
+@pytest.mark.parametrize(("modes", "expected"), values.BIGGS_MIDSPAN.items())
+def test_biggs(modes: int, expected: tuple[float, ...]) -> None:
+    case = values.BIGGS
+    given = study(
+        in_units_of(case, modes),
+        force(case.force, cruise(0.0, case.length, case.speed)),
+        solver={"scheme": "fox-goodwin", "steps": 20000, "static_correction": False},
+        output={"histories": {"every": 1000}},
+    )
+    ds = run(given)
+    np.testing.assert_allclose(ds.elapsed.values[1:4], values.BIGGS_TIMES, rtol=1e-12)
+    np.testing.assert_allclose(ds.midspan.values[1:4], expected, rtol=0, atol=5.5e-6, equal_nan=False)
+
+
+def test_quasi_static_contact_force() -> None:
+    """F/mg - 1 = pi^2 mu alpha^2/3 at midspan once damping has stilled the ringing; F = m (g - D2w)."""
+    mu, alpha = values.SMALL_LIMIT_MU, values.SMALL_LIMIT_ALPHA
+    gravity = values.WEIGHT / mu
+    given = study(
+        beam(modes=20, damping_ratio=0.3),
+        mass(mu, cruise(0.1, 0.9, math.pi * alpha)),
+        gravity=gravity,
+        initial="equilibrium",
+        sensor={"below": under("car", "acceleration")},
+        solver={"steps": 8000},
+        output={"histories": {"every": 4000}},
+    )
+    ds = run(given)
+    assert ds.car_position.values[1] == pytest.approx(0.5)
+    assert -ds.below.values[1] / gravity == pytest.approx(values.SMALL_LIMIT, rel=2e-2)
+
+
+def amplitude(ds: Any, station: int, omega: float, zeta: float) -> float:
+    """|q' + (zeta + i sqrt(1 - zeta^2)) omega q| of mode 1 from midspan's displacement and velocity."""
+    rate = complex(zeta, math.sqrt(1.0 - zeta**2)) * omega
+    return abs(complex(ds.rate.values[station]) + rate * ds.midspan.values[station]) / omega
+
+
+def single_mode(carriages: Table, after: float, zeta: float = 0.0) -> Any:
+    """One mode of the unit beam; displacement and velocity at midspan at all steps."""
+    return study(
+        beam(modes=1, damping_ratio=zeta),
+        carriages,
+        sensor={"midspan": fixed(0.5), "rate": fixed(0.5, "velocity")},
+        solver={"scheme": "fox-goodwin", "steps": 4000, "static_correction": False},
+        output={"histories": "all"},
+    )
+
+
+@pytest.mark.parametrize("alpha", [*values.RESIDUAL_ZERO_ALPHAS, 0.25, values.RESIDUAL_MAXIMUM_ALPHA, 1.0])
+def test_residual_vibration(alpha: float) -> None:
+    ds = run(single_mode(force(values.WEIGHT, cruise(0.0, 1.0, math.pi * alpha, after=3.0)), 3.0))
+    unit = 2.0 * values.WEIGHT / math.pi**4
+    expected = closed_forms.residual_amplitude(alpha)
+    assert amplitude(ds, 4000, math.pi**2, 0.0) / unit == pytest.approx(expected, abs=1e-6)
+    free = ds.midspan.values[4000:]
+    assert free.size == 601
+    assert np.ptp(free) / 2.0 / unit == pytest.approx(expected, rel=2e-4, abs=1e-6)
+    assert ds.elapsed.values[-1] - ds.elapsed.values[4000] == pytest.approx(3.0 * 2.0 / math.pi)
+
+
+@pytest.mark.parametrize(("zeta", "k"), [(0.0, 1.0), (0.0, 0.5), (0.02, 1.0)])
+def test_train(zeta: float, k: float) -> None:
+    """Eight forces d apart at v = f1 d/k against one."""
+    speed = 0.3 * math.pi
+    spacing = k * speed / (0.5 * math.pi)
+    way = cruise(0.0, 1.0, speed)
+    one = run(single_mode(force(values.WEIGHT, way), 0.0, zeta))
+    many = {f"axle{n}": force(values.WEIGHT, way, headway=n * spacing) for n in range(values.TRAIN_FORCES)}
+    all_of_them = run(single_mode(many, 0.0, zeta))
+    gain = amplitude(all_of_them, -1, math.pi**2, zeta) / amplitude(one, -1, math.pi**2, zeta)
+    expected = closed_forms.train_gain(values.TRAIN_FORCES, zeta, k)
+    assert gain == pytest.approx(expected, abs=2e-5)
+    if zeta > 0.0:
+        assert gain == pytest.approx(values.TRAIN_GAIN_DAMPED, abs=1e-4)
+
+
+def last_cycle(ds: Any, cycles: int) -> Array:
+    """Midspan over the last cycle, its end left out; (..., stations)."""
+    steps = int(np.atleast_1d(ds.steps_used.values).flat[0])
+    series = ds.midspan.values
+    assert series.shape[-1] == cycles * steps + 1
+    found: Array = series[..., -steps - 1 : -1]
+    return found
+
+
+def test_asymmetry() -> None:
+    """Third cycle of the shuttle at auto steps, by the naive indices: lag for every damping, rms and area at 2 %."""
+    rows = [row for row in values.ASYMMETRY if row.mu == 0.3]
+    way = shuttle(
+        values.ASYMMETRY_START,
+        values.ASYMMETRY_END,
+        math.pi * values.ASYMMETRY_ALPHA,
+        values.ASYMMETRY_TURN,
+        values.ASYMMETRY_CYCLES,
+    )
+    given = study(
+        beam(modes=values.ASYMMETRY_MODES),
+        mass(0.3, way),
+        gravity=values.WEIGHT / 0.3,
+        sweep={"zeta": {"of": "body.bed.damping_ratio", "values": [row.zeta for row in rows]}},
+        solver={"static_correction": False, "steps": 20000},
+        output={"histories": "all"},
+    )
+    ds = run(given)
+    s = ds.car_position.values[0][-20001:-1]
+    stroke = values.ASYMMETRY_END - values.ASYMMETRY_START
+    depth = values.ASYMMETRY_TURN * stroke
+    inside = np.flatnonzero((s > values.ASYMMETRY_START + depth) & (s < values.ASYMMETRY_END - depth))
+    out = inside[inside < 10000]
+    model = closed_forms.PinnedBeam(values.ASYMMETRY_MODES)
+    soft = values.WEIGHT * model.phi(0.5, 0) / model.omega**2
+    static = [float(soft @ model.phi(x, 0)) for x in s[out]]
+    slope = [float(soft @ model.phi(x, 1)) for x in s[out]]
+    cycle = last_cycle(ds, values.ASYMMETRY_CYCLES)
+    found = [
+        indices.asymmetry(indices.Legs(list(s[out]), list(w[out]), list(w[20000 - out]), static, slope)) for w in cycle
+    ]
+    for row, index in zip(rows, found, strict=True):
+        assert index.lag == pytest.approx(row.lag, rel=5e-4)
+    two_percent = found[[row.zeta for row in rows].index(0.02)]
+    assert two_percent.odd_rms == pytest.approx(values.ASYMMETRY_ODD_RMS, rel=2e-3)
+    assert two_percent.even_excess == pytest.approx(values.ASYMMETRY_EVEN_EXCESS, rel=2e-3)
+    assert two_percent.loop_area == pytest.approx(values.ASYMMETRY_LOOP_AREA, rel=2e-3)
+
+
+@pytest.mark.parametrize("row", values.DOUBLE_PEAK, ids=lambda row: f"ratio={row.frequency_ratio}")
+def test_double_peak(row: values.DoublePeak) -> None:
+    frequency = row.frequency_ratio * 0.5 * math.pi
+    given = study(
+        beam(modes=6, damping_ratio=0.02),
+        mass(0.1, swing(0.5, 0.49, frequency, 20)),
+        gravity=values.WEIGHT / 0.1,
+        solver={"static_correction": False, "steps": 8000},
+        output={"histories": "all"},
+    )
+    cycle = list(last_cycle(run(given), 20)[::4])
+    if row.peaks is not None:
+        assert len(indices.peaks(cycle)) == row.peaks
+    if row.largest is not None:
+        assert max(cycle) == pytest.approx(row.largest, abs=1e-4)
+    found = indices.harmonics(cycle)
+    for k, expected in row.harmonics.items():
+        assert found[k] == pytest.approx(expected, abs=1e-4)
+
+
+def test_end_springs() -> None:
+    """A slow force on unequal springs: the ratio of harmonics tends to the static one."""
+    k_a, k_b = values.END_SPRINGS
+    springs = [{"at": 0.0, "stiffness": k_a}, {"at": 1.0, "stiffness": k_b}]
+    given = study(
+        beam(modes=4, damping_ratio=0.05, supports=springs),
+        force(values.WEIGHT, swing(0.5, 0.49, 0.002, 1)),
+        solver={"steps": 20000},
+        output={"histories": {"every": 20}},
+    )
+    cycle = list(run(given).midspan.values[:-1])
+    found = indices.harmonics(cycle)
+    assert found[1] / found[2] == pytest.approx(values.END_SPRINGS_FIRST_OVER_SECOND, abs=2e-3)
+    assert indices.odd_even_ratio(cycle) == pytest.approx(values.END_SPRINGS_ODD_OVER_EVEN, abs=2e-3)
+
+
+def test_complex_amplitude_is_that_of_free_vibration() -> None:
+    """What the train's gain is measured by stays constant but for damping."""
+    rate = complex(-0.02, math.sqrt(1.0 - 0.02**2)) * 3.0
+    q = [(0.7 * cmath.exp(rate * t)).imag / 3.0 for t in (0.0, 1.0)]
+    v = [(0.7 * rate * cmath.exp(rate * t)).imag / 3.0 for t in (0.0, 1.0)]
+    found = [abs(v[i] - rate.conjugate() * q[i]) for i in range(2)]
+    assert found[1] / found[0] == pytest.approx(math.exp(-0.06))

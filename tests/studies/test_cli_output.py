@@ -1,0 +1,78 @@
+"""Standard output that is closed, full, or read by somebody who leaves; colours and the progress bar."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.studies.small import ROOT, SEPARATED, command, finish, write
+
+
+def shell(folder: Path, line: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command in a line of bash, where it stands as "$@"; the exit code is the command's."""
+    return subprocess.run(
+        ["bash", "-c", line, "bash", *command(*arguments)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["list"]], ids=str)
+def test_a_reader_may_leave(tmp_path: Path, arguments: list[str]) -> None:
+    done = shell(tmp_path, '"$@" | true; exit ${PIPESTATUS[0]}', *arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_run_keeps_its_code_when_its_reader_leaves(tmp_path: Path) -> None:
+    write(tmp_path, SEPARATED)
+    done = shell(tmp_path, '"$@" | true; exit ${PIPESTATUS[0]}', "run", "small.toml")
+    assert (done.returncode, done.stderr) == (3, "")
+    assert (tmp_path / "small.nc").exists()
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["list"]], ids=str)
+def test_full_output_is_code_74(tmp_path: Path, arguments: list[str]) -> None:
+    done = shell(tmp_path, '"$@" > /dev/full', *arguments)
+    assert done.returncode == 74 and "No space left" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_closed_output_is_no_error(tmp_path: Path) -> None:
+    done = shell(tmp_path, '"$@" >&-', "list")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert finish(tmp_path, "run", "small.toml", "-o", "quiet.nc").stderr == ""
+    master, terminal = pty.openpty()
+    process = subprocess.Popen(
+        command("run", "small.toml"),
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "NO_COLOR": "1"},
+        stdout=subprocess.PIPE,
+        stderr=terminal,
+    )
+    os.close(terminal)
+    output = process.communicate(timeout=60)[0]
+    shown = b""
+    while True:
+        try:
+            part = os.read(master, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        shown += part
+    os.close(master)
+    assert process.returncode == 0
+    assert b"small" in shown and b"/16" in shown
+    assert b"\x1b" not in output

@@ -1,0 +1,142 @@
+"""Figures draw with any sweep, show what they say, and are safe to put into one page."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from studies import figures, views
+from studies import study as running
+from studies.results import Results
+from tests.studies import scenes
+
+KINDS = tuple(scenes.MOTIONS)
+MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
+DAMPING = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
+RENDERED = ("none", "two axes")  # rendering takes a second each
+LENGTHS = 'area = { of = "body.bed.area", from = 0.01, to = 0.02, count = 3 }'
+
+
+def sweeps(kind: str) -> dict[str, str]:
+    """Sweeps of every shape: none, of one value, one to three axes, without a pace, unsorted, zipped, sampled."""
+    pace = scenes.pace(kind) if scenes.PACE[kind] else LENGTHS
+    sobol = [re.sub(r"from = (\S+), to = (\S+), count = \d+", r"sobol = 5, from = \1, to = \2", scenes.pace("passage"))]
+    sampled = sobol[0].replace(".speed", f".{scenes.PACE[kind]}") if scenes.PACE[kind] else ""
+    return {
+        "none": "",
+        "one value": 'mass = { of = "carriage.table.mass", values = [80] }',
+        "one axis": pace,
+        "two axes": f"{pace}\n{MASS}",
+        "three axes": f"{MASS}\n{pace}\n{DAMPING}",
+        "no pace": f"{MASS}\n{DAMPING}",
+        "body": f"{LENGTHS}\n{MASS}",
+        "zipped": f'zip = true\n{MASS}\nzeta = {{ of = "body.bed.damping_ratio", values = [0.01, 0.02, 0.03] }}',
+        "sampled": f'{sampled}\nmass = {{ of = "carriage.table.mass", sobol = 5, from = 10, to = 50 }}',
+        "mixed": f'{pace}\nmass = {{ of = "carriage.table.mass", sobol = 5, from = 10, to = 50 }}',
+    }
+
+
+@pytest.mark.parametrize("shape", sweeps("passage"))
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_sweep_can_be_drawn(kind: str, shape: str) -> None:
+    dataset = scenes.run(kind, sweeps(kind)[shape])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = running.figures(dataset)
+        for figure in found:
+            assert figure.title and figures.plain_name(figure.name) == figure.name
+            if shape in RENDERED:
+                ElementTree.fromstring(figures.svg(figure))
+    assert found and len({figure.name for figure in found}) == len(found)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_failed_variants_are_left_out_and_counted(kind: str, every: int) -> None:
+    sweep = f"{scenes.pace(kind)}\n{MASS}" if scenes.PACE[kind] else MASS
+    dataset = scenes.with_failures(scenes.run(kind, sweep), every)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = running.figures(dataset)
+        texts = [figures.svg(figure) for figure in found if every == 2]
+    assert not any(re.search(r"\bnan\b", text) for text in texts)
+    counted = [figure for figure in found if "diverged (left out)" in figure.caption]
+    assert counted or kind == "trajectory"
+
+
+def test_the_lag_is_drawn_with_its_theory() -> None:
+    dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 1.0, 5)}\n{DAMPING}")
+    figure = next(figure for figure in running.figures(dataset) if figure.name == "lag")
+    axes = figure.drawing.axes[0]
+    solid = [line for line in axes.get_lines() if line.get_linestyle() == "-" and len(line.get_xdata()) == 5]
+    dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--" and len(line.get_xdata()) == 5]
+    assert len(solid) == len(dashed) == 2
+    for line, theory in zip(solid, dashed, strict=True):
+        assert line.get_color() == theory.get_color()
+        np.testing.assert_allclose(line.get_ydata(), theory.get_ydata(), rtol=0.3)
+    expected = dataset.lag.sel(sensor="midspan", zeta=0.05).values
+    assert any(np.allclose(np.abs(line.get_ydata() / expected), 1e3) for line in solid)
+
+
+def test_unsorted_axes_are_drawn_in_order() -> None:
+    results = Results.of(scenes.run("passage", MASS))
+    (curve,) = views.view(results).curves(results.of_sensor("dynamic_amplification", "midspan"))
+    assert curve.x.tolist() == [50.0, 100.0, 200.0]
+    by_mass = results.of_sensor("dynamic_amplification", "midspan")
+    assert curve.y.tolist() == [float(by_mass.sel(mass=mass)) for mass in (50, 100, 200)]
+
+
+def test_a_view_says_what_it_holds() -> None:
+    results = Results.of(scenes.run("passage", f"{MASS}\n{scenes.pace('passage')}\n{DAMPING}"))
+    seen = views.view(results)
+    assert seen.x is not None and seen.y is not None
+    assert (seen.x.name, seen.y.name) == ("pace", "zeta")
+    assert seen.words == "Held at mass 50 kg."
+    assert seen.plane(results.of_sensor("dynamic_amplification", "midspan")).shape == (4, 2)
+    only = views.view(Results.of(scenes.run("passage")))
+    assert only.x is None and only.words == ""
+
+
+def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
+    dataset = scenes.run("passage", scenes.pace("passage"))
+    found = running.figures(dataset)
+    identifiers = [set(re.findall(r'\bid="([^"]+)"', figures.svg(figure))) for figure in found]
+    assert len(identifiers) > 1 and not set.intersection(*identifiers)
+    for figure in found:
+        text = figures.svg(figure)
+        used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)
+        defined = set(re.findall(r'\bid="([^"]+)"', text))
+        assert used and all((first or second) in defined for first, second in used)
+        assert text == figures.svg(figure)
+        assert "<script" not in text and "<!--" not in text and "DOCTYPE" not in text
+
+
+def test_no_text_is_mathematics() -> None:
+    """A label such as $\\frac{1}{0$ would raise, and $x$ would lose its dollars."""
+
+    def fill(drawing: figures.Drawing) -> None:
+        axes = drawing.subplots()
+        axes.set_title(r"$\frac{1}{0$ <script>")
+        axes.plot([1e-3, 1.0], [1e-3, 1e3], label="$x$")
+        figures.logarithmic(axes.yaxis)
+        axes.legend()
+
+    figure = figures.draw("../../etc/passwd", "t", "c", 2.0, fill)
+    assert figure.name == "etc-passwd"
+    text = figures.svg(figure)
+    assert "<script" not in text and "mathdefault" not in text
+    assert len(figures.png(figure)) > 1000
+    for label in figure.drawing.axes[0].get_yticklabels():
+        assert "$" not in label.get_text()
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([1, 5, 9, 13], False), ([1, 10, 100], True), ([0, 1, 10, 100], False), ([1, 2], False), ([1, 2, 4, 8, 16], True)],
+)
+def test_which_axes_are_logarithmic(values: list[float], expected: bool) -> None:
+    assert figures.is_logarithmic(np.array(values, dtype=float)) is expected

@@ -1,0 +1,163 @@
+"""The vectorised indices against their plain twins, closed forms, and against themselves in other company."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from studies import indices
+from tests.naive import indices as naive
+
+Array = NDArray[np.float64]
+
+
+def waves(seed: int, stations: int, lanes: int) -> Array:
+    """Cycles (stations, 1, lanes) of a few harmonics."""
+    rng = np.random.default_rng(seed)
+    phase = np.arange(stations) / stations
+    orders = np.arange(1, 9)
+    angle = 2 * np.pi * (phase[:, None] * orders + rng.random((lanes, 1, len(orders))))
+    size = rng.normal(size=(lanes, 1, len(orders))) / orders
+    return np.ascontiguousarray((size * np.cos(angle)).sum(axis=-1).T[:, None, :])
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31), stations=st.sampled_from([40, 64, 201, 400]))
+def test_peaks_are_those_of_the_twin(seed: int, stations: int) -> None:
+    cycles = waves(seed, stations, 5)
+    found = indices.peaks(cycles)
+    for lane in range(5):
+        expected = naive.peaks(cycles[:, 0, lane].tolist())
+        assert found.count[0, lane] == len(expected) > 0
+        kept = sorted(sorted(expected, key=lambda peak: -peak.value)[: indices.PEAKS])
+        for place, peak in enumerate(kept):
+            # a parabola moves a peak by up to half a station, and never down
+            away = abs(found.phase[:, 0, lane] - peak.phase)
+            nearest = int(np.nanargmin(np.minimum(away, 1.0 - away)))
+            assert min(away[nearest], 1.0 - away[nearest]) <= 0.5 / stations + 1e-12
+            assert found.value[nearest, 0, lane] >= peak.value - 1e-12
+            assert place < indices.PEAKS
+        assert np.isfinite(found.value[:, 0, lane]).sum() == len(kept)
+
+
+def test_a_parabola_finds_a_peak_between_stations() -> None:
+    stations, at = 400, 0.12345
+    phase = np.arange(stations) / stations
+    found = indices.peaks(np.cos(2 * np.pi * (phase - at))[:, None, None])
+    assert found.count[0, 0] == 1
+    assert found.phase[0, 0, 0] == pytest.approx(at, abs=1e-6)
+    assert found.value[0, 0, 0] == pytest.approx(1.0, abs=1e-8)
+    assert np.isnan(found.value[1:]).all()
+
+
+@pytest.mark.parametrize(("height", "count"), [(0.019, 1), (0.021, 2)])
+def test_a_bump_counts_from_two_percent_of_the_range_on(height: float, count: int) -> None:
+    """A triangle from 0 to 1 with a bump on its falling side."""
+    cycle = np.interp(np.arange(400), [0, 100, 200, 210, 220, 400], [0, 1, 0.5, 0.5 + height, 0.45, 0])
+    assert indices.peaks(cycle[:, None]).count[0] == count
+    assert len(naive.peaks(cycle.tolist())) == count
+
+
+def test_flat_tops_and_constant_cycles() -> None:
+    flat = np.array([0.0, 1.0, 1.0, 0.0, 0.5, 0.5, 0.5, 0.0])
+    assert indices.peaks(flat[:, None]).count[0] == len(naive.peaks(flat.tolist())) == 2
+    assert indices.peaks(np.full((16, 1), 3.0)).count[0] == 0
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_harmonics_are_those_of_the_twin(seed: int) -> None:
+    cycles = waves(seed, 100, 3)
+    found = indices.harmonics(cycles)
+    for lane in range(3):
+        cycle = cycles[:, 0, lane].tolist()
+        np.testing.assert_allclose(found[:, 0, lane], naive.harmonics(cycle), rtol=0, atol=1e-13)
+        assert indices.odd_even_ratio(found)[0, lane] == pytest.approx(naive.odd_even_ratio(cycle), rel=1e-10)
+
+
+def test_harmonics_that_too_few_stations_cannot_tell_are_nan() -> None:
+    found = indices.harmonics(waves(1, 12, 1))[:, 0, 0]
+    assert np.isfinite(found[:6]).all() and np.isnan(found[6:]).all() and len(found) == 17
+    assert np.isnan(indices.odd_even_ratio(indices.harmonics(np.cos(2 * np.pi * np.arange(16) / 16) * 0.0)))
+
+
+def out_and_back(stations: int, edge: float, shift: float) -> tuple[Array, Array, Array, Array]:
+    """Cycle of an out-and-back path whose cruise is from `edge` to 1/2 - edge: position, response, static and slope.
+
+    The static response is a cubic of the position; the response is late by `shift` in position on both ways.
+    """
+    phase = np.arange(stations) / stations
+    half = np.minimum(phase, 1.0 - phase)
+    position = 1.0 + 4.0 * half
+    way = np.where(phase < 0.5, 1.0, -1.0)
+
+    def static(s: Array) -> Array:
+        return s**3 - 2.0 * s**2
+
+    slope = 3.0 * position**2 - 4.0 * position
+    return position, static(position - way * shift), static(position), slope
+
+
+@pytest.mark.parametrize("stations", [200, 401, 800])
+@pytest.mark.parametrize("edge", [0.0123, 0.0371, 0.1])
+def test_asymmetry_is_that_of_the_twin(stations: int, edge: float) -> None:
+    """The twin gets a fine cycle that ends exactly where the cruise does."""
+    cycle = [field[:, None, None] for field in out_and_back(stations, edge, -0.01)[1:]]
+    cruise = (edge, 0.5 - edge)
+    found = indices.asymmetry(indices.folded(cruise, *cycle), 1.0)
+    s = np.linspace(1.0 + 4.0 * edge, 3.0 - 4.0 * edge, 20001)
+    forward, backward, static = ((x**3 - 2.0 * x**2).tolist() for x in (s + 0.01, s - 0.01, s))
+    expected = naive.asymmetry(naive.Legs(s.tolist(), forward, backward, static, (3 * s**2 - 4 * s).tolist()))
+    for name in ("lag", "loop_area", "odd_rms", "even_excess"):
+        value = float(getattr(found, name)[0, 0])
+        assert value == pytest.approx(getattr(expected, name), rel=20.0 / stations**2 + 1e-9), name
+
+
+def test_a_pure_delay_is_a_lag_of_that_length() -> None:
+    cycle = [field[:, None, None] for field in out_and_back(400, 0.1, 1e-4)[1:]]
+    forward = indices.asymmetry(indices.folded((0.1, 0.4), *cycle), 1.0)
+    assert forward.lag[0, 0] == pytest.approx(-1e-4, rel=1e-6)
+    # a cycle whose way out runs against the position trails in the other direction
+    assert indices.asymmetry(indices.folded((0.1, 0.4), *cycle), -1.0).lag[0, 0] == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_no_lag_where_the_static_response_does_not_vary() -> None:
+    zeros = np.zeros((40, 1, 2))
+    assert all(
+        np.isnan(value).all() for value in indices.asymmetry(indices.folded((0.1, 0.4), zeros, zeros, zeros), 1.0)
+    )
+
+
+def test_interval_weights_integrate_what_is_linear_exactly() -> None:
+    nodes = np.array([0.0, 0.3, 0.35, 1.0, 1.7])
+    for low, high in ((0.0, 1.7), (0.1, 0.2), (0.3, 1.0), (0.31, 1.69)):
+        weights = indices.interval_weights(nodes, low, high)
+        assert weights.sum() == pytest.approx(1.0)
+        assert weights @ nodes == pytest.approx(0.5 * (low + high))
+
+
+def test_uneven_phases_are_made_even() -> None:
+    even = np.arange(400) / 400
+    phase = even + np.where(np.arange(400) % 2, 0.2 / 400, 0.0)
+    field = np.sin(2 * np.pi * phase)[:, None]
+    np.testing.assert_allclose(indices.evenly(phase, field)[:, 0], np.sin(2 * np.pi * even), atol=1e-4)
+    assert indices.evenly(even, field) is field
+
+
+@pytest.mark.parametrize("stations", [200, 350])
+def test_a_lane_has_the_same_bits_in_any_company(stations: int) -> None:
+    cycles = np.concatenate([waves(3, stations, 37), waves(4, stations, 37)], axis=1)
+    whole = (indices.harmonics(cycles), *indices.peaks(cycles))
+    legs = indices.asymmetry(indices.folded((0.05, 0.45), cycles, cycles[::-1], np.roll(cycles, 3, 0)), 1.0)
+    for lanes in (slice(0, 1), slice(5, 12), slice(36, 37)):
+        part = np.ascontiguousarray(cycles[..., lanes])
+        alone = (indices.harmonics(part), *indices.peaks(part))
+        own = indices.asymmetry(indices.folded((0.05, 0.45), part, part[::-1], np.roll(part, 3, 0)), 1.0)
+        for expected, found in zip((*whole, *legs), (*alone, *own), strict=True):
+            assert np.array_equal(expected[..., lanes], found, equal_nan=True)
+    assert not math.isnan(float(legs.lag[0, 0]))

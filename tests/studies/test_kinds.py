@@ -1,0 +1,198 @@
+"""What each kind refuses, declares and says."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import studies
+from results_schema.errors import ArchiveError, BadInput
+from results_schema.variables import registered
+from studies import study as running
+from studies.results import Results
+from tests.studies import scenes
+
+KINDS = tuple(scenes.MOTIONS)
+
+
+def test_all_kinds_are_found_by_their_files() -> None:
+    assert studies.kind_names() == tuple(sorted(KINDS))
+    for name in KINDS:
+        kind = studies.kind_named(name)
+        assert kind.name == name and kind.summary and kind.question.endswith("?")
+        assert name in registered()
+
+
+def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(BadInput, match='unknown kind of study.*did you mean "asymmetry"'):
+        studies.run(scenes.study("asymmetry").with_values({"kind": "asymetry"}))
+
+
+def test_importing_studies_imports_nothing_heavy() -> None:
+    heavy = "numpy", "xarray", "matplotlib", "numba", "jinja2", "pydantic"
+    code = f"import sys, studies; studies.kind_names(); print([name for name in {heavy} if name in sys.modules])"
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    )
+
+
+def test_running_a_kind_does_not_import_matplotlib() -> None:
+    code = (
+        "import sys, studies; [studies.kind_named(k) for k in studies.kind_names()]; print('matplotlib' in sys.modules)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_results_are_as_declared(kind: str) -> None:
+    dataset = scenes.run(kind, scenes.pace(kind) if scenes.PACE[kind] else "")
+    assert dataset.attrs["study_kind"] == kind and "[body.bed]" in dataset.attrs["study"]
+    assert list(dataset["sensor"].values) == ["midspan", "moment"]
+    assert list(dataset["sensor_unit"].values) == ["m", "N m"]
+    assert "midspan_static" not in dataset
+
+
+def test_a_result_that_is_missing_is_noticed() -> None:
+    study = scenes.study("asymmetry")
+    dataset = studies.run(study)
+    with pytest.raises(ArchiveError, match="lag: expected in every asymmetry"):
+        running.finish(dataset.drop_vars("lag"), study)
+
+
+def test_asymmetry_needs_a_motion_that_comes_back() -> None:
+    with pytest.raises(BadInput, match=r'carriage.table.motion.kind: .*comes back.*"out-and-back".*"cruise"'):
+        studies.run(scenes.study("passage").with_values({"kind": "asymmetry"}))
+
+
+@pytest.mark.parametrize(
+    ("sweep", "received"),
+    [("", "0.26"), ('turn = { of = "carriage.table.motion.turn", values = [0.1, 0.3] }', "0.3")],
+)
+def test_asymmetry_needs_half_the_stroke_at_constant_speed(sweep: str, received: str) -> None:
+    study = scenes.study("asymmetry", sweep)
+    if not sweep:
+        study = study.with_values({"carriage.table.motion.turn": 0.26})
+    with pytest.raises(BadInput, match=rf"motion.turn: .*less than half.*at most 0.25, received {received}"):
+        studies.run(study)
+
+
+def test_half_the_stroke_is_enough() -> None:
+    study = scenes.study("asymmetry").with_values({"carriage.table.motion.turn": 0.25})
+    assert np.isfinite(studies.run(study).lag).all()
+
+
+def test_asymmetry_refuses_what_has_no_static_response() -> None:
+    extra = '[sensor.rate]\nbody = "bed"\nat = 3.0\nquantity = "velocity"'
+    with pytest.raises(BadInput, match=r"sensor.rate.quantity: .*static response.*velocity"):
+        scenes.run("asymmetry", extra=extra)
+
+
+def test_double_peak_needs_a_motion_that_repeats() -> None:
+    with pytest.raises(BadInput, match=r'motion.kind: .*repeats.*"cruise"'):
+        studies.run(scenes.study("passage").with_values({"kind": "double-peak"}))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_measured_is_refused(kind: str) -> None:
+    text = scenes.text_of(kind)
+    start, end = text.index("[sensor.midspan]"), text.index("[carriage.table.motion]")
+    with pytest.raises(BadInput, match="nothing is measured"):
+        studies.run(scenes.engine.load(text[:start] + text[end:]))
+
+
+def test_a_trajectory_without_histories_is_refused() -> None:
+    with pytest.raises(BadInput, match=r"output.histories: a trajectory is its histories"):
+        scenes.run("trajectory", extra='[output]\nhistories = "none"')
+
+
+def test_a_sensor_that_never_moves_has_no_indices() -> None:
+    extra = '[sensor.support]\nbody = "bed"\nat = 0.0'
+    found = scenes.run("asymmetry", extra=extra)
+    assert np.isnan(found.lag.sel(sensor="support")) and np.isfinite(found.lag.sel(sensor="midspan"))
+
+
+def test_amplification_is_largest_over_static() -> None:
+    found = scenes.run("passage", scenes.pace("passage"))
+    gain = found.dynamic_amplification.sel(sensor="midspan")
+    weight, stiffness = 100.0 * 9.80665, 210e9 * 8e-6
+    modes = sum(2.0 / (n * np.pi) ** 4 * np.sin(n * np.pi / 2) ** 2 for n in range(1, 2000))
+    largest = np.maximum(abs(found.midspan_max), abs(found.midspan_min))
+    np.testing.assert_allclose(gain, largest / (weight * 10.0**3 / stiffness * modes), rtol=1e-5)
+
+
+# ---- what is said ----
+
+
+def said(kind: str, sweep: str = "", **options: str) -> str:
+    return "\n".join(running.findings(scenes.run(kind, sweep, **options)))
+
+
+def test_findings_of_an_asymmetry_name_the_largest_and_its_place() -> None:
+    damping = 'damping_ratio = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
+    dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 2.0, 6)}\n{damping}")
+    text = "\n".join(running.findings(dataset))
+    odd = dataset.odd_rms
+    assert text.startswith(("Yes: ", "Hardly: "))
+    assert f"{float(odd.max()) * 100:.2g} % of the" in text
+    assert "2 ζ v/ω₁" in text and "theory" in text
+
+
+def test_lag_under_the_carriage_is_half_of_that_at_a_fixed_place() -> None:
+    """Slow and damped, in the model itself: the closed form that the findings compare with."""
+    from studies import theory
+
+    extra = '[sensor.under]\nunder = "table"'
+    results = Results.of(scenes.run("asymmetry", scenes.pace("asymmetry", 0.2, 0.4, 2), extra=extra))
+    for sensor in ("midspan", "under"):
+        found = results.of_sensor("lag", sensor).values
+        np.testing.assert_allclose(found, results.everywhere(theory.lag(results, sensor)), rtol=0.03)
+    assert theory.lag_factor(results, "under") * 2 == theory.lag_factor(results, "midspan")
+
+
+def test_loaded_frequency_is_the_closed_form_of_a_shuttle() -> None:
+    from scipy.special import j0
+
+    from studies import theory
+
+    results = Results.of(scenes.run("double-peak"))
+    found = theory.loaded_frequency(results, np.array([0.1, 0.5, 1.0]))
+    expected = (1.0 + np.array([0.1, 0.5, 1.0]) * (1.0 + j0(2 * np.pi * 4.8 / 10.0))) ** -0.5
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_findings_of_a_double_peak_follow_the_data() -> None:
+    mass = 'mass = { of = "carriage.table.mass", values = [50, 200] }'
+    dataset = scenes.run("double-peak", f"{scenes.pace('double-peak', 1, 16, 16)}\n{mass}")
+    text = "\n".join(running.findings(dataset))
+    counts = dataset.peaks_per_cycle.sel(sensor="midspan")
+    assert (counts == 2).any() and (counts != 2).any()
+    first = float(dataset.frequency_ratio.broadcast_like(counts).where(counts != 2).min())
+    assert f"{first:.3g}" in text and "mass 50 kg" in text and "ωₑ" in text
+
+
+def test_findings_of_a_passage_tell_where_the_contact_opens() -> None:
+    mass = 'mass = { of = "carriage.table.mass", values = [10, 600] }'
+    dataset = scenes.run("passage", f"{scenes.pace('passage', 2, 40, 8)}\n{mass}")
+    text = "\n".join(running.findings(dataset))
+    opened = (dataset.table_contact_force_min < 0).sel(mass=600)
+    assert opened.any() and not opened.all()
+    assert f"first at {float(dataset.pace.values[opened.values][0]):.3g} m/s" in text
+    assert "while the contact holds" in text and "not up to 40 m/s" in text
+
+
+def test_findings_of_a_trajectory() -> None:
+    assert "Histories of 1 variant out of 1, each over 3 s on 401 stations" in said("trajectory")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_failed_variants_are_left_out_and_counted(kind: str) -> None:
+    sweep = scenes.pace(kind) if scenes.PACE[kind] else 'mass = { of = "carriage.table.mass", values = [1, 2, 3, 4] }'
+    dataset = scenes.with_failures(scenes.run(kind, sweep), 2)
+    text = "\n".join(running.findings(dataset))
+    assert "2 diverged (left out)" in text and "nan" not in text.lower().replace("dominan", "")
+    everything = "\n".join(running.findings(scenes.with_failures(dataset, 1)))
+    assert "4 diverged (left out)" in everything and "nan" not in everything.lower()

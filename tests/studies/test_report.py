@@ -1,0 +1,167 @@
+"""The report: one page that stands by itself, honest and safe whatever the study file holds."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from results_schema import files
+from results_schema.archive import SCHEMA_VERSION, write_archive
+from results_schema.errors import ArchiveError, BadInput, OutputFailed
+from studies import study as running
+from studies.report import PAGE, write_report
+from tests.studies import scenes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KINDS = tuple(scenes.MOTIONS)
+MINUS = "\N{MINUS SIGN}"
+HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} $x_1$ ../../x\nnew --> line & \"q\" 'a'"
+
+
+def archive(folder: Path, dataset: xr.Dataset) -> Path:
+    """An archive of a dataset, with the attributes that the command gives it."""
+    attributes = {
+        "Conventions": "CF-1.11",
+        "history": "made by a test",
+        "schema_version": SCHEMA_VERSION,
+        "packages": ["numpy 2", "scipy 1"],
+        "run_seconds": 1.25,
+    }
+    path = folder / "study.nc"
+    write_archive(path, dataset.assign_attrs(attributes))
+    return path
+
+
+class Reader(HTMLParser):
+    """Tags with their attributes, and the text between them."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.text = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in ("meta", "br", "wbr", "link", "img"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not self.open or self.open[-1] != "style":
+            self.text += data
+
+
+def check_standing_alone(page: str) -> Reader:
+    """No script, nothing from outside, every tag closed; what it links to is inside."""
+    reader = Reader(page)
+    assert reader.open == []
+    for tag, attributes in reader.tags:
+        assert tag not in ("script", "link", "img", "iframe", "object", "base", "form")
+        for name, value in attributes.items():
+            assert not name.startswith("on")
+            if name in ("src", "href", "xlink:href", "action"):
+                assert value is not None and value.startswith(("#", "data:image/png"))
+    assert not re.search(r"url\((?!['\"]?#)|@import|javascript:", page)
+    return reader
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_report_of_every_kind(kind: str, tmp_path: Path) -> None:
+    sweep = scenes.pace(kind) if scenes.PACE[kind] else 'mass = { of = "carriage.table.mass", values = [1, 2] }'
+    dataset = scenes.run(kind, sweep)
+    page = write_report(archive(tmp_path, dataset), tmp_path / "out")
+    assert page == tmp_path / "out" / PAGE
+    reader = check_standing_alone(page.read_text(encoding="utf-8"))
+    drawn = running.figures(dataset)
+    assert sum(tag == "svg" for tag, _ in reader.tags) == len(drawn) > 0
+    for figure in drawn:
+        assert figure.title in reader.text and figure.caption in reader.text
+        for ending, start in ((".svg", b"<?xml"), (".png", b"\x89PNG")):
+            (file,) = page.parent.glob(f"*-{figure.name}{ending}")
+            assert file.read_bytes().startswith(start)
+    for sentence in running.findings(dataset):
+        words = sentence.partition(": ")[2] or sentence
+        assert words.replace(MINUS, "-") in reader.text.replace(MINUS, "-")
+    for name in dataset.data_vars:
+        assert str(name) in reader.text
+    for text in ("midspan", "210 GPa", "numpy 2, scipy 1", "1.25 s", str(dataset.attrs["study_sha256"])):
+        assert text in reader.text
+
+
+@pytest.mark.parametrize("kind", ["passage", "double-peak"])
+def test_hostile_titles_are_text(kind: str, tmp_path: Path) -> None:
+    page = write_report(archive(tmp_path, scenes.run(kind, title=HOSTILE)), tmp_path / "out")
+    text = page.read_text(encoding="utf-8")
+    reader = check_standing_alone(text)
+    assert HOSTILE in reader.text and "{{7*7}}" in text and "&lt;script&gt;" in text
+    names = sorted(path.name for path in page.parent.iterdir())
+    assert all(re.fullmatch(r"\d\d-[a-z0-9-]+\.(svg|png)|report\.html", name) for name in names)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "study.nc"]
+
+
+def test_failed_variants_are_counted_with_their_message(tmp_path: Path) -> None:
+    dataset = scenes.with_failures(scenes.run("passage", scenes.pace("passage")), 2)
+    page = write_report(archive(tmp_path, dataset), tmp_path / "out")
+    reader = check_standing_alone(page.read_text(encoding="utf-8"))
+    assert "the march left the finite numbers; no values" in reader.text
+    assert "2 diverged (left out)" in reader.text
+    assert not re.search(r"\bnan\b", reader.text.replace("NaN where", ""))
+
+
+def test_the_same_archive_gives_the_same_page(tmp_path: Path) -> None:
+    source = archive(tmp_path, scenes.run("passage", scenes.pace("passage")))
+    pages = [write_report(source, tmp_path / name).read_bytes() for name in ("one", "two")]
+    assert pages[0] == pages[1]
+    assert write_report(source, tmp_path / "one").read_bytes() == pages[0]
+
+
+def test_places_that_cannot_be_written_are_refused_before_anything_is_drawn(tmp_path: Path) -> None:
+    source = archive(tmp_path, scenes.run("passage"))
+    with pytest.raises(BadInput, match="no such file"):
+        write_report(tmp_path / "nothing.nc", tmp_path / "out")
+    with pytest.raises(BadInput, match="folder is a file"):
+        write_report(source, source)
+    with pytest.raises(BadInput, match="does not exist"):
+        write_report(source, tmp_path / "a" / "b")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
+    source = archive(tmp_path, scenes.run("passage"))
+    content = source.read_bytes()
+    source.write_bytes(content[: len(content) // 2])
+    with pytest.raises(ArchiveError, match=str(source)):
+        write_report(source, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_disk_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = archive(tmp_path, scenes.run("passage", scenes.pace("passage")))
+
+    class Full(files.Faults):
+        count = 0
+
+        def before(self, operation: str, path: Path) -> None:
+            if operation == "write":
+                self.count += 1
+                if self.count == 3:
+                    raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files, "FAULTS", Full())
+    with pytest.raises(OutputFailed, match="No space left"):
+        write_report(source, tmp_path / "out")
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert len(written) == 2 and PAGE not in written

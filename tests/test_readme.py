@@ -1,0 +1,27 @@
+"""The README tells the truth: its table of results, and its study file."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+from engine.plan import make_plan
+from engine.scene import load
+from studies.study import kind_of
+from tests.readme import README
+
+
+def test_the_table_of_results_is_the_declarations() -> None:
+    """In a process of its own: tests declare kinds too."""
+    made = "import tests.readme as r; t = r.README.read_text(); import sys; sys.exit(t != r.with_declarations(t))"
+    finished = subprocess.run([sys.executable, "-c", made], cwd=README.parent, check=False)
+    assert finished.returncode == 0, "run: python -m tests.readme"
+
+
+def test_the_study_file_runs() -> None:
+    text = README.read_text(encoding="utf-8")
+    block = next(block for block in re.findall(r"```toml\n(.*?)```", text, re.S) if "schema_version" in block)
+    study = load(block)
+    kind = kind_of(study)
+    assert make_plan(study, reduction=kind.reduction(study)).size == 160
