@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from results_schema.variables import Variable
 
 if TYPE_CHECKING:
@@ -29,9 +27,9 @@ def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
     ratios = []
     for sensor in study.sensor:
-        largest = np.maximum(abs(dataset[f"{sensor}_max"]), abs(dataset[f"{sensor}_min"]))
+        largest, smallest = (abs(dataset[f"{sensor}_{side}"]) for side in ("max", "min"))
         static = dataset[f"{sensor}_static"]
-        ratios.append((largest / static.where(static > 0.0)).drop_vars("sensor", errors="ignore"))
+        ratios.append(largest.where(largest > smallest, smallest) / static.where(static > 0.0))
     joined = xr.concat(ratios, "sensor").transpose(*dataset["status"].dims, "sensor")
     return dataset.assign(
         dynamic_amplification=(joined.dims, joined.values, DYNAMIC_AMPLIFICATION.attributes()),

@@ -36,7 +36,7 @@ BESIDE: Mapping[str, Any] = {
     "borderpad": 0.0,
 }
 WIDTH = 7.6  # inches: the width of the page's column
-STYLE: Mapping[str, Any] = {
+STYLE: Any = {
     "text.parse_math": False,
     "text.color": INK,
     "font.family": "DejaVu Sans",
@@ -87,7 +87,7 @@ class Figure:
 
 def draw(name: str, title: str, caption: str, height: float, fill: Callable[[Drawing], None]) -> Figure:
     """A figure of the page's width and `height` inches, filled by `fill` in the common look."""
-    with matplotlib.rc_context(dict(STYLE)):
+    with matplotlib.rc_context(STYLE):
         drawing = Drawing(figsize=(WIDTH, height), layout="constrained")
         FigureCanvasAgg(drawing)
         fill(drawing)
@@ -127,7 +127,7 @@ def svg(figure: Figure) -> str:
 def png(figure: Figure) -> bytes:
     """The figure as PNG, 200 dots per inch."""
     stream = io.BytesIO()
-    with matplotlib.rc_context(dict(STYLE)):
+    with matplotlib.rc_context(STYLE):
         _settle(figure)
         figure.drawing.savefig(stream, format="png", dpi=200, metadata={"Software": None})
     return stream.getvalue()

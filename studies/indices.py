@@ -45,9 +45,9 @@ class Asymmetry(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """count (...): prominent peaks in the cycle. value, phase (K, ...): of the K highest, by phase, then NaN."""
+    """number (...): prominent peaks in the cycle. value, phase (K, ...): of the K highest, by phase, then NaN."""
 
-    count: Array
+    number: Array
     value: Array
     phase: Array
 

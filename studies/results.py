@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 VARIANT = "variant"
+PACES = (".motion.frequency", ".motion.speed")
 Index = tuple[int, ...]
 
 
@@ -167,6 +168,15 @@ class Results:
 
         full = xr.broadcast(xr.DataArray(values), self.dataset["status"])[0].transpose(*self.dims)
         return np.asarray(full.values, dtype=np.float64)
+
+    def deciding_axis(self, variable: str, sensor: str) -> Axis | None:
+        """The axis, other than the pace of the motion, along which a result changes most; the mass in doubt."""
+        values, pace = self.of_sensor(variable, sensor), self.axis(*PACES)
+        axes = [axis for axis in self.axes if axis is not pace and len(axis.values) > 1]
+        if not axes or VARIANT in self.dims:
+            return self.axis(".mass")
+        axes.sort(key=lambda axis: not axis.sets(".mass"))
+        return max(axes, key=lambda axis: float((values.max(axis.dim) - values.min(axis.dim)).fillna(0.0).mean()))
 
     def holds_up_to(self, axis: Axis, holds: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
         """The largest value of an axis up to which something holds in every known variant; None if nowhere.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
@@ -74,10 +74,10 @@ def kind_of(study: Study) -> Kind:
 
 def run(study: Study, **options: Any) -> xr.Dataset:
     """Run a study in memory: the dataset of its archive. options: as of `engine.run`. Raises BadInput."""
-    import engine
+    from engine.run import run as march
 
     kind = kind_of(study)
-    return finish(engine.run(study, reduction=kind.reduction(study), **options), study)
+    return finish(march(study, reduction=kind.reduction(study), **options), study)
 
 
 def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
@@ -118,19 +118,3 @@ def sensor_units(study: Study) -> dict[str, str]:
     from results_schema.variables import sensor_unit
 
     return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
-
-
-def findings(dataset: xr.Dataset) -> list[str]:
-    """The answer of a finished study in sentences, from its dataset alone."""
-    from studies.results import Results
-
-    results = Results.of(dataset)
-    return kind_named(results.study.kind).findings(results)
-
-
-def figures(dataset: xr.Dataset) -> Sequence[Figure]:
-    """The figures of a finished study, from its dataset alone."""
-    from studies.results import Results
-
-    results = Results.of(dataset)
-    return kind_named(results.study.kind).figures(results)

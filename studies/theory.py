@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 CYCLE_POINTS = 720
+ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 ONE_PEAK = 1 / 8
 NEARLY = 0.01  # of the length: what counts as the middle
 LONG_SWING = 0.45  # of the length: an amplitude that reaches the ends
@@ -108,13 +109,16 @@ def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
 def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
     beam from one end to the other and the sensor is at midspan."""
+    from engine.bodies import Beam
     from engine.motions import Sinusoidal
 
     body, motion = results.study.body[results.carriage.on], results.carriage.motion
     mass = _coordinate(results, "mass_ratio")
     swept = {path for axis in results.axes for path in axis.paths}
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
-    if mass is None or swept & fixed or not isinstance(motion, Sinusoidal) or body.supports != "pinned-pinned":
+    if mass is None or swept & fixed or not isinstance(motion, Sinusoidal):
+        return None
+    if not isinstance(body, Beam) or body.supports != "pinned-pinned":
         return None
     at = results.study.sensor[sensor].at
     if at is None or motion.amplitude < LONG_SWING * body.length:
@@ -127,11 +131,13 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
 def end_spring_difference(results: Results, sensor: str) -> Array | None:
     """(E I/L^3)|1/k_a - 1/k_b| for every variant; None unless a beam stands on two springs at its ends and the sensor
     is at midspan. One peak per slow cycle instead of two where it is above 1/8."""
+    from engine.bodies import Beam
+
     name = results.carriage.on
     body, at = results.study.body[name], results.study.sensor[sensor].at
     key = f"body.{name}"
     varied = any(path == f"{key}.length" or path.endswith(".at") for axis in results.axes for path in axis.paths)
-    if isinstance(body.supports, str) or len(body.supports) != 2 or varied or at is None:
+    if not isinstance(body, Beam) or isinstance(body.supports, str) or len(body.supports) != 2 or varied or at is None:
         return None
     ends = sorted(spring.at for spring in body.supports)
     if ends != [0.0, body.length] or abs(at / body.length - 0.5) > NEARLY:
@@ -139,7 +145,7 @@ def end_spring_difference(results: Results, sensor: str) -> Array | None:
     if any(spring.rotational for spring in body.supports):
         return None
     first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
-    bending = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
+    bending: Any = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
     return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
 
 

@@ -13,7 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.results import VARIANT, Axis, Index, Results, chosen, extreme
+from studies.results import PACES, Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
 from studies.words import MINUS, counted, listed, number, percent
 
@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
-ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 MOST_SENSORS = 3
 MOST_GROUPS = 4
-PACES = (".motion.frequency", ".motion.speed")
 NEAR = 0.15  # how close a harmonic must be to be named as the cause
 SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
 SYMMETRIC = 0.05  # odd over even harmonics below which the two halves of a cycle are alike
@@ -107,7 +105,7 @@ class DoublePeakReduction:
         history = indices.evenly(cycle.phase, cycle.history)
         peaks, amplitudes = indices.peaks(history), indices.harmonics(history)
         return {
-            "peaks_per_cycle": peaks.count.T,
+            "peaks_per_cycle": peaks.number.T,
             "peak_value": peaks.value.T,
             "peak_phase": peaks.phase.T,
             "odd_even_ratio": indices.odd_even_ratio(amplitudes).T,
@@ -210,24 +208,13 @@ def _slowest(results: Results, ratio: Array) -> NDArray[np.bool_]:
     return np.asarray(along == along.min())
 
 
-def deciding_axis(results: Results, sensor: str) -> Axis | None:
-    """The axis, other than the pace of the motion, along which the number of peaks changes most; the mass in doubt."""
-    counts = results.of_sensor("peaks_per_cycle", sensor)
-    pace = results.axis(*PACES)
-    axes = [axis for axis in results.axes if axis is not pace and len(axis.values) > 1]
-    if not axes or VARIANT in results.dims:
-        return results.axis(".mass")
-    axes.sort(key=lambda axis: not axis.sets(".mass"))
-    return max(axes, key=lambda axis: float((counts.max(axis.dim) - counts.min(axis.dim)).mean()))
-
-
 def _breaks(results: Results, sensor: str) -> list[str]:
     """Up to which frequency ratio there are exactly two peaks, for each mass, and which harmonic breaks the pattern."""
     counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
         return []
-    group = deciding_axis(results, sensor)
+    group = results.deciding_axis("peaks_per_cycle", sensor)
     if group is None:
         return [f"{sensor}: {_break(results, ratio, counts, known)}."]
     along = results.everywhere(results.dataset[group.name])
@@ -259,7 +246,7 @@ def _break(results: Results, ratio: Array, counts: Array, among: NDArray[np.bool
     if mass is None:
         return text
     own = np.array([float(results.everywhere(mass)[place])])
-    lines = {order: float(theory.breakdown(results, own, order)[0]) for order in ORDERS}
+    lines = {order: float(theory.breakdown(results, own, order)[0]) for order in theory.ORDERS}
     near = min(lines, key=lambda order: abs(np.log(lines[order] / first)))
     if abs(lines[near] / first - 1.0) > NEAR:
         return text

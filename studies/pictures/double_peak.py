@@ -26,7 +26,6 @@ from studies.figures import (
     logarithmic,
     shades,
 )
-from studies.kinds.double_peak import ORDERS, deciding_axis
 from studies.pictures.traces import picked
 from studies.results import Index, Results, chosen
 from studies.views import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
@@ -50,7 +49,7 @@ def pictures(results: Results) -> list[Figure]:
     seen = view(results, SPEEDS, MASSES)
     if seen.x is not None:
         for sensor in sensors:
-            axis = deciding_axis(results, sensor)
+            axis = results.deciding_axis("peaks_per_cycle", sensor)
             own = view(results, SPEEDS, axis.paths) if axis is not None else seen
             found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
         found.append(_gain(seen, sensors))
@@ -165,7 +164,7 @@ def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
         return
     along = np.linspace(max(low, 0.0), high, 100) if mass is not None else np.array([low, high])
     own = along if mass is not None else np.full(2, held)
-    for order in ORDERS:
+    for order in theory.ORDERS:
         ratio = theory.breakdown(results, own, order)
         if ratio.max() < left or ratio.min() > right:
             continue

@@ -9,15 +9,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from studies import figures, views
-from studies import study as running
+from studies import answers, figures, views
 from studies.results import Results
 from tests.studies import scenes
 
 KINDS = tuple(scenes.MOTIONS)
 MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
 DAMPING = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
-RENDERED = ("none", "two axes")  # rendering takes a second each
+RENDERED = ("no pace",)  # rendering takes a second each
 LENGTHS = 'area = { of = "body.bed.area", from = 0.01, to = 0.02, count = 3 }'
 
 
@@ -46,7 +45,7 @@ def test_any_sweep_can_be_drawn(kind: str, shape: str) -> None:
     dataset = scenes.run(kind, sweeps(kind)[shape])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = running.figures(dataset)
+        found = answers.figures(dataset)
         for figure in found:
             assert figure.title and figures.plain_name(figure.name) == figure.name
             if shape in RENDERED:
@@ -61,7 +60,7 @@ def test_failed_variants_are_left_out_and_counted(kind: str, every: int) -> None
     dataset = scenes.with_failures(scenes.run(kind, sweep), every)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = running.figures(dataset)
+        found = answers.figures(dataset)
         texts = [figures.svg(figure) for figure in found if every == 2]
     assert not any(re.search(r"\bnan\b", text) for text in texts)
     counted = [figure for figure in found if "diverged (left out)" in figure.caption]
@@ -70,7 +69,7 @@ def test_failed_variants_are_left_out_and_counted(kind: str, every: int) -> None
 
 def test_the_lag_is_drawn_with_its_theory() -> None:
     dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 1.0, 5)}\n{DAMPING}")
-    figure = next(figure for figure in running.figures(dataset) if figure.name == "lag")
+    figure = next(figure for figure in answers.figures(dataset) if figure.name == "lag")
     axes = figure.drawing.axes[0]
     solid = [line for line in axes.get_lines() if line.get_linestyle() == "-" and len(line.get_xdata()) == 5]
     dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--" and len(line.get_xdata()) == 5]
@@ -103,7 +102,7 @@ def test_a_view_says_what_it_holds() -> None:
 
 def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
     dataset = scenes.run("passage", scenes.pace("passage"))
-    found = running.figures(dataset)
+    found = answers.figures(dataset)
     identifiers = [set(re.findall(r'\bid="([^"]+)"', figures.svg(figure))) for figure in found]
     assert len(identifiers) > 1 and not set.intersection(*identifiers)
     for figure in found:

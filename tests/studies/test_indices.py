@@ -33,7 +33,7 @@ def test_peaks_are_those_of_the_twin(seed: int, stations: int) -> None:
     found = indices.peaks(cycles)
     for lane in range(5):
         expected = naive.peaks(cycles[:, 0, lane].tolist())
-        assert found.count[0, lane] == len(expected) > 0
+        assert found.number[0, lane] == len(expected) > 0
         kept = sorted(sorted(expected, key=lambda peak: -peak.value)[: indices.PEAKS])
         for place, peak in enumerate(kept):
             # a parabola moves a peak by up to half a station, and never down
@@ -49,7 +49,7 @@ def test_a_parabola_finds_a_peak_between_stations() -> None:
     stations, at = 400, 0.12345
     phase = np.arange(stations) / stations
     found = indices.peaks(np.cos(2 * np.pi * (phase - at))[:, None, None])
-    assert found.count[0, 0] == 1
+    assert found.number[0, 0] == 1
     assert found.phase[0, 0, 0] == pytest.approx(at, abs=1e-6)
     assert found.value[0, 0, 0] == pytest.approx(1.0, abs=1e-8)
     assert np.isnan(found.value[1:]).all()
@@ -59,14 +59,14 @@ def test_a_parabola_finds_a_peak_between_stations() -> None:
 def test_a_bump_counts_from_two_percent_of_the_range_on(height: float, count: int) -> None:
     """A triangle from 0 to 1 with a bump on its falling side."""
     cycle = np.interp(np.arange(400), [0, 100, 200, 210, 220, 400], [0, 1, 0.5, 0.5 + height, 0.45, 0])
-    assert indices.peaks(cycle[:, None]).count[0] == count
+    assert indices.peaks(cycle[:, None]).number[0] == count
     assert len(naive.peaks(cycle.tolist())) == count
 
 
 def test_flat_tops_and_constant_cycles() -> None:
     flat = np.array([0.0, 1.0, 1.0, 0.0, 0.5, 0.5, 0.5, 0.0])
-    assert indices.peaks(flat[:, None]).count[0] == len(naive.peaks(flat.tolist())) == 2
-    assert indices.peaks(np.full((16, 1), 3.0)).count[0] == 0
+    assert indices.peaks(flat[:, None]).number[0] == len(naive.peaks(flat.tolist())) == 2
+    assert indices.peaks(np.full((16, 1), 3.0)).number[0] == 0
 
 
 @settings(max_examples=20, deadline=None)

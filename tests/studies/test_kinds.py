@@ -11,6 +11,7 @@ import pytest
 import studies
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
+from studies import answers
 from studies import study as running
 from studies.results import Results
 from tests.studies import scenes
@@ -27,7 +28,7 @@ def test_all_kinds_are_found_by_their_files() -> None:
 
 
 def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
-    with pytest.raises(BadInput, match='unknown kind of study.*did you mean "asymmetry"'):
+    with pytest.raises(BadInput, match=r'unknown kind of study.*did you mean "asymmetry"'):
         studies.run(scenes.study("asymmetry").with_values({"kind": "asymetry"}))
 
 
@@ -128,13 +129,13 @@ def test_amplification_is_largest_over_static() -> None:
 
 
 def said(kind: str, sweep: str = "", **options: str) -> str:
-    return "\n".join(running.findings(scenes.run(kind, sweep, **options)))
+    return "\n".join(answers.findings(scenes.run(kind, sweep, **options)))
 
 
 def test_findings_of_an_asymmetry_name_the_largest_and_its_place() -> None:
     damping = 'damping_ratio = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
     dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 2.0, 6)}\n{damping}")
-    text = "\n".join(running.findings(dataset))
+    text = "\n".join(answers.findings(dataset))
     odd = dataset.odd_rms
     assert text.startswith(("Yes: ", "Hardly: "))
     assert f"{float(odd.max()) * 100:.2g} % of the" in text
@@ -167,7 +168,7 @@ def test_loaded_frequency_is_the_closed_form_of_a_shuttle() -> None:
 def test_findings_of_a_double_peak_follow_the_data() -> None:
     mass = 'mass = { of = "carriage.table.mass", values = [50, 200] }'
     dataset = scenes.run("double-peak", f"{scenes.pace('double-peak', 1, 16, 16)}\n{mass}")
-    text = "\n".join(running.findings(dataset))
+    text = "\n".join(answers.findings(dataset))
     counts = dataset.peaks_per_cycle.sel(sensor="midspan")
     assert (counts == 2).any() and (counts != 2).any()
     first = float(dataset.frequency_ratio.broadcast_like(counts).where(counts != 2).min())
@@ -177,7 +178,7 @@ def test_findings_of_a_double_peak_follow_the_data() -> None:
 def test_findings_of_a_passage_tell_where_the_contact_opens() -> None:
     mass = 'mass = { of = "carriage.table.mass", values = [10, 600] }'
     dataset = scenes.run("passage", f"{scenes.pace('passage', 2, 40, 8)}\n{mass}")
-    text = "\n".join(running.findings(dataset))
+    text = "\n".join(answers.findings(dataset))
     opened = (dataset.table_contact_force_min < 0).sel(mass=600)
     assert opened.any() and not opened.all()
     assert f"first at {float(dataset.pace.values[opened.values][0]):.3g} m/s" in text
@@ -192,7 +193,7 @@ def test_findings_of_a_trajectory() -> None:
 def test_failed_variants_are_left_out_and_counted(kind: str) -> None:
     sweep = scenes.pace(kind) if scenes.PACE[kind] else 'mass = { of = "carriage.table.mass", values = [1, 2, 3, 4] }'
     dataset = scenes.with_failures(scenes.run(kind, sweep), 2)
-    text = "\n".join(running.findings(dataset))
+    text = "\n".join(answers.findings(dataset))
     assert "2 diverged (left out)" in text and "nan" not in text.lower().replace("dominan", "")
-    everything = "\n".join(running.findings(scenes.with_failures(dataset, 1)))
+    everything = "\n".join(answers.findings(scenes.with_failures(dataset, 1)))
     assert "4 diverged (left out)" in everything and "nan" not in everything.lower()

@@ -12,7 +12,7 @@ import pytest
 from results_schema import files
 from results_schema.archive import SCHEMA_VERSION, write_archive
 from results_schema.errors import ArchiveError, BadInput, OutputFailed
-from studies import study as running
+from studies import answers
 from studies.report import PAGE, write_report
 from tests.studies import scenes
 
@@ -85,14 +85,14 @@ def test_report_of_every_kind(kind: str, tmp_path: Path) -> None:
     page = write_report(archive(tmp_path, dataset), tmp_path / "out")
     assert page == tmp_path / "out" / PAGE
     reader = check_standing_alone(page.read_text(encoding="utf-8"))
-    drawn = running.figures(dataset)
+    drawn = answers.figures(dataset)
     assert sum(tag == "svg" for tag, _ in reader.tags) == len(drawn) > 0
     for figure in drawn:
         assert figure.title in reader.text and figure.caption in reader.text
         for ending, start in ((".svg", b"<?xml"), (".png", b"\x89PNG")):
             (file,) = page.parent.glob(f"*-{figure.name}{ending}")
             assert file.read_bytes().startswith(start)
-    for sentence in running.findings(dataset):
+    for sentence in answers.findings(dataset):
         words = sentence.partition(": ")[2] or sentence
         assert words.replace(MINUS, "-") in reader.text.replace(MINUS, "-")
     for name in dataset.data_vars:
@@ -122,10 +122,9 @@ def test_failed_variants_are_counted_with_their_message(tmp_path: Path) -> None:
 
 
 def test_the_same_archive_gives_the_same_page(tmp_path: Path) -> None:
-    source = archive(tmp_path, scenes.run("passage", scenes.pace("passage")))
-    pages = [write_report(source, tmp_path / name).read_bytes() for name in ("one", "two")]
+    source = archive(tmp_path, scenes.run("passage"))
+    pages = [write_report(source, tmp_path / "out").read_bytes() for _ in range(2)]
     assert pages[0] == pages[1]
-    assert write_report(source, tmp_path / "one").read_bytes() == pages[0]
 
 
 def test_places_that_cannot_be_written_are_refused_before_anything_is_drawn(tmp_path: Path) -> None:

@@ -1,0 +1,241 @@
+"""The kernels themselves: no index out of range, the same numbers without the compiler, one tie as many, the cache."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine.march
+from engine.kernels import jit
+from engine.kernels.march import march_many
+from engine.run import run
+from engine.scene import Study
+from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, under
+
+ROOT = Path(__file__).parents[2]
+QUANTITIES = ("displacement", "velocity", "acceleration", "bending_moment", "shear_force")
+SPRINGS = [{"at": 0.0, "stiffness": 60.0}, {"at": 1.0, "stiffness": 90.0, "damping": 0.5}]
+
+
+def small(name: str) -> Study:
+    """Small studies that reach every branch of the kernels: one tie and three, sensors of every kind, events, steps
+    of one station, mode counts that are and are not multiples of four."""
+    sensors = {quantity: fixed(0.31, quantity) for quantity in QUANTITIES}
+    sensors |= {f"below_{quantity}": under("car", quantity) for quantity in QUANTITIES}
+    sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 0.5, "count": 18}}
+    given: dict[str, Any] = {"sensor": sensors, "output": {"histories": "all"}, "sweep": sweep}
+    short = cruise(-0.1, 1.1, 0.9, after=0.02)
+    if name == "one":
+        return study(beam(modes=3), mass(0.3, short), **given, solver={"steps": 12})
+    if name == "quiet":
+        return study(beam(modes=4), mass(0.3, short), sweep=sweep, solver={"steps": 1})
+    if name == "turning":
+        return study(beam(modes=2), mass(0.3, shuttle(0.2, 0.8, 1.0, 0.0, 2)), **given, solver={"steps": 6})
+    riding = {"car": mass(0.3, short), "next": force(2.0, cruise(1.0, 0.0, 1.1), delay=0.2)}
+    return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 9})
+
+
+NAMES = ("one", "quiet", "turning", "many")
+SCRIPT = """
+import json, sys
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+import engine.march
+from engine.run import run
+from tests.engine.test_kernels import numbers_of, small
+print(json.dumps({name: numbers_of(run(small(name), threads=1)) for name in sys.argv[3:]}))
+if sys.argv[2] == "break":  # histories go to a row that is not there
+    sampled = engine.march.rows_sampled
+    engine.march.rows_sampled = lambda *given: np.where(sampled(*given) >= 0, 10**9, -1)
+    try:
+        run(small("one"), threads=1)
+    except IndexError:
+        sys.exit(0)
+    sys.exit("nothing was noticed")
+"""
+
+
+def numbers_of(dataset: Any) -> dict[str, list[float]]:
+    """Every floating-point result."""
+    return {
+        str(name): array.values.ravel().tolist()
+        for name, array in dataset.data_vars.items()
+        if array.dtype == np.float64 and "position" not in str(name)
+    }
+
+
+def in_a_process(end: str, names: tuple[str, ...], **environment: str) -> dict[str, dict[str, list[float]]]:
+    """Small studies in a process of its own, which at its end may "break" a kernel."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, str(ROOT), end, *names],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    found: dict[str, dict[str, list[float]]] = json.loads(done.stdout)
+    assert set(found) == set(names)
+    return found
+
+
+def assert_same(found: dict[str, dict[str, list[float]]], tolerance: float) -> None:
+    """The same numbers as in this process, within a part of each result's size; NaN in the same places."""
+    compared = 0
+    for name, results in found.items():
+        expected = numbers_of(run(small(name), threads=1))
+        assert set(results) == set(expected)
+        for key, values in expected.items():
+            one, two = np.array(results[key]), np.array(values)
+            np.testing.assert_array_equal(np.isnan(one), np.isnan(two))
+            numbers = np.isfinite(two)
+            size = np.abs(two[numbers]).max(initial=0.0)
+            np.testing.assert_allclose(one[numbers], two[numbers], rtol=0, atol=tolerance * size, equal_nan=False)
+            compared += int(numbers.sum())
+    assert compared > 3000
+
+
+def test_no_index_out_of_range(tmp_path: Path) -> None:
+    """Fault 23: compiled with checks of every index, which do find one that is out of range."""
+    checked = {"NUMBA_BOUNDSCHECK": "1", "NUMBA_OPT": "0", "WANDERLAST_CACHE": str(tmp_path)}
+    assert_same(in_a_process("break", NAMES, **checked), 1e-11)
+
+
+def test_the_same_without_the_compiler(tmp_path: Path) -> None:
+    plain = {"NUMBA_DISABLE_JIT": "1", "WANDERLAST_CACHE": str(tmp_path)}
+    assert_same(in_a_process("break", NAMES, **plain), 1e-11)
+
+
+@pytest.fixture
+def copied_cache(tmp_path: Path) -> Path:
+    """A copy of this process' compiled kernels, in a cache folder of its own."""
+    run(small("one"))
+    run(small("many"))
+    here = Path(jit._FOLDER)
+    shutil.copytree(here, tmp_path / here.name)
+    return tmp_path
+
+
+def test_a_damaged_cache_is_rebuilt(copied_cache: Path) -> None:
+    """Fault 36: every compiled kernel and one index replaced by garbage; the next process finds a whole cache."""
+    data, index = list(copied_cache.rglob("*.nbc")), list(copied_cache.rglob("*.nbi"))
+    assert len(data) >= 2
+    for file in (*data, index[0]):
+        file.write_bytes(b"not a kernel")
+    assert_same(in_a_process("end", ("one",), WANDERLAST_CACHE=str(copied_cache)), 0.0)
+    whole = [file for file in copied_cache.rglob("*.nbc") if file.read_bytes() != b"not a kernel"]
+    assert len(whole) >= 2
+
+
+CACHE_SCRIPT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+sys.path.insert(0, sys.argv[2])
+from engine.kernels import jit
+import a_kernel
+print(a_kernel.twice(3.0), jit._FOLDER, sep="\\n")
+"""
+
+
+@pytest.mark.parametrize("place", ["/dev/null/kernels", "a file", "a link"])
+def test_an_unwritable_cache_folder(tmp_path: Path, place: str) -> None:
+    """Another private folder takes its place, and kernels compile."""
+    root = tmp_path / "cache"
+    if place == "a file":
+        root.write_text("in the way")
+    elif place == "a link":
+        root.mkdir()
+        (tmp_path / "elsewhere").mkdir()
+        (root / jit.cache_folder().name).symlink_to(tmp_path / "elsewhere")
+    else:
+        root = Path(place)
+    source = """
+        from engine.kernels.jit import kernel
+
+        @kernel
+        def twice(x):
+            return 2.0 * x
+        """
+    (tmp_path / "a_kernel.py").write_text(textwrap.dedent(source))
+    done = subprocess.run(
+        [sys.executable, "-c", CACHE_SCRIPT, str(ROOT), str(tmp_path)],
+        env=os.environ | {"WANDERLAST_CACHE": str(root)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    value, folder = done.stdout.split()
+    assert float(value) == 6.0
+    assert not Path(folder).is_relative_to(root)
+    assert list((tmp_path / "elsewhere").glob("*") if place == "a link" else []) == []
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.mark.parametrize("name", ["one", "quiet", "turning"])
+def test_one_tie_is_many_with_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = numbers_of(run(small(name), threads=1))
+    monkeypatch.setattr(engine.march, "march_one", march_many)
+    found = numbers_of(run(small(name), threads=1))
+    compared = 0
+    for key, values in expected.items():
+        one, two = np.array(found[key]), np.array(values)
+        np.testing.assert_array_equal(np.isnan(one), np.isnan(two))
+        numbers = np.isfinite(two)
+        size = np.abs(two[numbers]).max(initial=0.0)
+        np.testing.assert_allclose(one[numbers], two[numbers], rtol=0, atol=1e-11 * size, equal_nan=False)
+        compared += int(numbers.sum())
+    assert compared > 100
+
+
+def test_policy() -> None:
+    """Contract-only fastmath, no parallel loops, and no name of a kernel that the policy does not know."""
+    for source in sorted(Path(jit.__file__).parent.glob("*.py")):
+        text = source.read_text()
+        assert "prange" not in text
+        assert "parallel=True" not in text
+        if source.name != "jit.py":
+            assert "numba" not in text.replace("numba's", "")
+    options = march_many.targetoptions  # type: ignore[attr-defined]
+    assert options["fastmath"] == {"contract"}
+    assert options["nogil"]
+
+
+def test_kernel_hash_is_of_the_sources(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = jit.kernel_hash()
+    assert before == jit.kernel_hash()
+    read = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + (b" " if self.name == "march.py" else b""))
+    assert jit.kernel_hash() != before
+
+
+def test_settled_accelerations_satisfy_the_equations() -> None:
+    """The first station of a mass on a moving beam: contact force m (g - D2w) with the accelerations that it causes."""
+    sensors = {"w": under("car"), "a": under("car", "acceleration")}
+    given = study(
+        beam(modes=1),
+        mass(0.5, cruise(0.5, 1.0, 1.0)),
+        sensor=sensors,
+        output={"histories": "all"},
+        solver={"steps": 10},
+        initial="equilibrium",
+    )
+    ds = run(given)
+    # one mode, phi = sqrt 2 sin(pi s): q = m g phi/omega^2, curve s'^2 phi'' q = -pi^2 phi q at s = 1/2
+    q = 0.5 * 9.81 * math.sqrt(2.0) / math.pi**4
+    curve = -(math.pi**2) * math.sqrt(2.0) * q
+    acceleration = curve / (1.0 + 0.5 * 2.0)
+    assert float(ds.a[0]) == pytest.approx(acceleration, rel=1e-12)
+    assert float(ds.car_contact_force_max) >= 0.5 * (9.81 - acceleration) * (1.0 - 1e-12)
