@@ -12,14 +12,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from engine.execution import run
     from engine.plan import Plan, make_plan
-    from engine.run import run
     from engine.scene import Study, load
 
 _HOMES = {
     "Study": "engine.scene",
     "load": "engine.scene",
-    "run": "engine.run",
+    "run": "engine.execution",
     "Plan": "engine.plan",
     "make_plan": "engine.plan",
 }

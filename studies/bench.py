@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.execution import execute, march_seconds, warm_up
 from engine.plan import make_plan
-from engine.run import execute, march_seconds, warm_up
 from engine.scene import Study
 
 BEST_OF = 7

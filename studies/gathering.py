@@ -37,7 +37,7 @@ class Gatherer:
             self.flush()
 
     def add(self, variants: np.ndarray, arrays: Mapping[str, np.ndarray], selected: Rows | None) -> None:
-        """Take one chunk; as the sink of `engine.run.execute`."""
+        """Take one chunk; as the sink of `engine.execution.execute`."""
         self._chunks.append((Rows(variants, arrays), selected))
         self._bytes += sum(array.nbytes for array in arrays.values())
         if time.monotonic() - self._started >= SECONDS_PER_PART or self._bytes >= BYTES_PER_PART:

@@ -114,7 +114,7 @@ def _store(plan: Plan, archive: Path, options: RunOptions) -> PartStore:
 def _march(
     plan: Plan, store: PartStore, done: np.ndarray, options: RunOptions, progress: Progress | None, stop: Stop
 ) -> None:
-    from engine.run import execute
+    from engine.execution import execute
 
     if progress is not None:
         progress(int(done.size), plan.size)

@@ -74,7 +74,7 @@ def kind_of(study: Study) -> Kind:
 
 def run(study: Study, **options: Any) -> xr.Dataset:
     """Run a study in memory: the dataset of its archive. options: as of `engine.run`. Raises BadInput."""
-    from engine.run import run as march
+    from engine.execution import run as march
 
     kind = kind_of(study)
     return finish(march(study, reduction=kind.reduction(study), **options), study)

@@ -118,4 +118,4 @@ def _extreme(results: xr.Dataset, values: NDArray[np.float64], flat: np.intp) ->
     return Extreme(float(values.reshape(-1)[flat]), variant)
 
 
-_DERIVED = ("speed_ratio", "mass_ratio")
+_DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

@@ -23,12 +23,12 @@ STAGES = {
     "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics",
     "scenes as arrays": "timeline model track signals lanes fidelity tables",
     "all work of a study": "reduction plan histories",
-    "the run": "march outcome dataset run",
+    "the run": "march outcome dataset execution",
 }
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"}
 # Packages that only these modules of ours may import.
 ONLY_IN = {
-    "dask": ("engine.run",),
+    "dask": ("engine.execution",),
     "numba": ("engine.kernels",),
     "netCDF4": ("results_schema",),
     "click": ("studies",),

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 import engine.march
 from engine.dataset import Collector, build
+from engine.execution import execute, run
 from engine.lanes import LaneTable, LaneValues, to_blocks
 from engine.model import SceneModel
 from engine.plan import Plan, make_plan
-from engine.run import execute, run
 from engine.scene import Study
 from results_schema.errors import BadInput, Interrupted
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under

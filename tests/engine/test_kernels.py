@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import engine.march
+from engine.execution import run
 from engine.kernels import jit
 from engine.kernels.march import march_many
-from engine.run import run
 from engine.scene import Study
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, under
 
@@ -51,7 +51,7 @@ import json, sys
 import numpy as np
 sys.path.insert(0, sys.argv[1])
 import engine.march
-from engine.run import run
+from engine.execution import run
 from tests.engine.test_kernels import numbers_of, small
 print(json.dumps({name: numbers_of(run(small(name), threads=1)) for name in sys.argv[3:]}))
 if sys.argv[2] == "break":  # histories go to a row that is not there

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from engine.execution import run
 from engine.fidelity import MOST_STEPS, alias_steps, round_up
 from engine.plan import Plan, explain, make_plan
-from engine.run import run
 from engine.scene import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study

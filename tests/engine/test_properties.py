@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from engine.execution import run
 from engine.march import March, prepare
 from engine.plan import make_plan
-from engine.run import run
 from engine.scene import Study
 from tests.engine import twin
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under

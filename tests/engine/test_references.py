@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.run import run
+from engine.execution import run
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.naive import indices
 from tests.reference import closed_forms, values

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.run import run
+from engine.execution import run
 from engine.scene import Study
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.twin import Reading, Twin, march_twin

@@ -221,7 +221,7 @@ def test_workers_that_give_up_are_code_70(here: Path, capsys: Captured, monkeypa
     def give_up(*_: object, **__: object) -> None:
         raise WorkersGaveUp("no worker is left", remedy="run again to resume")
 
-    monkeypatch.setattr("engine.run.execute", give_up)
+    monkeypatch.setattr("engine.execution.execute", give_up)
     assert "no worker is left" in refused(capsys, "run", "small.toml", code=70)
 
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from engine.execution import march_seconds
 from engine.plan import Plan
-from engine.run import march_seconds
 from studies import bench
 from studies.bench import Scene, Throughput
 from studies.cli import main
