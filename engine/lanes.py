@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 #: Keys of numbers that a lane may have to itself.
 LANE_KEYS = re.compile(
-    r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?|carriage\.\w+\.(mass|force|delay|headway)"
+    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping)|carriage\.\w+\.(mass|force|delay|headway)"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
@@ -117,8 +117,8 @@ class LaneTable:
     """Numbers of whole blocks of variants of one scene, in SI units.
 
     omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mass, weight (blocks, ties, LANES): of the carriages, zero
-    for dampers and, mass, for carriages whose inertia does not act;  damper (ties,): N s/m;
-    time_scale, gravity (blocks, LANES).
+    for dampers and, mass, for carriages whose inertia does not act;  damper (blocks, ties, LANES): N s/m, zero for
+    carriages;  time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
@@ -135,7 +135,7 @@ class LaneTable:
         return Lanes(
             stiffness=(self.omega[:, None] * h) ** 2,
             damping=self.rates * h,
-            gain=self.mass + self.damper[:, None] * h,
+            gain=self.mass + self.damper * h,
             load=self.weight * h**2,
             gravity=self.gravity,
             step=step,
@@ -148,13 +148,13 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     none = np.zeros(values.size)
     masses = [none if c.inertia == "force" else values.moving_mass(c.name) for c in model.carriages]
     weights = [values.weight(c.name) for c in model.carriages]
-    dampers = [none] * len(model.dampers)
+    no_dampers, no_carriages = [none] * len(model.dampers), [none] * len(model.carriages)
     return LaneTable(
         omega=model.omega,
         rates=to_blocks(np.concatenate(rates)),
-        mass=to_blocks(np.stack(masses + dampers)),
-        weight=to_blocks(np.stack(weights + dampers)),
-        damper=np.array([0.0] * len(model.carriages) + [damper.coefficient for damper in model.dampers]),
+        mass=to_blocks(np.stack(masses + no_dampers)),
+        weight=to_blocks(np.stack(weights + no_dampers)),
+        damper=to_blocks(np.stack(no_carriages + [values.of(damper.key) for damper in model.dampers])),
         time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
         gravity=to_blocks(values.of("gravity")),
     )

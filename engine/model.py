@@ -5,7 +5,7 @@ A `SceneModel` is what variants share that differ only in mass, force, pace, dam
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -54,11 +54,11 @@ class CarriageTie:
 
 @dataclass(frozen=True, eq=False)
 class DamperTie:
-    """A damper to ground at a place of a body: force -c w'."""
+    """A damper to ground at a place of a body (m): force -c w'; c in N s/m stands at the dotted key."""
 
     body: int
     at: float
-    coefficient: float
+    key: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +112,15 @@ class SceneModel:
         return part.modal.own_weight_deflection(x, derivative)
 
 
-def build_model(study: Study, paces: Mapping[str, float], delays: Mapping[str, float]) -> SceneModel:
+def build_model(
+    study: Study, paces: Mapping[str, float], delays: Mapping[str, float], swept: Collection[str] = ()
+) -> SceneModel:
     """The model of a study without sweep.
 
     paces: per carriage, the first carriage's time scale over its own. delays: per carriage, in the first one's time
-    scale. Raises BadInput where the scene cannot be marched.
+    scale. swept: keys of numbers that differ between the variants that share the model. Raises BadInput where the
+    scene cannot be marched.
     """
-    if not study.carriage:
-        raise BadInput(
-            "nothing moves", where=study.source.where("carriage"), expected="at least one table [carriage.name]"
-        )
     used = [name for name in study.body if _in_use(study, name)]
     parts: list[BodyPart] = []
     first = 0
@@ -134,10 +133,22 @@ def build_model(study: Study, paces: Mapping[str, float], delays: Mapping[str, f
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
         carriages.append(CarriageTie(name, body, rider, _inertia(study.solver.fidelity, carriage.inertial)))
-    dampers = [DamperTie(i, at, c) for i, part in enumerate(parts) for at, c in part.modal.dampers]
+    dampers = [
+        DamperTie(number, at, f"body.{name}.{key}")
+        for number, name in enumerate(used)
+        for key, at, coefficient in study.body[name].dampers()
+        if coefficient > 0.0 or f"body.{name}.{key}" in swept
+    ]
     model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers))
     _check_rigid_modes(model)
     return model
+
+
+def check_moves(study: Study) -> None:
+    """Refuse a study without a carriage. Raises BadInput."""
+    if not study.carriage:
+        where = study.source.where("carriage")
+        raise BadInput("nothing moves", where=where, expected="at least one table [carriage.name]")
 
 
 def _in_use(study: Study, body: str) -> bool:

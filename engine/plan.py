@@ -17,7 +17,7 @@ from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.kernels.schemes import Scheme
 from engine.lanes import LANE_KEYS, LaneValues
-from engine.model import SceneModel, build_model
+from engine.model import SceneModel, build_model, check_moves
 from engine.reduction import Reduction
 from engine.scene import Study
 from engine.sweep import Cases, expand
@@ -172,6 +172,7 @@ class Plan:
 
 def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
+    check_moves(study)
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"
     buckets = tuple(
@@ -202,7 +203,7 @@ def _scenes(study: Study, cases: Cases) -> Iterator[tuple[SceneModel, Counts]]:
         if np.any(columns != columns[:, :1]):
             codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
         for part in _split(np.arange(variants.size), codes):
-            yield build_model(own, *_timing_of(values, int(part[0]))), variants[part]
+            yield build_model(own, *_timing_of(values, int(part[0])), cases.paths), variants[part]
 
 
 def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:

@@ -70,6 +70,10 @@ class Body(Spec):
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""
 
+    def dampers(self) -> list[tuple[str, float, float]]:
+        """Discrete dampers to ground: key within the body, place (m), coefficient (N s/m)."""
+        return []
+
 
 class Beam(Body):
     """A uniform beam. SI units; `supports` names both ends or lists springs, between which all is free.
@@ -116,6 +120,9 @@ class Beam(Body):
     def springs(self) -> tuple[Spring, ...]:
         """Springs to ground; none where the ends are named."""
         return () if isinstance(self.supports, str) else self.supports
+
+    def dampers(self) -> list[tuple[str, float, float]]:
+        return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
 
     @model_validator(mode="after")
     def _list_of_ratios(self) -> Beam:
