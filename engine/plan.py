@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,16 +98,6 @@ class Plan:
         """Expected time of the march on one thread."""
         return float(sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets))
 
-    @property
-    def numbers_per_variant(self) -> int:
-        """Floating-point results of one variant."""
-        sensors, carriages = len(self.study.sensor), len(self.study.carriage)
-        found = 6 * sensors + 4 * carriages + 4
-        if self.reduction is not None:
-            sizes = self.reduction.sizes(self.study)
-            found += sum(int(np.prod([sizes[d] for d in dims])) for dims in self.reduction.outputs(self.study).values())
-        return found
-
     @cached_property
     def reads_accelerations(self) -> bool:
         """Whether the kind of study keeps the accelerations of the carriages."""
@@ -141,12 +132,12 @@ class Plan:
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
         shown = int(self.shown.size) * self.stations_shown * (len(self.study.sensor) + 2)
-        return 8 * (self.size * self.numbers_per_variant + shown) + 65536
+        return 8 * (self.size * numbers_per_variant(self.study, self.reduction) + shown) + 65536
 
     @property
     def memory_bytes(self) -> int:
         """Expected peak: results, a chunk per thread, and the program itself."""
-        return 300 * 2**20 + 3 * self.disk_bytes + 8 * MOST_HISTORY_BYTES
+        return needed_memory(self.disk_bytes)
 
     def lanes_per_chunk(self, bucket: Bucket) -> int:
         """Variants of one task, by time and memory."""
@@ -174,21 +165,42 @@ def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
     check_moves(study)
     cases = expand(study)
+    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction))
     window: Window = "whole" if reduction is None else "last-cycle"
     buckets = tuple(
         bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window)
     )
     base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
-    if plan.memory_bytes > MOST_MEMORY:
+    check_memory(study, plan.size, plan.disk_bytes)
+    return plan
+
+
+def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
+    """Numbers of 8 bytes that are kept of one variant, besides histories."""
+    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 4
+    if reduction is not None:
+        sizes = reduction.sizes(study)
+        found += sum(prod(sizes[dim] for dim in dims) for dims in reduction.outputs(study).values())
+    return found
+
+
+def needed_memory(result_bytes: int) -> int:
+    """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
+    return 300 * 2**20 + 3 * result_bytes + 8 * MOST_HISTORY_BYTES
+
+
+def check_memory(study: Study, size: int, result_bytes: int) -> None:
+    """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
+    needed = needed_memory(result_bytes)
+    if needed > MOST_MEMORY:
         raise BadInput(
             "the study does not fit into memory",
             where=study.source.where("sweep"),
             expected=f"at most {MOST_MEMORY / 2**30:.0f} GiB",
-            received=f"{plan.memory_bytes / 2**30:.1f} GiB for {plan.size} variants",
+            received=f"{needed / 2**30:.1f} GiB for {size} variants",
             remedy="fewer variants or sensors, or fewer histories",
         )
-    return plan
 
 
 def _scenes(study: Study, cases: Cases) -> Iterator[tuple[SceneModel, Counts]]:
