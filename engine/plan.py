@@ -5,7 +5,7 @@ Scene, step count and bucket of a variant are functions of that variant alone, s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -255,22 +255,38 @@ def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
 def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) -> Iterator[Bucket]:
     """Variants of one scene by their step counts."""
     values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
+    steps, reasons = _steps(scene, values)
+    for part in _split(np.arange(variants.size), steps):
+        tables = SceneTables(scene, int(steps[part[0]]), window)
+        _check_readings(scene, tables)
+        yield Bucket(tables, variants[part], reasons(part))
+
+
+def _steps(scene: SceneModel, values: LaneValues) -> tuple[Counts, Callable[[Counts], str]]:
+    """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
     scheme = Scheme(*scene.study.solver.newmark)
     time_scale = values.time_scale(scene.carriages[0].name)
     if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
         steps = values.of("solver.steps").astype(np.int64)
         check_most_steps(scene, steps)
         check_fixed_steps(scene, scheme, time_scale, steps)
-        for part in _split(np.arange(variants.size), steps):
-            yield Bucket(SceneTables(scene, int(steps[part[0]]), window), variants[part], "as the study says")
-        return
+        return steps, lambda part: "as the study says"
     distinct, inverse = np.unique(time_scale, return_inverse=True)
     needs = needed_steps(scene, scheme, distinct)
     check_most_steps(scene, needs.total)
-    steps = round_up(needs.total)[inverse]
-    for part in _split(np.arange(variants.size), steps):
-        reason = _reason(needs, inverse[part])
-        yield Bucket(SceneTables(scene, int(steps[part[0]]), window), variants[part], reason)
+    return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
+
+
+def _check_readings(scene: SceneModel, tables: SceneTables) -> None:
+    """Refuse a sensor under a carriage that is never on its body while anything is recorded. Raises BadInput."""
+    for sensor in tables.sensors:
+        seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
+        if not seen:
+            raise BadInput(
+                "the carriage is off its body for all of the recorded part, so the sensor reads nothing",
+                where=scene.study.source.where(f"sensor.{sensor.name}.under"),
+                expected="a carriage on its body",
+            )
 
 
 def _reason(needs: Needs, lanes: Counts) -> str:

@@ -60,11 +60,11 @@ class Rider:
     def path(self, tau: Array, start: float, end: float) -> Path:
         """Position and its derivatives by scene time on a segment without a break inside, one-sided at its ends."""
         first, last = (self._own(t) for t in (start, end))
-        own = first + (tau - start) / (end - start) * (last - first)
         middle = 0.5 * (first + last)  # and not an end, which rounding may put on the other side
         if not 0.0 < middle < self.motion.duration:
             place = self.motion.path(0.0 if middle <= 0.0 else self.motion.duration).S
             return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
+        own = first + (tau - start) / (end - start) * (last - first)
         found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
         return Path(found.S, found.dS * self.pace, found.ddS * self.pace**2)
 
@@ -234,7 +234,9 @@ def build_timeline(riders: tuple[Rider, ...], steps: int, window: Window, free_s
         before = head.active
     free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
     if free > 0.0:
-        segments += _free_vibration(segments[-1], math.ceil(free * free_steps), recorded[1] == end)
+        parked = tuple(rider.stays and rider.touches(end, end) for rider in riders)
+        last = segments[-1]._replace(active=parked, recorded=recorded[1] == end)
+        segments += _free_vibration(last, math.ceil(free * free_steps))
     kept = [segment for segment in segments if segment.recorded]
     span = (kept[0].first, kept[-1].first + kept[-1].steps)
     repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
@@ -253,11 +255,11 @@ def _between(riders: tuple[Rider, ...], ends: tuple[float, float], steps: int, c
     ]
 
 
-def _free_vibration(last: Segment, total: int, recorded: bool) -> list[Segment]:
-    """Slices after the end of the scene, with no carriage on any body."""
-    gone, count = tuple(False for _ in last.active), last.first + last.steps
+def _free_vibration(last: Segment, total: int) -> list[Segment]:
+    """Slices after the end of the scene; who stands on a body and what is recorded is as ``last`` says."""
+    count = last.first + last.steps
     return [
-        Segment(last.end, last.end, stop - first, count + first, gone, first == 0, (), recorded, True)
+        Segment(last.end, last.end, stop - first, count + first, last.active, first == 0, (), last.recorded, True)
         for first, stop in pairwise(_slices(total))
     ]
 

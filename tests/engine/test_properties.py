@@ -18,7 +18,8 @@ from engine.plan import make_plan
 from engine.scene import Study
 from tests.engine import twin
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
-from tests.engine.twin import Reading, march_twin
+from tests.engine.reading import Reading
+from tests.engine.twin import march_twin
 from tests.naive import newmark, ode
 from tests.naive import scene as scenes
 

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from engine.execution import run
 from engine.motions import Cruise, OutAndBack, Sinusoidal
+from engine.plan import make_plan
 from engine.reduction import Cycle
 from engine.scene import Study
 from engine.timeline import MOST_STATIONS, Rider, build_timeline
+from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.reference import closed_forms
 
@@ -183,3 +185,47 @@ def test_static_slope_of_a_reduction() -> None:
             np.testing.assert_allclose(cycle.static_slope[n, :, 0], 2.0 * np.array([midspan, moment, below]), atol=1e-8)
             compared += 1
     assert compared > 50
+
+
+def test_a_parked_carriage_stays_through_free_vibration() -> None:
+    """After the last motion the standing mass still bends the beam: strongly damped, its static deflection remains."""
+    parked = mass(0.5, shuttle(0.5, 0.3, 2.0, 0.1, 1))
+    given = study(
+        beam(damping_ratio=0.3),
+        {"parked": parked, "car": force(1.0, cruise(0.0, 1.0, 1.0, after=8.0))},
+        sensor={"midspan": fixed(0.5)},
+        gravity=10.0,
+        output={"histories": "all"},
+        solver={"steps": 2000},
+    )
+    ds = run(given)
+    assert float(ds.midspan[-1]) == pytest.approx(0.5 * 10.0 / 48.0, rel=1e-6)
+
+
+class Nothing:
+    """A reduction that wants the last cycle and computes nothing."""
+
+    stations = 100
+
+    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
+        return {}
+
+    def sizes(self, study: Study) -> Mapping[str, int]:
+        return {}
+
+    def __call__(self, cycle: Cycle) -> dict[str, Array]:
+        return {}
+
+
+def test_a_sensor_that_never_reads_is_refused() -> None:
+    given = study(
+        beam(),
+        {
+            "first": mass(0.1, shuttle(0.3, 0.8, 1.0, 0.1, 3)),
+            "early": force(1.0, cruise(0.0, 1.0, 5.0)),
+        },
+        sensor={"below": under("early")},
+    )
+
+    with pytest.raises(BadInput, match="reads nothing"):
+        make_plan(given, reduction=Nothing())

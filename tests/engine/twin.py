@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -290,81 +290,3 @@ def march_on_sag(
         now = heavy(scene, bed, gravity, t[n], side)
         forces.append(scenes.contact_forces(now, t[n], states[n], accelerations[n], side))
     return replace(found, contact_force=np.array(forces))
-
-
-DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """A sensor of a study on a twin."""
-
-    study: Study
-    twin: Twin
-    sensor: Any
-
-    @cached_property
-    def place(self) -> Array:
-        """Where it reads at every instant, m; NaN where it does not."""
-        if self.sensor.under is None:
-            return np.full(self.twin.history.t.shape, self.sensor.at)
-        return self.twin.history.position[:, self.twin.riders.index(self.sensor.under)]
-
-    @property
-    def values(self) -> Array:
-        """(S,) what it reads."""
-        if self.sensor.quantity in DERIVATIVE:
-            history = self.twin.history
-            read = zip(self.place, history.position, history.q, history.v, history.contact_force, strict=True)
-            return np.array([math.nan if math.isnan(x) else self._state(float(x), *rest) for x, *rest in read])
-        return np.array([math.nan if math.isnan(x) else self._rate(n) for n, x in enumerate(self.place)])
-
-    @property
-    def values_before(self) -> list[float]:
-        """What it reads just before events, where the history has the values just after them."""
-        found = []
-        for event in self.twin.history.before:
-            phases = [load.phase(event.t, "left") for load in self.twin.scene.loads]
-            position = np.array([math.nan if phase is None else phase.s(event.t) for phase in phases])
-            under = self.sensor.under
-            x = self.sensor.at if under is None else float(position[self.twin.riders.index(under)])
-            if not math.isnan(x):
-                q = self.twin.history.q[event.step]
-                found.append(self._state(x, position, q, event.v, event.contact_force))
-        return found
-
-    def _state(self, x: float, position: Array, q: Array, v: Array, contact_force: Array) -> float:
-        bed, order = self.twin.bed, DERIVATIVE[self.sensor.quantity]
-        value = float(bed.phi(x, order) @ q) + self.twin.gravity * bed.sag(x, order)
-        if self.study.solver.static_correction:
-            for s, force in zip(position, contact_force, strict=True):
-                if not math.isnan(s):
-                    value += bed.missed(x, float(s), order) * float(force)
-            for damper, (at, c) in zip(self.twin.scene.dampers, bed.dampers, strict=True):
-                value -= bed.missed(x, at, order) * c * float(damper.row @ v)
-        if order == 0:
-            return value
-        table: Any = self.study.body[self.study.body_of(self._name)]
-        lever = table.fibre_distance / table.second_moment if self.sensor.quantity == "stress" else 1.0
-        return -bed.stiffness * lever * value
-
-    @property
-    def _name(self) -> str:
-        return next(name for name, sensor in self.study.sensor.items() if sensor is self.sensor)
-
-    def _rate(self, n: int) -> float:
-        bed, history, x = self.twin.bed, self.twin.history, float(self.place[n])
-        row = bed.phi(x, 0)
-        if self.sensor.under is None:
-            return float(row @ (history.v if self.sensor.quantity == "velocity" else history.a)[n])
-        load = self.twin.scene.loads[self.twin.riders.index(self.sensor.under)]
-        t = float(history.t[n])
-        phase = load.phase(t, "right" if n < len(history.t) - 1 else "left")
-        assert phase is not None
-        ds, dds = phase.ds(t), phase.dds(t)
-        slope, bend = bed.phi(x, 1), bed.phi(x, 2)
-        own = [self.twin.gravity * bed.sag(x, j) for j in (1, 2)]
-        if self.sensor.quantity == "velocity":
-            return float(row @ history.v[n] + ds * (slope @ history.q[n])) + ds * own[0]
-        curve = float((ds**2 * bend + dds * slope) @ history.q[n]) + ds**2 * own[1] + dds * own[0]
-        return float(row @ history.a[n] + 2.0 * ds * (slope @ history.v[n])) + curve
