@@ -162,8 +162,10 @@ class ContactForce:
     def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         way, carriage = along[self.carriage], model.carriages[self.carriage]
+        if not way.active:
+            return np.zeros(way.s.size, dtype=np.bool_)
         low, high = span_counted(model, carriage.rider, carriage.body)
-        return np.asarray(way.active & (way.s >= low) & (way.s <= high))
+        return np.asarray((way.s >= low) & (way.s <= high))
 
 
 Signal = Sensor | ContactForce

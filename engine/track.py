@@ -71,7 +71,9 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], newmark: Newmark) -
     inertial = np.array([carriage.inertia != "force" for carriage in model.carriages] + [False] * len(model.dampers))
     rows[..., CLOSED] = np.where(inertial, rows[..., FORCE], 0.0)
     rows[1:, ..., CLOSED] += newmark.gamma * rows[1:, ..., RATE] + newmark.beta * rows[1:, ..., CURVE]
-    return Ties(np.ascontiguousarray(rows), drive)
+    reacts = inertial.copy()
+    reacts[len(model.carriages) :] = True
+    return Ties(np.ascontiguousarray(rows), drive, np.flatnonzero(reacts), np.flatnonzero(~reacts))
 
 
 def _tabulate_carriage(model: SceneModel, carriage: CarriageTie, way: Way, rows: Array, drive: Array) -> None:

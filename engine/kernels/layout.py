@@ -28,10 +28,13 @@ class Ties(NamedTuple):
            implicit part.
     drive: (stations, ties): the same kinematics of the track's own unevenness (per unit gravity where it is the
            body's sag).
+    reacting, given: numbers of the ties whose force depends on the motion, and of those that are dead loads.
     """
 
     rows: FloatArray
     drive: FloatArray
+    reacting: IntArray
+    given: IntArray
 
 
 class Lanes(NamedTuple):

@@ -186,50 +186,62 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
 
 
 @piece
-def gather_ties(sums, factor, work, rows, n, k):
-    """Add mode k to the sums of every tie's equation at station n."""
-    for r in range(rows.shape[2]):
+def gather_ties(sums, factor, work, ties, n, k):
+    """Add mode k to the sums of every reacting tie's equation at station n."""
+    rows = ties.rows
+    for i in range(sums.shape[0]):
+        r = ties.reacting[i]
         w, rate, curve = rows[n, k, r, CLOSED], rows[n, k, r, RATE], rows[n, k, r, CURVE]
         for j in range(LANES):
-            sums[r, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
-        for s in range(rows.shape[2]):
+            sums[i, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
+        for s in range(factor.shape[1]):
             wp = w * rows[n, k, s, FORCE]
             for j in range(LANES):
-                factor[r, s, j] += wp * work[k, D, j]
+                factor[i, s, j] += wp * work[k, D, j]
 
 
 @piece
 def close_ties(b, sums, factor, ties, lanes, block, n):
     """Solve (I + gain w.(D p)) F = load + gain (sum - drive) of one block and clear the sums.
 
-    Gauss without pivoting: the matrix is the identity plus a product that is positive wherever the march is stable.
+    Dead loads go to the right-hand side. Gauss without pivoting: the matrix is the identity plus a product that is
+    positive wherever the march is stable.
     """
     count = sums.shape[0]
-    for r in range(count):
+    for s in range(ties.given.shape[0]):
+        for j in range(LANES):
+            b[TIE + ties.given[s], j] = lanes.load[block, ties.given[s], j]
+    for i in range(count):
+        r = ties.reacting[i]
         drive = ties.drive[n, r]
         for j in range(LANES):
             gain = lanes.gain[block, r, j]
-            b[TIE + r, j] = lanes.load[block, r, j] + gain * (sums[r, j] - drive * b[GRAVITY, j])
-            sums[r, j] = 0.0
-        for s in range(count):
+            b[TIE + r, j] = lanes.load[block, r, j] + gain * (sums[i, j] - drive * b[GRAVITY, j])
+            sums[i, j] = 0.0
+        for s in range(factor.shape[1]):
             one = 1.0 if r == s else 0.0
             for j in range(LANES):
-                factor[r, s, j] = one + lanes.gain[block, r, j] * factor[r, s, j]
-    for r in range(count):
-        for s in range(r + 1, count):
+                factor[i, s, j] = one + lanes.gain[block, r, j] * factor[i, s, j]
+        for s in range(ties.given.shape[0]):
             for j in range(LANES):
-                ratio = factor[s, r, j] / factor[r, r, j]
-                factor[s, r, j] = ratio
-                b[TIE + s, j] -= ratio * b[TIE + r, j]
-            for t in range(r + 1, count):
+                b[TIE + r, j] -= factor[i, ties.given[s], j] * b[TIE + ties.given[s], j]
+    for i in range(count):
+        r = ties.reacting[i]
+        for m in range(i + 1, count):
+            for j in range(LANES):
+                ratio = factor[m, r, j] / factor[i, r, j]
+                factor[m, r, j] = ratio
+                b[TIE + ties.reacting[m], j] -= ratio * b[TIE + r, j]
+            for t in range(i + 1, count):
                 for j in range(LANES):
-                    factor[s, t, j] -= factor[s, r, j] * factor[r, t, j]
-    for r in range(count - 1, -1, -1):
-        for s in range(r + 1, count):
+                    factor[m, ties.reacting[t], j] -= factor[m, r, j] * factor[i, ties.reacting[t], j]
+    for i in range(count - 1, -1, -1):
+        r = ties.reacting[i]
+        for m in range(i + 1, count):
             for j in range(LANES):
-                b[TIE + r, j] -= factor[r, s, j] * b[TIE + s, j]
+                b[TIE + r, j] -= factor[i, ties.reacting[m], j] * b[TIE + ties.reacting[m], j]
         for j in range(LANES):
-            b[TIE + r, j] /= factor[r, r, j]
+            b[TIE + r, j] /= factor[i, r, j]
     factor[:] = 0.0
 
 
@@ -255,8 +267,8 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
     b = np.zeros((TIE + many, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     force = np.empty(LANES)
-    sums = np.zeros((many, LANES))
-    factor = np.zeros((many, many, LANES))
+    sums = np.zeros((ties.reacting.shape[0], LANES))
+    factor = np.zeros((ties.reacting.shape[0], many, LANES))
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, newmark, block)
         copy_marks(marks, record.marks[block])
@@ -264,7 +276,7 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
         sums[:] = 0.0
         factor[:] = 0.0
         for k in range(modes):
-            gather_ties(sums, factor, work, rows, 1, k)
+            gather_ties(sums, factor, work, ties, 1, k)
         for n in range(1, stations):
             close_ties(b, sums, factor, ties, lanes, block, n)
             if n == stations - 1:
@@ -280,7 +292,7 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
                     now[k, Q_NOW, j] = q
                     now[k, V_NOW, j] = v
                     now[k, A_NOW, j] = a
-                gather_ties(sums, factor, work, rows, m, k)
+                gather_ties(sums, factor, work, ties, m, k)
             observe(marks, now, b, watch, n, 0)
             keep(marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)

@@ -59,27 +59,34 @@ def settle(ties, lanes, state):
     The row w of station 0 holds P alone. F = load - gain (P.a + A.v + B.u + drive), a = p F - c v - k u.
     """
     rows = ties.rows
-    modes, many = rows.shape[1], rows.shape[2]
-    matrix = np.empty((many, many))
+    modes, many, reacting = rows.shape[1], rows.shape[2], ties.reacting.shape[0]
+    matrix = np.empty((reacting, reacting))
+    unknown = np.empty(reacting)
     force = np.empty(many)
     for block in range(lanes.step.shape[0]):
         for j in range(LANES):
             h = lanes.step[block, j]
             for r in range(many):
+                force[r] = lanes.load[block, r, j]
+            for i in range(reacting):
+                r = ties.reacting[i]
                 gain = lanes.gain[block, r, j]
                 total = -ties.drive[0, r] * lanes.gravity[block, j]
-                for s in range(many):
-                    matrix[r, s] = 0.0
+                for t in range(reacting):
+                    matrix[i, t] = 1.0 if i == t else 0.0
                 for k in range(modes):
                     inertial, rate, curve = tie_row(rows, k, r)
                     u, v = state.q[block, k, j], state.v[block, k, j] * h
                     elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
+                    for s in ties.given:
+                        elastic -= rows[0, k, s, FORCE] * force[s]
                     total += inertial * elastic - rate * v - curve * u
-                    for s in range(many):
-                        matrix[r, s] += gain * inertial * rows[0, k, s, FORCE]
-                matrix[r, r] += 1.0
-                force[r] = lanes.load[block, r, j] + gain * total
-            solve_in_place(matrix, force)
+                    for t in range(reacting):
+                        matrix[i, t] += gain * inertial * rows[0, k, ties.reacting[t], FORCE]
+                unknown[i] = lanes.load[block, r, j] + gain * total
+            solve_in_place(matrix, unknown)
+            for i in range(reacting):
+                force[ties.reacting[i]] = unknown[i]
             for k in range(modes):
                 u, v = state.q[block, k, j], state.v[block, k, j] * h
                 a = -lanes.damping[block, k, j] * v - lanes.stiffness[block, k, j] * u
