@@ -30,6 +30,7 @@ from results_schema.variables import declarations
 Counts = NDArray[np.int64]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
+START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
@@ -104,6 +105,17 @@ class Plan:
         names = {variable.name for variable in declarations(self.study.kind)}
         return "{carriage}_acceleration_across" in names
 
+    def total_seconds(self, threads: int) -> float:
+        """Expected wall time of a run: the march in whole blocks, tables and chunks, and starting up."""
+        found = START_SECONDS
+        for bucket in self.buckets:
+            lanes = LANES * -(-bucket.variants.size // LANES)
+            timeline = bucket.tables.timeline
+            tabulated = min(timeline.steps, bucket.steps) if timeline.repeats else timeline.steps
+            found += bucket.seconds_per_variant * lanes / threads
+            found += BUCKET_SECONDS + STATION_SECONDS * tabulated * bucket.scene.ties
+        return found
+
     def counts_shown(self, bucket: Bucket) -> Counts:
         """Stations of the kept histories of a bucket, by their count."""
         return counts_shown(bucket.tables.timeline, self.window, self.study.output.histories)
@@ -137,7 +149,7 @@ class Plan:
     @property
     def memory_bytes(self) -> int:
         """Expected peak: results, a chunk per thread, and the program itself."""
-        return needed_memory(self.disk_bytes)
+        return needed_memory(self.disk_bytes, self.reduction)
 
     def lanes_per_chunk(self, bucket: Bucket) -> int:
         """Variants of one task, by time and memory."""
@@ -165,14 +177,14 @@ def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
     check_moves(study)
     cases = expand(study)
-    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction))
+    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction), reduction)
     window: Window = "whole" if reduction is None else "last-cycle"
     buckets = tuple(
         bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window)
     )
     base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
-    check_memory(study, plan.size, plan.disk_bytes)
+    check_memory(study, plan.size, plan.disk_bytes, reduction)
     return plan
 
 
@@ -185,14 +197,15 @@ def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
     return found
 
 
-def needed_memory(result_bytes: int) -> int:
+def needed_memory(result_bytes: int, reduction: Reduction | None) -> int:
     """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
-    return 300 * 2**20 + 3 * result_bytes + 8 * MOST_HISTORY_BYTES
+    history_bytes = 0 if reduction is None else 6 * MOST_HISTORY_BYTES
+    return 300 * 2**20 + 3 * result_bytes + history_bytes
 
 
-def check_memory(study: Study, size: int, result_bytes: int) -> None:
+def check_memory(study: Study, size: int, result_bytes: int, reduction: Reduction | None) -> None:
     """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
-    needed = needed_memory(result_bytes)
+    needed = needed_memory(result_bytes, reduction)
     if needed > MOST_MEMORY:
         raise BadInput(
             "the study does not fit into memory",

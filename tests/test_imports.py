@@ -22,7 +22,7 @@ STAGES = {
     "numbers only": "kernels kernels.jit kernels.layout kernels.schemes kernels.record kernels.start kernels.march",
     "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics",
     "scenes as arrays": "timeline model track signals lanes fidelity tables",
-    "all work of a study": "reduction plan histories",
+    "all work of a study": "reduction plan histories remarks",
     "the run": "march outcome dataset execution",
 }
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"}

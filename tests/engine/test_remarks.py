@@ -1,0 +1,45 @@
+"""What is allowed and yet often a mistake is remarked; an ordinary study is not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from engine.plan import make_plan
+from engine.remarks import REMARKS, remarks
+from engine.scene import Study
+from tests.engine.build import beam, cruise, mass, study
+
+WAY = cruise(0.0, 1.0, 0.5)
+
+
+def passing(bed: Any = None, car: Any = None, **changes: Any) -> Study:
+    return study(bed or beam(), car or mass(0.1, WAY), gravity=0.1, **changes)
+
+
+CASES = {
+    "move away": passing(beam(supports="free-free")),
+    "released undeformed": passing(beam(own_weight=True)),
+    "leaves its body": passing(
+        car=mass(0.1, {"kind": "waypoints", "times": [0.0, 2.0, 5.0], "positions": [0.1, 0.99, 0.99]})
+    ),
+    "are the units right": passing(car=mass(0.1, cruise(0.0, 1.0, 50.0))),
+    "times its body": passing(car=mass(5.0, WAY)),
+    "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
+    "resonate with the march": passing(car=mass(0.5, cruise(0.0, 1.0, 2.5)), solver={"steps": 3}),
+    "in a first period": passing(solver={"steps": 30}),
+}
+
+
+@pytest.mark.parametrize("words", CASES)
+def test_remarked(words: str) -> None:
+    assert any(words in sentence for sentence in remarks(make_plan(CASES[words])))
+
+
+def test_an_ordinary_study_is_not_remarked() -> None:
+    assert remarks(make_plan(passing())) == []
+
+
+def test_every_remark_has_its_case() -> None:
+    assert len(CASES) == len(REMARKS)
