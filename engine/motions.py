@@ -13,7 +13,7 @@ from pydantic import Field, Strict, model_validator
 
 from engine.checks import Check, on_body
 from engine.law import Array, Motion, Path, Reversal, Side
-from engine.spec import KindOf, Spec
+from engine.spec import Hint, KindOf, Spec
 from engine.splines import spline_at_rest, spline_range, spline_touches
 from engine.units import Dimensionless, Frequency, Length, Speed, Time, fault
 
@@ -28,7 +28,7 @@ class Cruise(Motion):
     kind: Literal["cruise"]
     start: Length
     end: Length
-    speed: Speed = Field(gt=0)
+    speed: Annotated[Speed, Hint("end < start runs backward")] = Field(gt=0)
     after: Dimensionless = Field(default=0.0, ge=0, le=1e6)
 
     @property

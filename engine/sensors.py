@@ -10,6 +10,7 @@ from engine.spec import Spec, one_of
 from engine.units import Length, fault
 
 Quantity = Literal["displacement", "velocity", "acceleration", "bending_moment", "shear_force", "stress"]
+_MEANT = {"deflection": "displacement", "moment": "bending_moment", "shear": "shear_force"}
 
 
 class Sensor(Spec):
@@ -21,7 +22,7 @@ class Sensor(Spec):
     body: str | None = None
     at: Length | None = Field(default=None, ge=0)
     under: str | None = None
-    quantity: Annotated[str, AfterValidator(one_of(*get_args(Quantity)))] = "displacement"
+    quantity: Annotated[str, AfterValidator(one_of(*get_args(Quantity), meant=_MEANT))] = "displacement"
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:

@@ -85,8 +85,12 @@ class KindOf:
         raise ValidationError.from_exception_data(self.noun, [detail])
 
 
-def one_of(*words: str, planned: Sequence[str] = ()) -> Callable[[str], str]:
-    """Validator of a word out of a list, of which some are not built yet."""
+def one_of(*words: str, planned: Sequence[str] = (), meant: Mapping[str, str] | None = None) -> Callable[[str], str]:
+    """Validator of a word out of a list, of which some are not built yet.
+
+    meant: words that others use -> the one of the list.
+    """
+    others = meant or {}
 
     def check(word: str) -> str:
         if word in words:
@@ -94,7 +98,8 @@ def one_of(*words: str, planned: Sequence[str] = ()) -> Callable[[str], str]:
         expected = f"one of {', '.join(words)}"
         if word in planned:
             raise fault(f'"{word}" is not built yet', expected=expected, received=shortened(word))
-        remedy = nearest(word, [*words, *planned])
+        known = others.get(word.lower().replace("_", "-").replace(" ", "-"))
+        remedy = f'did you mean "{known}"?' if known else nearest(word, [*words, *planned])
         raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
 
     return check
@@ -111,6 +116,13 @@ def nearest(word: object, names: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
+class Hint:
+    """Annotation of a number: what to do where it is out of its bounds."""
+
+    remedy: str
+
+
+@dataclass(frozen=True)
 class FieldType:
     """Type and annotations of the place that a dotted key names."""
 
@@ -121,6 +133,11 @@ class FieldType:
     def unit(self) -> Unit | None:
         """The unit of the number, if the place holds one."""
         return next((note for note in _notes(self.annotation, self.metadata) if isinstance(note, Unit)), None)
+
+    @property
+    def hint(self) -> str:
+        """The remedy for a number out of its bounds, or ""."""
+        return next((note.remedy for note in _notes(self.annotation, self.metadata) if isinstance(note, Hint)), "")
 
     def describe(self) -> str:
         """What belongs there, in words, as far as annotations tell: "a length (m), > 0"."""
@@ -182,7 +199,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     except KeyError:
         received = shortened(detail["input"])
     words = get_args(place.annotation) if place and get_origin(place.annotation) is Literal else ()
-    remedy = nearest(detail["input"], [str(word) for word in words])
+    bound = any(name in context for _, name, _ in _BOUNDS)
+    remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
 
 

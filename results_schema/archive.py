@@ -113,21 +113,13 @@ def output_state(path: Path | str, study_sha256: str) -> OutputState:
     path = Path(path)
     if not path.exists():
         return "absent"
-    if not _is_hdf5(path):
+    if not files.is_hdf5(path):
         return "another study"
     with checked(path) as dataset:
         if getattr(dataset, "study_sha256", "") != study_sha256:
             return "another study"
         verify(path, dataset)
     return "same study, finished"
-
-
-def _is_hdf5(path: Path) -> bool:
-    try:
-        with path.open("rb") as stream:
-            return stream.read(4) == b"\x89HDF"
-    except OSError:
-        return False
 
 
 def describe(path: Path | str) -> Summary:

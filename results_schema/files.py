@@ -22,6 +22,7 @@ NETCDF_LOCK = threading.RLock()
 
 _TEMPORARY = ".wanderlast-tmp"
 _SIDECAR = ".sha256"
+_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class Faults:
@@ -59,17 +60,20 @@ def write_whole(path: Path | str, write: Callable[[Path], None]) -> None:
 
 def output_failed(path: Path, error: BaseException) -> OutputFailed:
     """The error for a failed operation on `path`, with the bytes that are free there."""
-    try:
-        free = shutil.disk_usage(path.parent).free
-    except OSError:
-        free = None
     reason = getattr(error, "strerror", None) or str(error)
     return OutputFailed(
         f"cannot write ({reason})",
         path=path,
-        free_bytes=free,
+        free_bytes=_free_bytes(path.parent),
         remedy="free some space or choose another place, then run again: finished work is kept",
     )
+
+
+def _free_bytes(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return None
 
 
 def _is_netcdf_failure(error: BaseException) -> bool:
@@ -175,8 +179,8 @@ def sidecar_matches(path: Path) -> bool:
 def check_output_place(path: Path | str) -> None:
     """Refuse a place where `path` could not be written, before anything is computed.
 
-    Raises BadInput when the folder is missing, read-only or a file, or when `path` itself is a folder, and
-    OutputFailed when the disk is full. Leaves nothing behind.
+    Raises BadInput when the folder is missing or a file, or when `path` itself is a folder, and OutputFailed when
+    the folder is read-only or the disk full. Leaves nothing behind.
     """
     path = Path(path)
     folder = path.parent
@@ -197,11 +201,49 @@ def check_output_place(path: Path | str) -> None:
         raise output_failed(path, error) from error
 
 
-def _read_only(folder: Path, error: OSError) -> BadInput:
-    return BadInput(
+def check_replaceable(path: Path | str) -> None:
+    """Refuse to put an archive in the place of anything that none has ever been. Raises BadInput."""
+    path = Path(path)
+    if path.exists() and not is_hdf5(path):
+        raise BadInput(
+            "what is there is no archive, and is never replaced",
+            where=str(path),
+            expected="no file, or a netCDF-4 file",
+            remedy="choose another place, or move it away",
+        )
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether this is a file that begins as every netCDF-4 (HDF5) file does."""
+    try:
+        # Only files: to open a pipe would wait for its other end.
+        if not path.is_file():
+            return False
+        with path.open("rb") as stream:
+            return stream.read(len(_HDF5_SIGNATURE)) == _HDF5_SIGNATURE
+    except OSError:
+        return False
+
+
+def check_free(folder: Path, needed: int, what: str) -> None:
+    """Refuse a disk with fewer than `needed` free bytes for `what`. Raises OutputFailed."""
+    free = _free_bytes(folder)
+    if free is not None and needed > free:
+        raise OutputFailed(
+            f"{what} would not fit on the disk",
+            path=folder,
+            free_bytes=free,
+            expected=f"{needed} bytes",
+            remedy="fewer variants, sensors or histories, or another place",
+        )
+
+
+def _read_only(folder: Path, error: OSError) -> OutputFailed:
+    return OutputFailed(
         "the output folder cannot be written",
-        where=str(folder),
+        path=folder,
+        free_bytes=_free_bytes(folder),
         expected="a writable folder",
         received=str(error.strerror),
-        remedy="choose another folder with -o",
+        remedy="choose another folder",
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -201,6 +202,23 @@ class PartStore:
         """Remove all parts: the archive is written."""
         files.remove_folder(self._folder)
         self._valid = {}
+
+
+def finished_so_far(archive_path: Path | str) -> int | None:
+    """Number of variants in the valid parts of an archive, None where it has no parts.
+
+    Only reads: another run may be at work there.
+    """
+    archive_path = Path(archive_path)
+    folder = archive_path.with_name(archive_path.name + ".parts")
+    if not folder.is_dir():
+        return None
+    found = [np.empty(0, np.int64)]
+    for path in sorted(folder.glob(f"*{_SUFFIX}")):
+        with suppress(ArchiveError):
+            if files.sidecar_matches(path):
+                found.append(_read_tables(path, [_VARIANTS])["/"].variants)
+    return int(np.unique(np.concatenate(found)).size)
 
 
 def _checked(rows: Rows) -> Rows:

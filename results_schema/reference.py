@@ -7,11 +7,13 @@ from results_schema.variables import AXES, EVERY_KIND, Variable, registered
 
 
 def reference_table() -> str:
-    """All declarations as a markdown table, for the README."""
+    """All results that are written as a markdown table, for the README; what most kinds share stands once."""
     rows = ["| variable | in | dimensions | type | unit | meaning |", "|---|---|---|---|---|---|"]
+    shared = registered()["march"]
     for kind, variables in registered().items():
-        where = {EVERY_KIND: "every kind", AXES: "coordinates"}.get(kind, kind)
-        rows += [_row(where, variable) for variable in variables]
+        where = {EVERY_KIND: "every kind", AXES: "coordinates", "march": "most kinds"}.get(kind, kind)
+        own = [variable for variable in variables if kind == "march" or variable not in shared]
+        rows += [_row(where, variable) for variable in own if not variable.planned]
     return "\n".join(rows) + "\n"
 
 

@@ -48,6 +48,7 @@ class Variable:
     lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
         (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
+    planned: no version writes it yet; left out of the table for people.
     gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
     """
 
@@ -61,6 +62,7 @@ class Variable:
     required: bool = True
     nan_allowed: bool = False
     gaps_allowed: bool = False
+    planned: bool = False
     lead: Literal["grid", "history", "none"] = "grid"
 
     def attributes(self) -> dict[str, Any]:
@@ -158,6 +160,10 @@ def _axis(name: str, long_name: str, units: str = "", dtype: str = "float64", me
     return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
 
 
+def _planned(name: str, long_name: str, units: str = "", dtype: str = "float64") -> Variable:
+    return replace(_axis(name, long_name, units, dtype), planned=True)
+
+
 declare(
     AXES,
     Variable(
@@ -185,14 +191,14 @@ declare(
     Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
     _axis("peak", "number of the peak in the cycle", dtype="int64"),
     _axis("mode", "number of the mode, from 1", dtype="int64"),
-    _axis("sample", "number of the variant that was run again", dtype="int64"),
-    _axis("scheme", "time integration scheme", dtype="str"),
-    _axis("step_count", "steps over one passage or cycle", dtype="int64"),
-    _axis("mode_count", "number of modes", dtype="int64"),
-    _axis("quantity", "measured quantity", dtype="str"),
-    _axis("relative_step", "omega_1 times the time step"),
-    _axis("robot", "robot", dtype="str"),
-    _axis("component", "component of the vector", dtype="str"),
+    _planned("sample", "number of the variant that was run again", dtype="int64"),
+    _planned("scheme", "time integration scheme", dtype="str"),
+    _planned("step_count", "steps over one passage or cycle", dtype="int64"),
+    _planned("mode_count", "number of modes", dtype="int64"),
+    _planned("quantity", "measured quantity", dtype="str"),
+    _planned("relative_step", "omega_1 times the time step"),
+    _planned("robot", "robot", dtype="str"),
+    _planned("component", "component of the vector", dtype="str"),
 )
 
 declare(
@@ -216,6 +222,7 @@ declare(
         "value of that sensor (velocity and acceleration: by their own largest value)",
         required=False,
         nan_allowed=True,
+        planned=True,
     ),
     *(
         Variable(
@@ -223,6 +230,7 @@ declare(
             long_name=f"part of the estimated relative error that comes from the {what}",
             required=False,
             nan_allowed=True,
+            planned=True,
         )
         for source, what in (("steps", "time step"), ("modes", "number of modes"), ("fidelity", "choice of model"))
     ),
@@ -241,7 +249,7 @@ def _extreme(which: str, word: str) -> tuple[Variable, Variable]:
             f"{{sensor}}_{which}_position",
             units="m",
             long_name=f"position of the first carriage at the {word} value of {{sensor}}",
-            meaning="NaN where the carriage was off the body",
+            meaning="whichever carriage the sensor belongs to; NaN where the first one was off its body",
             nan_allowed=True,
         ),
     )
@@ -337,6 +345,7 @@ declare(
         meaning="against the same variant at higher fidelity",
         lead="none",
         nan_allowed=True,
+        planned=True,
     ),
     Variable(
         "estimated_error",
@@ -345,6 +354,7 @@ declare(
         meaning="the estimate of the archive for the same variant",
         lead="none",
         nan_allowed=True,
+        planned=True,
     ),
 )
 

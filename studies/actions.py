@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from results_schema.errors import ArchiveError, BadInput
 from studies import catalogue, console
+from studies.words import counted
 
 if TYPE_CHECKING:
     from studies.bench import Throughput
@@ -70,6 +71,7 @@ def list_studies() -> None:
 
 def report(archive: Path, folder: Path | None) -> None:
     """Write the report of an archive."""
+    _refuse_unfinished(archive)
     from studies.report import write_report
 
     page = write_report(archive, folder or Path(f"{archive.name.removesuffix('.nc')}-report"))
@@ -78,12 +80,28 @@ def report(archive: Path, folder: Path | None) -> None:
 
 def info(archive: Path) -> None:
     """Print what is inside an archive. Raises ArchiveError, after that, where it is not whole."""
+    _refuse_unfinished(archive)
     from results_schema.archive import describe
 
     summary = describe(archive)
     console.show_archive(summary)
     if not summary.whole:
         raise ArchiveError(summary.damage)
+
+
+def _refuse_unfinished(archive: Path) -> None:
+    """Tell of an unfinished run where its archive is not there yet. Raises BadInput."""
+    from results_schema.parts import finished_so_far
+
+    if archive.exists() or (finished := finished_so_far(archive)) is None:
+        return
+    raise BadInput(
+        "not there yet; an unfinished run of it is",
+        where=str(archive),
+        expected="a finished archive",
+        received=f"parts with {counted(finished, 'finished variant')}",
+        remedy=f"wait for the run if one is at work, or go on from there: wanderlast run STUDY -o {archive}",
+    )
 
 
 def bench(modes: int, steps: int, variants: int, threads: int | None) -> Throughput:

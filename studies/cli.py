@@ -26,8 +26,9 @@ def commands() -> None:
 
     \b
     Exit codes: 0 fine; 2 bad input; 3 finished, but some variants carry a status other than ok;
-    4 damaged or foreign archive; 70 workers gave up; 74 input/output failed; 75 another run holds
-    the archive; 130 and 143 interrupted, finished work is kept; 1 a bug of our own.
+    4 damaged or foreign archive; 70 workers gave up; 74 input/output failed (disk full,
+    read-only); 75 another run holds the archive; 130 and 143 interrupted, finished work is kept;
+    1 a bug of our own.
     """
 
 
@@ -56,7 +57,7 @@ def check(study: str) -> None:
 @commands.command()
 @click.argument("study")
 @click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
-@click.option("--overwrite", is_flag=True, help="Replace what is there, and unfinished parts of another study.")
+@click.option("--overwrite", is_flag=True, help="Replace another archive, and unfinished parts of another study.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 @_THREADS
 @_JSON
@@ -75,6 +76,7 @@ def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
         console.say_json(summary.as_json(outcome, code))
     else:
         console.show_outcome(outcome)
+    console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))
     return code
 
 
@@ -94,7 +96,10 @@ def report(archive: Path, folder: Path | None) -> None:
 @commands.command()
 @click.argument("archive", type=_FILE)
 def info(archive: Path) -> None:
-    """Tell what is inside ARCHIVE and whether it is whole."""
+    """Tell what is inside ARCHIVE and whether it is whole.
+
+    Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
+    """
     from studies import actions
 
     actions.info(archive)

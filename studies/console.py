@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -53,6 +54,13 @@ def say(*lines: str) -> None:
         console.print(Text(printable(line, 10_000)), soft_wrap=True)
 
 
+def warn(*lines: str) -> None:
+    """Print lines on standard error."""
+    with suppress(OSError):
+        for line in lines:
+            click.echo(printable(line, 10_000), err=True)
+
+
 def say_json(content: Mapping[str, Any]) -> None:
     """Print one JSON object; numbers that are not finite as null."""
     _output().out(json.dumps(_finite(content), indent=2, allow_nan=False))
@@ -93,6 +101,8 @@ def show_preview(shown: Preview) -> None:
     for part in shown.tables:
         table(part.title, part.headings, part.rows)
     say(shown.cost)
+    if shown.remarks:
+        say("", "Worth knowing", *(f"- {remark}" for remark in shown.remarks))
 
 
 def show_studies(entries: Iterable[Entry], kinds: Iterable[tuple[str, str]]) -> None:

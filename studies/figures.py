@@ -28,6 +28,8 @@ BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "
 DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 SEQUENTIAL = "viridis"
 FEW_DECADES = 300.0
+ALIKE = 1e-6  # of the largest value: a smaller range is rounding
+FLAT = 0.05  # of the largest value, shown to either side of what is constant
 
 BESIDE: Mapping[str, Any] = {
     "loc": "upper left",
@@ -166,6 +168,15 @@ def is_logarithmic(values: NDArray[np.float64]) -> bool:
 def zero_line(axes: Axes) -> None:
     """A thin line at zero."""
     axes.axhline(0.0, color=MUTED, linewidth=0.7, zorder=1.5)
+
+
+def widen(axes: Axes, values: Sequence[NDArray[np.float64]]) -> None:
+    """A vertical axis on which values that differ by rounding alone look constant, with short numbers at its ticks."""
+    known = np.concatenate([row[np.isfinite(row)] for row in values])
+    largest = float(np.abs(known).max(initial=0.0))
+    if known.size and largest > 0.0 and float(np.ptp(known)) < ALIKE * largest:
+        middle = float(known.mean())
+        axes.set_ylim(middle - FLAT * largest, middle + FLAT * largest)
 
 
 def note(axes: Axes, text: str) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from engine.lanes import LaneValues
 from engine.plan import Bucket, Plan, explain
+from engine.remarks import remarks
 from studies.words import counted, number, unit_text
 
 Array = NDArray[np.float64]
@@ -29,20 +30,21 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Preview:
-    """What `check` tells: tables, and a last line with the cost."""
+    """What `check` tells: tables, a line with the cost, and what is worth knowing beside it."""
 
     tables: tuple[Table, ...]
     cost: str
+    remarks: tuple[str, ...]
 
 
 def preview(plan: Plan, threads: int) -> Preview:
     """The explanation of a plan for so many threads; computes nothing large."""
     tables = (_study(plan), _bodies(plan), _sweep(plan), _ratios(plan), _work(plan))
     cost = (
-        f"About {duration(plan.seconds / threads)} on {counted(threads, 'thread')} for the march, at most "
+        f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
         f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk."
     )
-    return Preview(tuple(table for table in tables if table.rows), cost)
+    return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks(plan)))
 
 
 def duration(seconds: float) -> str:

@@ -5,7 +5,6 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,7 +37,7 @@ class Outcome:
     """What became of a run.
 
     results: the archive's root. resumed: variants that an earlier start had finished. was_finished: there was
-    nothing to do. seconds: of this run.
+    nothing to do. seconds: of this run. remarks: what is worth knowing about a study that was run.
     """
 
     archive: Path
@@ -46,6 +45,7 @@ class Outcome:
     resumed: int
     was_finished: bool
     seconds: float
+    remarks: tuple[str, ...] = ()
 
 
 def run_to_archive(
@@ -53,19 +53,23 @@ def run_to_archive(
 ) -> Outcome:
     """Run a study and write its archive, or find it finished there.
 
-    Raises BadInput before anything is computed or written; Interrupted, OutputFailed and ArchiveBusy with finished
-    work kept; ArchiveError when this study's archive is there and damaged.
+    Raises BadInput, and OutputFailed where nothing can be written or the disk is too small, before anything is
+    computed or written; later Interrupted, OutputFailed and ArchiveBusy with finished work kept; ArchiveError when
+    this study's archive is there and damaged.
     """
     from engine.plan import make_plan
+    from engine.remarks import remarks
 
     started, stop = time.perf_counter(), stop or Stop()
     kind = kind_of(study)
     files.check_output_place(archive)
+    _check_target(study, archive)
     if _state(study, archive, options) == "same study, finished":
         root = open_archive(archive).root
         return Outcome(archive, root, int(root["status"].size), True, time.perf_counter() - started)
     plan = make_plan(study, reduction=kind.reduction(study))
-    _check_disk(plan, archive)
+    files.check_free(archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
+    worth_knowing = tuple(remarks(plan))
     with _store(plan, archive, options) as store:
         done = store.finished()
         _march(plan, store, done, options, progress, stop)
@@ -76,7 +80,15 @@ def run_to_archive(
         stop.check()
         write_archive(archive, root, _groups(plan))
         store.remove()
-    return Outcome(archive, root, int(done.size), False, seconds)
+    return Outcome(archive, root, int(done.size), False, seconds, worth_knowing)
+
+
+def _check_target(study: Study, archive: Path) -> None:
+    """Refuse to replace what is no archive, above all the study file, whatever the options. Raises BadInput."""
+    name = study.source.name
+    if name and archive.exists() and Path(name).exists() and archive.samefile(name):
+        raise BadInput("the output is the study file itself", where=str(archive), remedy="choose another place with -o")
+    files.check_replaceable(archive)
 
 
 def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
@@ -92,19 +104,6 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
             remedy="choose another place with -o, or replace it with --overwrite",
         )
     return state
-
-
-def _check_disk(plan: Plan, archive: Path) -> None:
-    """Refuse a run whose parts and archive would not fit on the disk."""
-    free, needed = shutil.disk_usage(archive.parent).free, 2 * plan.disk_bytes
-    if needed > free:
-        raise BadInput(
-            f"the archive of {plan.size} variants does not fit on the disk",
-            where=str(archive.parent),
-            expected=f"{needed} bytes for the parts and the archive",
-            received=f"{free} bytes free",
-            remedy="fewer variants, sensors or histories, or another place with -o",
-        )
 
 
 def _store(plan: Plan, archive: Path, options: RunOptions) -> PartStore:

@@ -49,7 +49,10 @@ class Stop:
 
 @contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """Turn SIGINT and SIGTERM into a request to stop while the block lasts; from the main thread only."""
+    """Turn SIGINT and SIGTERM into a request to stop while the block lasts; from the main thread only.
+
+    Once somebody has asked, the handlers stay: a second signal may come while the process is on its way out.
+    """
     stop = Stop()
     deadline = threading.Timer(GRACE_SECONDS, _end_at_once, [stop])
     deadline.daemon = True
@@ -65,8 +68,9 @@ def stop_on_signals() -> Iterator[Stop]:
         yield stop
     finally:
         deadline.cancel()
-        for number, handler in former.items():
-            signal.signal(number, handler)
+        if not stop.event.is_set():
+            for number, handler in former.items():
+                signal.signal(number, handler)
 
 
 def _end_at_once(stop: Stop) -> None:

@@ -81,6 +81,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
         "resumed": outcome.resumed,
         "seconds": outcome.seconds,
         "exit_code": exit_code,
+        "remarks": list(outcome.remarks),
         "results": [
             {
                 "name": found.name,

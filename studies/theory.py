@@ -89,6 +89,23 @@ def cycle_frequency(results: Results) -> Any:
     return results.parameter(f"{key}.speed") / motion.max_speed
 
 
+def remainder_of_start(results: Results) -> Array:
+    """Part of the vibration of the start that is left in the last cycle of an out-and-back, for every variant.
+
+    exp(-zeta_1 omega_1 T (cycles - 1)) with the cycle's time T; NaN where only dampers damp the body, so that zeta_1
+    is not known. Where both do it is an upper bound. The body is
+    taken without the carriage, whose mass makes the vibration die out more slowly.
+    """
+    key = f"carriage.{results.carriage_name}.motion"
+    start, end, speed, turn, cycles = (
+        results.everywhere(results.parameter(f"{key}.{name}")) for name in ("start", "end", "speed", "turn", "cycles")
+    )
+    time = 2.0 * ((math.pi - 2.0) * turn + 1.0) * np.abs(end - start) / speed
+    damping, omega = (results.everywhere(value) for value in (damping_ratio(results), first_omega(results)))
+    unknown = (damping == 0.0) & (_support_damping(results) > 0.0)
+    return np.where(unknown, np.nan, np.exp(-damping * omega * time * (cycles - 1.0)))
+
+
 def loaded_frequency(results: Results, mass_ratio: Array) -> Array:
     """First natural frequency (n,) with the carriage's mass on its way, over that without, for mass ratios (n,).
 
@@ -152,6 +169,15 @@ def end_spring_difference(results: Results, sensor: str) -> Array | None:
 def _coordinate(results: Results, name: str) -> Array | None:
     found = results.dataset.coords.get(name)
     return None if found is None else results.everywhere(found)
+
+
+def _support_damping(results: Results) -> Array:
+    """Sum of the dampers (N s/m) under the first carriage's body, for every variant."""
+    name = results.carriage.on
+    supports = getattr(results.study.body[name], "supports", ())
+    count = 0 if isinstance(supports, str) else len(supports)
+    dampers = (results.everywhere(results.parameter(f"body.{name}.supports.{i}.damping")) for i in range(count))
+    return sum(dampers, np.zeros(results.shape))
 
 
 def _is_swept(results: Results, key: str) -> bool:

@@ -63,6 +63,10 @@ def _code_of_unforeseen(error: Exception) -> int:
 
 
 def _complain_about_usage(error: click.UsageError) -> None:
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        with suppress(OSError):
+            error.show()
+        return
     _complain(error.format_message())
     if error.ctx is not None:
         click.echo(f'try "{error.ctx.command_path} --help"', err=True)

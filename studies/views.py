@@ -12,7 +12,7 @@ from matplotlib.collections import PathCollection, QuadMesh
 from numpy.typing import NDArray
 
 from results_schema.status import Status
-from studies.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades
+from studies.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades, widen
 from studies.results import VARIANT, Axis, Results, spread, statuses
 from studies.words import listed
 
@@ -155,6 +155,7 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
         axes.plot(curve.x, curve.y, color=colour, marker=marker, label=curve.label)
     if seen.y is not None and len(curves) > 1:
         legend_beside(axes, seen.y.noun)
+    widen(axes, [curve.y for curve in curves])
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
@@ -184,7 +185,9 @@ def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None,
         rasterized = grid.size > VECTOR_CELLS
         mesh = axes.pcolormesh(x, y, grid.T, shading="nearest", rasterized=rasterized, edgecolors="face", **style)
         mesh.set_linewidth(0.7)  # covers the seams that browsers show between cells
-    for axis, way in ((axes.xaxis, x), (axes.yaxis, y)):
+    for axis, way, ends in ((axes.xaxis, x, axes.set_xlim), (axes.yaxis, y, axes.set_ylim)):
+        if np.nanmin(way) >= 0.0 > axis.get_view_interval()[0]:
+            ends(0.0, None)  # the lowest cell reaches below its value
         if is_logarithmic(way):
             logarithmic(axis)
     return mesh

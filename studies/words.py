@@ -10,6 +10,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MINUS = "\N{MINUS SIGN}"
 _PREFIXED = ("m", "N", "N m", "Pa")
+NOISE = 1e-12  # of the largest value beside it: what is smaller is rounding
 _METRES = (-9, -6, -3, 0)
 
 
@@ -85,12 +86,13 @@ def scale_for(largest: float, units: str) -> Scale:
     return Scale(10.0**-exponent, _PREFIXES[exponent] + units)
 
 
-def quantity(value: float, units: str, digits: int = 3) -> str:
-    """A value with its unit.
+def quantity(value: float, units: str, digits: int = 3, beside: float = 0.0) -> str:
+    """A value with its unit; 0 where it is rounding beside a value so much larger.
 
-    >>> quantity(0.0012345, "m"), quantity(5.0, "m s-1"), quantity(0.25, "1")
-    ('1.23 mm', '5 m/s', '0.25')
+    >>> quantity(0.0012345, "m"), quantity(5.0, "m s-1"), quantity(0.25, "1"), quantity(-2e-13, "N m", beside=7.0)
+    ('1.23 mm', '5 m/s', '0.25', '0 N m')
     """
+    value = 0.0 if abs(value) < NOISE * abs(beside) else value
     scale = scale_for(abs(value), units)
     text = number(value * scale.factor, digits)
     return f"{text} {scale.unit}" if scale.unit else text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from typing import Any
 
 from engine.plan import make_plan
 from engine.scene import load
@@ -25,3 +26,12 @@ def test_the_study_file_runs() -> None:
     study = load(block)
     kind = kind_of(study)
     assert make_plan(study, reduction=kind.reduction(study)).size == 160
+
+
+def test_the_python_example_runs() -> None:
+    text = README.read_text(encoding="utf-8")
+    block = next(block for block in re.findall(r"```python\n(.*?)```", text, re.S))
+    lines = [line for line in block.splitlines() if "engine.load" not in line and not line.endswith(".plot()")]
+    names: dict[str, Any] = {}
+    exec("\n".join(lines), names)
+    assert names["ds"].dynamic_amplification.sel(sensor="midspan", mass=100).shape == (40,)

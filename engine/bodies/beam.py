@@ -49,7 +49,14 @@ Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_len
 DampingRatio = Annotated[
     Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
 ]
-Ends = Annotated[str, AfterValidator(one_of(*("-".join(ends) for ends in product(END_WORDS, repeat=2))))]
+_ENDS = tuple("-".join(ends) for ends in product(END_WORDS, repeat=2))
+_MEANT = {
+    "simply-supported": "pinned-pinned",
+    "hinged-hinged": "pinned-pinned",
+    "fixed-fixed": "clamped-clamped",
+    "cantilever": "clamped-free",
+}
+Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
 Springs = Annotated[tuple[Spring, ...], Strict(False), Field(min_length=1, max_length=100)]
 Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
 Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]

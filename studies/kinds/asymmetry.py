@@ -14,7 +14,7 @@ from results_schema.variables import MARCH, Variable, declare
 from studies import indices, theory
 from studies.results import VARIANT, Results, extreme
 from studies.telling import exceeds, first_carriage, in_words, told_statuses
-from studies.words import listed, percent, quantity
+from studies.words import counted, listed, percent, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,8 +29,10 @@ Array = NDArray[np.float64]
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
 THRESHOLDS = (0.01, 0.05)
 CLOSE = 0.05
+LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
 MOST_SENSORS = 3
 STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
+REMAINDER = "exp(−ζ ω₁ T (cycles − 1)) with the time T of a cycle"
 
 RESULTS = (
     Variable(
@@ -129,9 +131,12 @@ class Asymmetry:
         return dataset
 
     def findings(self, results: Results) -> list[str]:
-        said = [_answer(results)]
+        left = theory.remainder_of_start(results)
+        settled = ~(left > LEFT_OVER)
+        answer, start = _answer(results, settled), _start(results, left)
+        said = [answer, start] if settled.any() else [start, answer]
         for sensor in list(results.sensors)[:MOST_SENSORS]:
-            said += [_lag(results, sensor), _first_beyond(results, sensor)]
+            said += [_lag(results, sensor), _first_beyond(results, sensor, settled)]
         return [*said, *_mass(results), *told_statuses(results)]
 
     def figures(self, results: Results) -> list[Figure]:
@@ -159,13 +164,49 @@ def _check_cruise(study: Study, carriage: str) -> None:
         )
 
 
-def _answer(results: Results) -> str:
-    """Yes or no, by the largest odd part of all sensors."""
-    odd = results.dataset["odd_rms"]
+def _start(results: Results, left: Array) -> str:
+    """How many variants still carry the vibration of the start in their last cycle, and where.
+
+    left: what is left of it, in the sweep's shape, NaN where that is not known.
+    """
+    known, late = np.isfinite(left), left > LEFT_OVER
+    if not known.any():
+        return "How much of the start is left in the last cycle is not known, as only dampers damp the body."
+    unknown = f" In {counted(int((~known).sum()), 'variant')} with dampers alone it is not known." * (not known.all())
+    if not late.any():
+        most = f"at most {percent(float(left[known].max()))} of the start is left, {REMAINDER}"
+        who = "every variant" if known.all() else "every other variant"
+        return f"In the last cycle {most}: {who} has settled.{unknown}"
+    where = _where_late(results, late)
+    told = f"more than {percent(LEFT_OVER)} of the start is left in the last cycle, {REMAINDER}{where}"
+    if late.all():
+        return f"No variant has settled: {told}. What follows holds the start too; run more cycles or with damping."
+    count = f"In {int(late.sum()):,} of {counted(results.size, 'variant')}"
+    advice = "they have not settled, and the first sentence leaves them out; run more cycles or with damping"
+    return f"{count} {told}: {advice}.{unknown}"
+
+
+def _where_late(results: Results, late: NDArray[np.bool_]) -> str:
+    """From which speed on and up to which damping ratio variants have not settled."""
+    said = ""
+    for ending, pick, words in ((".motion.speed", np.min, "from {} on"), (".damping_ratio", np.max, "up to {}")):
+        axis = results.axis(ending)
+        if axis is not None:
+            value = float(pick(results.everywhere(results.dataset[axis.name])[late]))
+            said += f", {words.format(f'{axis.noun} {quantity(value, axis.units)}')}"
+    return said
+
+
+def _answer(results: Results, settled: NDArray[np.bool_]) -> str:
+    """Yes or no, by the largest odd part of all sensors in the variants that have settled, or in all if none has."""
+    odd = np.asarray(results.dataset["odd_rms"].transpose(*results.dims, "sensor").values, dtype=np.float64)
+    if extreme(odd) is None:
+        return "No variant has values, so the question stays open."
+    odd = np.where(settled[..., None], odd, np.nan) if settled.any() else odd
     place = extreme(odd)
     if place is None:
-        return "No variant has values, so the question stays open."
-    largest, sensor = float(odd.values[place]), list(results.sensors)[place[-1]]
+        return "No variant that has settled has values, so the question stays open."
+    largest, sensor = float(odd[place]), list(results.sensors)[place[-1]]
     at = in_words(results, place[:-1])
     if largest < NOTICEABLE:
         return (
@@ -202,8 +243,8 @@ def _lag(results: Results, sensor: str) -> str:
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
     return (
         f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of {formula}, as "
-        f"damping alone would have it: {calm}. Beyond, vibration left over from the turns takes over, and the lag "
-        f"ranges from {span}."
+        f"damping alone would have it: {calm}. Beyond, vibration left over from the turns (or the start) takes over, "
+        f"and the lag ranges from {span}."
     )
 
 
@@ -216,10 +257,12 @@ def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
     return f"{said} (theory: {quantity(abs(float(expected[place])), 'm')})" if expected[place] else said
 
 
-def _first_beyond(results: Results, sensor: str) -> str:
-    """Where the odd part exceeds each threshold first."""
+def _first_beyond(results: Results, sensor: str, settled: NDArray[np.bool_]) -> str:
+    """Where the odd part exceeds each threshold first, in the variants that have settled, or in all if none has."""
     odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
-    return f"{sensor}: the odd part {listed([exceeds(results, odd, part) for part in THRESHOLDS])}."
+    some = settled.any() and not settled.all()
+    odd, of = (np.where(settled, odd, np.nan), " of those that have settled") if some else (odd, "")
+    return f"{sensor}: the odd part{of} {listed([exceeds(results, odd, part) for part in THRESHOLDS])}."
 
 
 def _mass(results: Results) -> list[str]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from results_schema.variables import MARCH, declare
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.results import Axis, Index, Results, chosen, extreme
+from studies.results import VARIANT, Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
 from studies.words import counted, listed, number, quantity
 
@@ -114,21 +114,34 @@ def _onset(results: Results, carriage: str, opened: NDArray[np.bool_], known: ND
     speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
     if speed is None:
         return f"{shown}. {BEYOND}"
+    if VARIANT in (speed.dim, speed.dim if group is None else group.dim):
+        return f"{shown}; {_worst(results, carriage, opened)}. {BEYOND}"
     if group is None:
-        return f"{shown}, {_first_speed(results, speed, opened)}. {BEYOND}"
+        return f"{shown}, {_first_speed(results, speed, opened, known)}. {BEYOND}"
     along = results.everywhere(results.dataset[group.name])
     parts = []
     for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
         label = group.at(int(np.flatnonzero(group.values == value)[0]))
-        parts.append(f"{label}: {_first_speed(results, speed, opened & (along == value))}")
+        parts.append(f"{label}: {_first_speed(results, speed, opened & (along == value), known & (along == value))}")
     return f"{shown} ({listed(parts)}). {BEYOND}"
 
 
-def _first_speed(results: Results, speed: Axis, opened: NDArray[np.bool_]) -> str:
+def _worst(results: Results, carriage: str, opened: NDArray[np.bool_]) -> str:
+    """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
+    weight = results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
+    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight)
+    place = extreme(-np.where(opened, ratio, np.nan))
+    assert place is not None
+    return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"
+
+
+def _first_speed(results: Results, speed: Axis, opened: NDArray[np.bool_], known: NDArray[np.bool_]) -> str:
     """The lowest speed at which the contact opens, with its ratio to the critical speed where that is known."""
-    if not opened.any():
-        return f"not up to {quantity(float(speed.values.max()), speed.units)}"
     along = results.everywhere(results.dataset[speed.name])
+    if not known.any():
+        return "no values"
+    if not opened.any():
+        return f"not up to {quantity(float(along[known].max()), speed.units)}"
     first = float(along[opened].min())
     text = f"first at {quantity(first, speed.units)}"
     if "speed_ratio" not in results.dataset.coords:

@@ -102,5 +102,6 @@ def _span(results: Results, sensor: str) -> str:
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
     over = " over all variants" if results.size > 1 else ""
-    span = f"{quantity(float(np.nanmin(low)), units)} to {quantity(float(np.nanmax(high)), units)}"
+    ends = float(np.nanmin(low)), float(np.nanmax(high))
+    span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
     return f"{sensor}: from {span}{over}."

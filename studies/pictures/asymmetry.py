@@ -70,6 +70,8 @@ def _response(results: Results, sensor: str) -> list[Figure]:
         f"{which} Above: the last cycle over the position of the carriage; below: half the difference of forward and "
         "backward at equal position. Grey: the turns, which no index counts."
     ).strip()
+    if results.sensors[sensor] == "m":
+        caption += " Above, displacements point down, as the body hangs."
     title = f"Forward and backward: {sensor}"
     return [draw(f"response-{sensor}", title, caption, 4.2, partial(_draw_response, results, sensor, shown))]
 

@@ -52,10 +52,17 @@ def pictures(results: Results) -> list[Figure]:
             axis = results.deciding_axis("peaks_per_cycle", sensor)
             own = view(results, SPEEDS, axis.paths) if axis is not None else seen
             found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
-        found.append(_gain(seen, sensors))
+        amplified = [sensor for sensor in sensors if _has_values(seen, "dynamic_amplification", sensor)]
+        found += [_gain(seen, amplified)] if amplified else []
         if float(np.nanmax(results.dataset["odd_even_ratio"].values, initial=0.0)) > ALIKE:
-            found.append(_halves(seen, sensors))
+            halved = [sensor for sensor in sensors if _has_values(seen, "odd_even_ratio", sensor)]
+            found += [_halves(seen, halved)] if halved else []
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
+
+
+def _has_values(seen: View, variable: str, sensor: str) -> bool:
+    """Whether a result of a sensor has values in a view: without a static response there is no amplification."""
+    return bool(np.isfinite(seen.plane(seen.results.of_sensor(variable, sensor))).any())
 
 
 def _typical(results: Results, sensor: str) -> list[Index]:

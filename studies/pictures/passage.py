@@ -112,21 +112,34 @@ def _name_ways(axes: Any, seen: View, ways: tuple[Any, Any]) -> None:
 
 
 def _contact(seen: View, carriage: str) -> Figure:
+    line = "; the line is where that begins" if _has_line(seen, _relative_force(seen, carriage)) else ""
     caption = seen.caption(
         "Smallest contact force on 0-98 % of the span over the weight.",
-        "Where it is negative the carriage would lift off; the line is where that begins."
-        if seen.y is not None
-        else "Below zero the carriage would lift off.",
+        "Below zero the carriage would lift off."
+        if seen.y is None
+        else f"Where it is negative the carriage would lift off{line}.",
     )
     title = f"Contact force: {carriage}"
     height = 3.2 if seen.y is not None else 2.6
     return draw(f"contact-{carriage}", title, caption, height, partial(_draw_contact, seen, carriage))
 
 
+def _relative_force(seen: View, carriage: str) -> Any:
+    """Smallest contact force over the weight."""
+    weight = seen.results.parameter(f"carriage.{carriage}.mass") * seen.results.parameter("gravity")
+    return seen.results.dataset[f"{carriage}_contact_force_min"] / weight
+
+
+def _has_line(seen: View, force: Any) -> bool:
+    """Whether a map of the force has a line of zero: on a grid, where both signs occur."""
+    grid = seen.plane(force)
+    known = grid[np.isfinite(grid)]
+    on_grid = seen.y is not None and not seen.is_sampled and min(grid.shape) >= 2
+    return bool(on_grid and known.size and known.min() < 0.0 < known.max())
+
+
 def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
-    results = seen.results
-    weight = results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
-    force = results.dataset[f"{carriage}_contact_force_min"] / weight
+    force = _relative_force(seen, carriage)
     axes = drawing.subplots()
     if seen.y is None:
         way, title = _ratio(seen)
@@ -139,12 +152,10 @@ def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
     mesh = draw_map(axes, seen, force, ways, cmap="PuOr", vmin=-1.0, vmax=1.0)
     _name_ways(axes, seen, ways)
     colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
-    grid = seen.plane(force)
-    known = grid[np.isfinite(grid)]
-    if seen.is_sampled or min(grid.shape) < 2 or not (known.size and known.min() < 0.0 < known.max()):
+    if not _has_line(seen, force):
         return
     x, y = (seen.along(axis, way) for axis, way in zip((seen.x, seen.y), ways, strict=True) if axis is not None)
-    axes.contour(x, y, grid.T, [0.0], colors=VERMILION, linewidths=1.8)
+    axes.contour(x, y, seen.plane(force).T, [0.0], colors=VERMILION, linewidths=1.8)
     line = Line2D([], [], color=VERMILION, linewidth=1.8)
     axes.legend([line], ["contact opens"], loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1)
 

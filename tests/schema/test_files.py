@@ -96,8 +96,28 @@ def test_places_where_nothing_can_be_written_are_refused(tmp_path, monkeypatch):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(files.tempfile, "TemporaryFile", refuse)
-    with pytest.raises(BadInput, match="Read-only"):
+    with pytest.raises(OutputFailed, match=r"Read-only.*bytes free there") as caught:
         files.check_output_place(tmp_path / "a.nc")
+    assert caught.value.exit_code == 74 and caught.value.path == tmp_path
+
+
+def test_only_netcdf_files_are_ever_replaced(tmp_path):
+    archive, text, pipe = tmp_path / "a.nc", tmp_path / "notes.txt", tmp_path / "pipe"
+    archive.write_bytes(b"\x89HDF\r\n\x1a\n and more")
+    text.write_text("\x89HDF")
+    os.mkfifo(pipe)
+    files.check_replaceable(archive)
+    files.check_replaceable(tmp_path / "nothing")
+    for path in (text, pipe, Path(os.devnull)):
+        with pytest.raises(BadInput, match="never replaced"):
+            files.check_replaceable(path)
+
+
+def test_a_disk_that_is_too_small_is_refused(tmp_path):
+    files.check_free(tmp_path, 1, "it")
+    with pytest.raises(OutputFailed, match=r"it would not fit .* bytes free there") as caught:
+        files.check_free(tmp_path, 1 << 80, "it")
+    assert caught.value.path == tmp_path and 0 < caught.value.free_bytes < 1 << 80
 
 
 REAL_DISKS = """
@@ -106,12 +126,12 @@ sys.path.insert(0, {root!r})
 import numpy as np
 from pathlib import Path
 from results_schema import files, parts
-from results_schema.errors import BadInput, OutputFailed
+from results_schema.errors import OutputFailed
 
 full, read_only = Path({full!r}), Path({read_only!r})
 try:
     files.check_output_place(read_only / "a.nc")
-except BadInput as error:
+except OutputFailed as error:
     print("read-only:", error.exit_code)
 store = parts.PartStore(full / "a.nc", "key")
 kept = 0
@@ -142,4 +162,4 @@ def test_real_full_and_read_only_disks(tmp_path):
     )
     if run.returncode == 77 or "unshare failed" in run.stderr:
         pytest.skip("this system lets users mount nothing")
-    assert run.stdout.splitlines() == ["read-only: 2", "full: 74 True True", "kept: True"], run.stderr
+    assert run.stdout.splitlines() == ["read-only: 74", "full: 74 True True", "kept: True"], run.stderr

@@ -89,8 +89,10 @@ def test_groups_do_not_inherit_the_outputs_of_every_kind():
 def test_every_declaration_has_a_text_and_a_row_in_the_table():
     table = reference_table()
     rows = table.splitlines()[2:]
-    declared = [(kind, v) for kind, vs in registered().items() for v in vs]
-    assert len(rows) == len(declared) > 40
+    shared = registered()["march"]
+    declared = [(kind, v) for kind, vs in registered().items() for v in vs if kind == "march" or v not in shared]
+    declared = [(kind, variable) for kind, variable in declared if not variable.planned]
+    assert len(rows) == len(declared) > 30
     for row, (_, variable) in zip(rows, declared, strict=True):
         assert variable.long_name
         assert row.startswith(f"| `{variable.name}` |")

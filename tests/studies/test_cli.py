@@ -106,7 +106,13 @@ def test_another_study_is_overwritten_only_if_asked(here: Path, capsys: Captured
         (["run", "asymetry"], 'did you mean "asymmetry"'),
         (["run", "small.toml", "-o", "missing/a.nc"], "missing: the output folder does not exist"),
         (["run", "small.toml", "-o", "small.toml/a.nc"], "the output folder is a file"),
-        (["run", "small.toml", "-o", "small.toml"], "something else already"),
+        (["run", "small.toml", "-o", "small.toml"], "the output is the study file itself"),
+        (["run", "small.toml", "-o", "small.toml", "--overwrite"], "the output is the study file itself"),
+        (["run", "small.toml", "-o", "linked.toml", "--overwrite"], "the output is the study file itself"),
+        (["run", "linked.toml", "-o", "small.toml", "--overwrite"], "the output is the study file itself"),
+        (["run", "small.toml", "-o", "twin.toml", "--overwrite"], "the output is the study file itself"),
+        (["run", "small.toml", "-o", "broken.toml", "--overwrite"], "broken.toml: .*never replaced"),
+        (["run", "small.toml", "-o", "broken.toml"], "broken.toml: .*never replaced"),
         (["run", "small.toml", "--scheduler", "tcp://localhost:1"], "not built yet"),
         (["check", "broken.toml"], "body.beam.lenght: unknown key.*length"),
         (["run", "broken.toml"], "body.beam.lenght: unknown key"),
@@ -122,6 +128,8 @@ def test_bad_input_is_refused_and_nothing_written(
 ) -> None:
     write(here)
     write(here, SMALL.replace("length = 1.0", "lenght = 1.0"), "broken.toml")
+    Path("linked.toml").symlink_to("small.toml")
+    Path("twin.toml").hardlink_to("small.toml")
     before = {path: path.read_bytes() for path in here.iterdir()}
     message = refused(capsys, *arguments)
     assert re.search(words, message), message
@@ -143,6 +151,13 @@ def test_usage_errors_are_bad_input(capsys: Captured, arguments: list[str]) -> N
     assert main(arguments) == 2
     output = capsys.readouterr()
     assert output.out == "" and output.err.startswith("wanderlast: ") and "--help" in output.err
+
+
+def test_no_arguments_print_the_help(capsys: Captured) -> None:
+    assert main([]) == 2
+    output = capsys.readouterr()
+    assert output.out == "" and output.err.startswith("Usage: wanderlast") and "\n  run " in output.err
+    assert output.err.count("Usage") == 1 and "try " not in output.err
 
 
 def test_help_and_version(capsys: Captured) -> None:
@@ -287,6 +302,11 @@ def test_init_writes_a_study_that_runs(here: Path, kind: str, capsys: Captured) 
     assert main(["init", kind]) == 0
     assert main(["check", f"{kind}.toml"]) == 0
     assert f"{kind}.toml" in capsys.readouterr().out
+
+
+def test_the_first_study_that_people_run_ends_well(here: Path) -> None:
+    assert main(["init", "passage"]) == 0
+    assert main(["run", "passage.toml"]) == 0
 
 
 def test_titles_cannot_speak_to_the_terminal(here: Path, capsys: Captured) -> None:

@@ -80,6 +80,24 @@ def test_a_signal_stops_and_the_next_start_goes_on(
     assert not Path("small.nc.parts").exists() and not Path("small.nc.lock").exists()
 
 
+@pytest.mark.parametrize("name", ["info", "report"])
+def test_an_unfinished_run_is_told(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patch:
+        after_parts(patch, 2, signal.SIGINT)
+        assert main(["run", "small.toml"]) == 130
+    parts = sorted(Path("small.nc.parts").glob("*.nc"))
+    kept = sum(xr.load_dataset(path).variants.size for path in parts[1:])
+    parts[0].write_bytes(parts[0].read_bytes()[:-50])
+    capsys.readouterr()
+    before = {path: path.read_bytes() for path in Path("small.nc.parts").iterdir()}
+    assert main([name, "small.nc"]) == 2
+    message = capsys.readouterr().err
+    assert f"{kept} finished variant" in message and "wanderlast run STUDY -o small.nc" in message
+    assert {path: path.read_bytes() for path in Path("small.nc.parts").iterdir()} == before
+
+
 def test_parts_of_another_study_need_overwrite(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
