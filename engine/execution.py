@@ -108,22 +108,26 @@ def warm_up(plan: Plan) -> None:
             _first_steps(plan, kind)
 
 
-def march_seconds(plan: Plan, threads: int | None = None) -> float:
-    """Wall time of marching every variant once, without compiling, tabulating, and gathering results."""
+def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
+    """Wall time of marching every variant once with the study's sensors alone, without compiling, tabulating, and
+    gathering results; the mean over ``repeats`` marches in a row."""
     import dask.threaded
 
     from engine.lanes import padded
     from engine.march import prepare
+    from engine.tables import SceneTables
 
     nothing = np.zeros(0, dtype=np.int64)
-    marches = [prepare(b.tables, plan.values(b, padded(variants)), nothing) for b, variants in plan.chunks(None, None)]
+    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors") for b in plan.buckets}
+    chunks = list(plan.chunks(None, None)) * repeats
+    marches = [prepare(tables[id(bucket)], plan.values(bucket, padded(part)), nothing) for bucket, part in chunks]
     for march in marches:
         for segment in march.tables.timeline.segments:
             march.tables.table(segment)
     graph = {("march", i): (march.go,) for i, march in enumerate(marches)}
     start = time.perf_counter()
     dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
-    return time.perf_counter() - start
+    return (time.perf_counter() - start) / repeats
 
 
 def _first_steps(plan: Plan, bucket: Bucket) -> None:

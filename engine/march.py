@@ -169,5 +169,5 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     sensors = scale[None, :, None] * weight[:, None]
     loose = [model.bodies[sensor.body].modal.rigid_modes > 0 for sensor in tables.sensors]
     sensors = np.where(np.array(loose)[None, :, None], np.inf, sensors)  # a rigid body may go anywhere
-    found = np.concatenate([sensors, contact], axis=1)
+    found = np.concatenate([sensors, contact], axis=1)[:, : len(tables.signals)]
     return np.where(found > 0.0, found, np.inf)

@@ -164,13 +164,19 @@ class Plan:
         """The tasks that are left; ``chunk`` fixes the number of variants of each."""
         for bucket in self.buckets:
             left = bucket.variants if done is None else np.setdiff1d(bucket.variants, done, assume_unique=True)
-            size = chunk or self.lanes_per_chunk(bucket)
+            size = chunk or _even(left.size, self.lanes_per_chunk(bucket))
             for first in range(0, left.size, size):
                 yield bucket, left[first : first + size]
 
     def values(self, bucket: Bucket, variants: Counts) -> LaneValues:
         """Numbers of some variants of a bucket."""
         return LaneValues(bucket.scene.study, self.cases.columns_of(variants), variants.size)
+
+
+def _even(size: int, most: int) -> int:
+    """The size of equal chunks of at most ``most``, in whole blocks."""
+    parts = max(1, -(-size // most))
+    return LANES * max(1, -(-size // (parts * LANES)))
 
 
 def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:

@@ -56,7 +56,7 @@ class SceneTables:
     model: SceneModel
     steps: int
     window: Window
-    accelerations: Literal["unread", "read"] = "unread"
+    readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
     _kept: OrderedDict[tuple[float, float, int, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -68,13 +68,15 @@ class SceneTables:
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
-        """Sensors, then contact forces; between them every carriage's acceleration across, where that is read."""
-        return build_signals(self.model, () if self.accelerations == "unread" else self.model.carriages)
+        """Sensors, then contact forces unless only sensors are read; between them every carriage's acceleration across,
+        where that is read."""
+        signals = build_signals(self.model, self.model.carriages if self.readings == "accelerations" else ())
+        return tuple(s for s in signals if self.readings != "sensors" or isinstance(s, Sensor))
 
     @cached_property
     def with_accelerations(self) -> SceneTables:
         """The same with the accelerations of the carriages read."""
-        return SceneTables(self.model, self.steps, self.window, "read")
+        return SceneTables(self.model, self.steps, self.window, "accelerations")
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
@@ -102,11 +104,9 @@ class SceneTables:
     def _build(self, segment: Segment) -> SegmentTable:
         along = ways(self.model, segment)
         contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
-        return SegmentTable(
-            tabulate_ties(self.model, along, self.newmark),
-            tabulate_watch(self.model, self.signals, along),
-            tabulate_watch(self.model, contacts, along),
-        )
+        watch = tabulate_watch(self.model, self.signals, along)
+        guard = tabulate_watch(self.model, contacts, along) if contacts else watch
+        return SegmentTable(tabulate_ties(self.model, along, self.newmark), watch, guard)
 
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""

@@ -14,6 +14,7 @@ from engine.plan import make_plan
 from engine.scene import Study
 
 BEST_OF = 7
+TIMED_SECONDS = 0.5  # about that long is each timing, so that starting threads does not count
 MIDSPAN = "midspan"
 
 
@@ -87,9 +88,10 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
     """March the scene several times and take the best; threads: None takes all cores."""
     plan = make_plan(scene.study())
     warm_up(plan)
-    seconds = min(march_seconds(plan, threads) for _ in range(best_of))
-    rate = scene.variants / seconds
     threads = threads or os.cpu_count() or 1
+    repeats = max(1, round(TIMED_SECONDS * threads / plan.seconds))
+    seconds = min(march_seconds(plan, threads, repeats) for _ in range(best_of))
+    rate = scene.variants / seconds
     return Throughput(
         rate * scene.modes * scene.steps, rate, seconds, scene.modes, scene.steps, scene.variants, threads, best_of
     )

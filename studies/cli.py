@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from studies import trouble
+from studies import stopping, trouble
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 _FILE = click.Path(path_type=Path)
@@ -138,4 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
         return code if isinstance(code, int) else 0
 
-    return trouble.exit_code_of(invoke)
+    code = trouble.exit_code_of(invoke)
+    if arguments is None:
+        stopping.end_undisturbed()
+    return code

@@ -131,9 +131,9 @@ def show_outcome(outcome: Outcome) -> None:
     rows = [
         (
             f"{found.name} {found.sensor}".strip(),
-            quantity(found.smallest.value, found.units),
+            quantity(found.smallest.value, found.units, beside=found.size),
             found.smallest.where,
-            quantity(found.largest.value, found.units),
+            quantity(found.largest.value, found.units, beside=found.size),
             found.largest.where,
         )
         for found in summary.ranges(results)

@@ -49,10 +49,7 @@ class Stop:
 
 @contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """Turn SIGINT and SIGTERM into a request to stop while the block lasts; from the main thread only.
-
-    Once somebody has asked, the handlers stay: a second signal may come while the process is on its way out.
-    """
+    """Turn SIGINT and SIGTERM into a request to stop while the block lasts; from the main thread only."""
     stop = Stop()
     deadline = threading.Timer(GRACE_SECONDS, _end_at_once, [stop])
     deadline.daemon = True
@@ -68,9 +65,15 @@ def stop_on_signals() -> Iterator[Stop]:
         yield stop
     finally:
         deadline.cancel()
-        if not stop.event.is_set():
-            for number, handler in former.items():
-                signal.signal(number, handler)
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+
+def end_undisturbed() -> None:
+    """Hear no more signals: the process is on its way out with the right exit code, which a second Ctrl-C in the
+    interpreter's last moments would change."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _end_at_once(stop: Stop) -> None:

@@ -43,6 +43,11 @@ class Range:
     smallest: Extreme
     largest: Extreme
 
+    @property
+    def size(self) -> float:
+        """The larger magnitude, beside which rounding shows."""
+        return max(abs(self.smallest.value), abs(self.largest.value))
+
 
 def counts(results: xr.Dataset) -> dict[str, int]:
     """Number of variants by status, those that occur."""
