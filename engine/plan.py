@@ -163,7 +163,7 @@ class Plan:
     def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Bucket, Counts]]:
         """The tasks that are left; ``chunk`` fixes the number of variants of each."""
         for bucket in self.buckets:
-            left = bucket.variants if done is None else np.setdiff1d(bucket.variants, done, assume_unique=True)
+            left = bucket.variants if done is None else bucket.variants[~np.isin(bucket.variants, done)]
             size = chunk or _even(left.size, self.lanes_per_chunk(bucket))
             for first in range(0, left.size, size):
                 yield bucket, left[first : first + size]
@@ -275,10 +275,11 @@ def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) 
     """Variants of one scene by their step counts."""
     values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
     steps, reasons = _steps(scene, values)
+    pace = values.time_scale(scene.carriages[0].name)  # variants of like pace rise and fall together: fewer extremes
     for part in _split(np.arange(variants.size), steps):
         tables = SceneTables(scene, int(steps[part[0]]), window)
         _check_readings(scene, tables)
-        yield Bucket(tables, variants[part], reasons(part))
+        yield Bucket(tables, variants[part[np.argsort(pace[part], kind="stable")]], reasons(part))
 
 
 def _steps(scene: SceneModel, values: LaneValues) -> tuple[Counts, Callable[[Counts], str]]:
