@@ -14,6 +14,7 @@ from engine.plan import make_plan
 from engine.scene import Study
 
 BEST_OF = 7
+MOST_REPEATS = 20
 TIMED_SECONDS = 0.5  # about that long is each timing, so that starting threads does not count
 MIDSPAN = "midspan"
 
@@ -89,7 +90,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
     plan = make_plan(scene.study())
     warm_up(plan)
     threads = threads or os.cpu_count() or 1
-    repeats = max(1, round(TIMED_SECONDS * threads / plan.seconds))
+    repeats = min(max(1, round(TIMED_SECONDS * threads / plan.seconds)), MOST_REPEATS)
     seconds = min(march_seconds(plan, threads, repeats) for _ in range(best_of))
     rate = scene.variants / seconds
     return Throughput(

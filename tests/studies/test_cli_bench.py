@@ -37,9 +37,10 @@ def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
 def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     marched = []
 
-    def spy(plan: Plan, threads: int | None) -> float:
+    def spy(plan: Plan, threads: int | None, repeats: int) -> float:
+        assert repeats >= 1
         marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size, threads))
-        return march_seconds(plan, threads)
+        return march_seconds(plan, threads, repeats)
 
     monkeypatch.setattr("studies.bench.march_seconds", spy)
     found = bench.measure(Scene(modes=4, steps=100, variants=64), threads=1, best_of=3)
