@@ -120,7 +120,7 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     nothing = np.zeros(0, dtype=np.int64)
     tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors") for b in plan.buckets}
     workers = threads or os.cpu_count() or 1
-    chunks = list(plan.chunks(None, -(-plan.size // workers))) * repeats
+    chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     marches = [prepare(tables[id(bucket)], plan.values(bucket, padded(part)), nothing) for bucket, part in chunks]
     for march in marches:
         for segment in march.tables.timeline.segments:
