@@ -20,8 +20,11 @@ from engine.kernels.layout import (
     MARKS,
     SMALLEST,
     SMALLEST_AT,
+    Lanes,
     Record,
     State,
+    Ties,
+    Watch,
 )
 from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
@@ -40,7 +43,8 @@ DIVERGED = 1e6  # times its static value a signal has left every meaning
 @dataclass(frozen=True, eq=False)
 class Marched:
     """What a march of V variants leaves: marks (J, MARKS, V) of all signals over the recorded part, of the contact
-    forces before it (C, MARKS, V), the sensors' samples (H, S, V), and whether the final state is finite (V,)."""
+    forces before it (C, MARKS, V), the samples of the first signals (H, S, V), and whether the final state is finite
+    (V,)."""
 
     marks: Array
     guard: Array
@@ -76,12 +80,7 @@ class March:
     def _segment(self, segment: Segment, unseen: bool) -> None:
         """The impulse and the new accelerations of a segment's event, its first station, its steps."""
         model, table = self.tables.model, self.tables.table(segment)
-        watch = table.watch if segment.recorded else table.guard
-        record = Record(
-            self.marks if segment.recorded else self.guard,
-            rows_sampled(segment, self.counts if segment.recorded else self.counts[:0]),
-            self.history,
-        )
+        watch, record = self._observed(segment)
         stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
         if segment.strikes:
             active = np.array([*segment.active, *([False] * len(model.dampers))])
@@ -91,8 +90,19 @@ class March:
             settle(table.ties, stepped, self.state)
         if unseen:
             watch_start(table.ties, stepped, self.state, watch, record, segment.first)
-        kernel = march_one if model.ties == 1 else march_many
-        kernel(table.ties, stepped, self.state, watch, record, self.tables.newmark, segment.first)
+        self._steps(segment, table.ties, stepped, watch, record)
+
+    def _observed(self, segment: Segment) -> tuple[Watch, Record]:
+        """What is observed along a segment, and where it is kept."""
+        table = self.tables.table(segment)
+        if not segment.recorded:
+            return table.guard, Record(self.guard, rows_sampled(segment, self.counts[:0]), self.history)
+        return table.watch, Record(self.marks, rows_sampled(segment, self.counts), self.history)
+
+    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Watch, record: Record) -> None:
+        """The steps of a segment, from its station 0, which is settled and seen."""
+        kernel = march_one if self.tables.model.ties == 1 else march_many
+        kernel(ties, stepped, self.state, watch, record, self.tables.scheme, segment.first)
 
     def result(self, size: int) -> Marched:
         """What the march of the first ``size`` variants left."""
@@ -101,8 +111,9 @@ class March:
         return Marched(marks, guard, history, finite.reshape(-1)[:size])
 
 
-def prepare(tables: SceneTables, values: LaneValues, counts: Counts) -> March:
-    """Set up variants whose number is a multiple of LANES, with the sensors sampled at ``counts``."""
+def prepare(tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None = None) -> March:
+    """Set up variants whose number is a multiple of LANES, with signals sampled at ``counts``: the first ``sampled``
+    of the tables' signals, or the sensors."""
     lanes = lane_table(tables.model, values)
     blocks = lanes.gravity.shape[0]
     sensors = len(tables.sensors)
@@ -110,15 +121,20 @@ def prepare(tables: SceneTables, values: LaneValues, counts: Counts) -> March:
     guard = _blank_marks(blocks, len(tables.signals) - sensors)
     bounds = _bounds(tables, lanes)
     marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, sensors:]
-    history = np.full((blocks, counts.size, sensors, LANES), np.nan)
+    history = np.full((blocks, counts.size, sensors if sampled is None else sampled, LANES), np.nan)
     return March(tables, lanes, counts, initial_state(tables.model, lanes), marks, guard, history)
 
 
 def march(
-    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+    tables: SceneTables,
+    values: LaneValues,
+    counts: Counts,
+    size: int,
+    halted: Callable[[], bool] = lambda: False,
+    sampled: int | None = None,
 ) -> Marched:
     """Prepare, go, and return the result of the first ``size`` variants. Raises Halted."""
-    prepared = prepare(tables, values, counts)
+    prepared = prepare(tables, values, counts, sampled)
     prepared.go(halted)
     return prepared.result(size)
 
@@ -149,7 +165,7 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
             place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length)
             soft = part.modal.shape(place.reshape(1))[0] / part.modal.omega**2
             q[:, part.modes] += soft[:, None] * lanes.weight[:, r, None]
-    return State(q, np.zeros(shape), np.zeros(shape))
+    return State(q, np.zeros(shape), np.zeros(shape), np.zeros(shape))
 
 
 def _blank_marks(blocks: int, signals: int) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from engine.bodies import Beam
 from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
 from engine.bodies.modal import ModalBody
+from engine.kernels.schemes import Scheme
 from engine.scene import Study
 from engine.timeline import Rider
 from results_schema.errors import BadInput
@@ -79,6 +80,11 @@ class SceneModel:
     def omega(self) -> Array:
         """(N,) natural frequencies of all bodies, rad/s."""
         return np.concatenate([part.modal.omega for part in self.bodies])
+
+    @cached_property
+    def scheme(self) -> Scheme:
+        """The time integration scheme of the study."""
+        return self.study.solver.integration
 
     @property
     def leading_body(self) -> BodyPart:

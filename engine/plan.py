@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from engine.fidelity import Needs, check_fixed_steps, check_most_steps, needed_steps, round_up
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
-from engine.kernels.schemes import Scheme
 from engine.lanes import LANE_KEYS, LaneValues
 from engine.model import SceneModel, build_model, check_moves
 from engine.reduction import Reduction
@@ -28,6 +27,7 @@ from results_schema.errors import BadInput
 from results_schema.variables import declarations
 
 Counts = NDArray[np.int64]
+CheckSteps = Callable[[SceneModel, NDArray[np.float64], Counts], None]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
 START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
@@ -179,14 +179,19 @@ def _even(size: int, most: int) -> int:
     return LANES * max(1, -(-size // (parts * LANES)))
 
 
-def make_plan(study: Study, *, reduction: Reduction | None = None) -> Plan:
-    """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed."""
+def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: CheckSteps = check_fixed_steps) -> Plan:
+    """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed.
+
+    check_steps: refuses fixed steps that cannot be right.
+    """
     check_moves(study)
     cases = expand(study)
     check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction), reduction)
     window: Window = "whole" if reduction is None else "last-cycle"
     buckets = tuple(
-        bucket for scene, variants in _scenes(study, cases) for bucket in _buckets(scene, cases, variants, window)
+        bucket
+        for scene, variants in _scenes(study, cases)
+        for bucket in _buckets(scene, cases, variants, window, check_steps)
     )
     base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
@@ -271,10 +276,12 @@ def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
     yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)
 
 
-def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) -> Iterator[Bucket]:
+def _buckets(
+    scene: SceneModel, cases: Cases, variants: Counts, window: Window, check_steps: CheckSteps
+) -> Iterator[Bucket]:
     """Variants of one scene by their step counts."""
     values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
-    steps, reasons = _steps(scene, values)
+    steps, reasons = _steps(scene, values, check_steps)
     pace = values.time_scale(scene.carriages[0].name)  # variants of like pace rise and fall together: fewer extremes
     for part in _split(np.arange(variants.size), steps):
         tables = SceneTables(scene, int(steps[part[0]]), window)
@@ -282,17 +289,16 @@ def _buckets(scene: SceneModel, cases: Cases, variants: Counts, window: Window) 
         yield Bucket(tables, variants[part[np.argsort(pace[part], kind="stable")]], reasons(part))
 
 
-def _steps(scene: SceneModel, values: LaneValues) -> tuple[Counts, Callable[[Counts], str]]:
+def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Callable[[Counts], str]]:
     """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
-    scheme = Scheme(*scene.study.solver.newmark)
     time_scale = values.time_scale(scene.carriages[0].name)
     if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
         steps = values.of("solver.steps").astype(np.int64)
         check_most_steps(scene, steps)
-        check_fixed_steps(scene, scheme, time_scale, steps)
+        check_steps(scene, time_scale, steps)
         return steps, lambda part: "as the study says"
     distinct, inverse = np.unique(time_scale, return_inverse=True)
-    needs = needed_steps(scene, scheme, distinct)
+    needs = needed_steps(scene, distinct)
     check_most_steps(scene, needs.total)
     return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.fidelity import alias_steps
 from engine.lanes import LaneValues
 from engine.plan import Bucket, Plan
 
@@ -77,24 +76,6 @@ def _deep(plan: Plan) -> Iterator[str]:
         yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
 
 
-def _coarse(plan: Plan) -> Iterator[str]:
-    for bucket in plan.buckets:
-        inertial = [carriage for carriage in bucket.scene.carriages if carriage.inertia == "mass"]
-        if bucket.reason != "as the study says" or not inertial:
-            continue
-        values = plan.values(bucket, bucket.variants)
-        time_scale = np.unique(values.time_scale(bucket.scene.carriages[0].name))
-        for carriage in inertial:
-            body = bucket.scene.bodies[carriage.body].modal
-            top = (float(body.wave_number.max()), float(body.omega.max()), carriage.rider.top_speed)
-            needed = int(np.ceil(alias_steps(*top, time_scale).max()))
-            if bucket.steps < needed:
-                yield (
-                    f"{bucket.steps} steps are fewer than the {needed} below which a moving mass may resonate with the "
-                    "march itself"
-                )
-
-
 def _thin(plan: Plan) -> Iterator[str]:
     """Fewer than 20 fixed steps in a first period."""
     for bucket in plan.buckets:
@@ -126,6 +107,5 @@ REMARKS: tuple[Callable[[Plan], Iterator[str]], ...] = (
     _fast,
     _heavy,
     _deep,
-    _coarse,
     _thin,
 )

@@ -9,33 +9,37 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
 
 from engine.document import shortened
+from engine.kernels.schemes import SCHEMES, Scheme
 from engine.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
 from engine.units import Dimensionless, fault
 
-NEWMARK: Mapping[str, tuple[float, float]] = {
-    "average-acceleration": (1 / 4, 1 / 2),
-    "linear-acceleration": (1 / 6, 1 / 2),
-    "fox-goodwin": (1 / 12, 1 / 2),
-    "central-difference": (0.0, 1 / 2),
+#: Parameters that a scheme takes from the study file; the others take none.
+PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    "newmark": ("beta", "gamma"),
+    "hht-alpha": ("alpha",),
+    "generalized-alpha": ("rho_inf",),
 }
 FIDELITIES = ("auto", "force", "mass", "mass-without-convective")
 MAX_STEPS = 100_000_000
 
-Scheme = Annotated[str, AfterValidator(one_of(*NEWMARK, "newmark", planned=("hht-alpha", "generalized-alpha")))]
+SchemeName = Annotated[str, AfterValidator(one_of(*SCHEMES))]
 Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES, planned=("static",)))]
 
 
 class Solver(Spec):
     """How to march.
 
-    beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step).
+    beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step). alpha: of "hht-alpha",
+    rho_inf: of "generalized-alpha".
     steps: over one whole passage or one whole cycle. tolerance: wanted where something is "auto".
     audit: variants run again at higher fidelity.
     """
 
-    scheme: Scheme = "average-acceleration"
+    scheme: SchemeName = "average-acceleration"
     beta: Dimensionless | None = Field(default=None, ge=0, le=1)
     gamma: Dimensionless | None = Field(default=None, ge=0.5, le=1.5)
+    alpha: Dimensionless | None = Field(default=None, ge=-1 / 3, le=0)
+    rho_inf: Dimensionless | None = Field(default=None, ge=0, le=1)
     fidelity: Chosen = "auto"
     steps: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_STEPS)], by_form] = "auto"
     tolerance: Dimensionless = Field(default=1e-3, gt=0, lt=1)
@@ -43,20 +47,21 @@ class Solver(Spec):
     audit: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=0)], by_form] = "auto"
 
     @property
-    def newmark(self) -> tuple[float, float]:
-        """(beta, gamma) of the scheme."""
-        if self.beta is not None and self.gamma is not None:
-            return self.beta, self.gamma
-        return NEWMARK[self.scheme]
+    def integration(self) -> Scheme:
+        """The scheme with its parameters."""
+        return SCHEMES[self.scheme]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, ())})
 
     @model_validator(mode="after")
     def _fitting_keys(self) -> Solver:
-        given = [name for name in ("beta", "gamma") if getattr(self, name) is not None]
-        if self.scheme == "newmark" and len(given) < 2:
-            raise fault('the scheme "newmark" needs beta and gamma', expected="beta and gamma")
-        if self.scheme != "newmark" and given:
-            expected, received = 'scheme = "newmark"', f'scheme = "{self.scheme}"'
-            raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
+        wanted = PARAMETERS.get(self.scheme, ())
+        if any(getattr(self, name) is None for name in wanted):
+            needed = " and ".join(wanted)
+            raise fault(f'the scheme "{self.scheme}" needs {needed}', expected=needed)
+        for scheme, names in PARAMETERS.items():
+            given = [name for name in names if getattr(self, name) is not None]
+            if scheme != self.scheme and given:
+                expected, received = f'scheme = "{scheme}"', f'scheme = "{self.scheme}"'
+                raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
         if self.audit not in ("auto", 0):
             raise fault("the audit is not built yet", expected='audit = "auto" or 0', received=str(self.audit))
         return self

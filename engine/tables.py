@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.fidelity import free_steps
-from engine.kernels.layout import Newmark, Ties, Watch
-from engine.kernels.schemes import Scheme
+from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
 from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
-from engine.timeline import Segment, Timeline, Window, build_timeline
+from engine.timeline import Segment, Timeline, Window, build_timeline, refined
 from engine.track import Way, tabulate_ties, ways
 
 Array = NDArray[np.float64]
@@ -51,20 +50,31 @@ class StaticUnit(NamedTuple):
 
 @dataclass(eq=False)
 class SceneTables:
-    """Timeline, signals and tables of a scene at ``steps`` per unit of scene time."""
+    """Timeline, signals and tables of a scene at ``steps`` per unit of scene time.
+
+    refinement: every step of a timeline with so many times fewer steps is cut into so many.
+    """
 
     model: SceneModel
     steps: int
     window: Window
     readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
+    refinement: int = 1
     _kept: OrderedDict[tuple[float, float, int, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
     def timeline(self) -> Timeline:
         """The scene cut into segments."""
-        scheme = Scheme(*self.model.study.solver.newmark)
-        return build_timeline(self.model.riders, self.steps, self.window, free_steps(self.model, scheme))
+        return refined(self._unrefined, self.refinement)
+
+    @cached_property
+    def _unrefined(self) -> Timeline:
+        free = free_steps(self.model)
+        if self.refinement > 1:
+            free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
+        steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
+        return build_timeline(self.model.riders, steps, self.window, free)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -76,17 +86,24 @@ class SceneTables:
     @cached_property
     def with_accelerations(self) -> SceneTables:
         """The same with the accelerations of the carriages read."""
-        return SceneTables(self.model, self.steps, self.window, "accelerations")
+        return SceneTables(self.model, self.steps, self.window, "accelerations", self.refinement)
+
+    @cached_property
+    def coarser(self) -> SceneTables:
+        """The same with half the steps, for a Richardson pair; ``refinement`` must be even."""
+        found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
+        found._unrefined = self._unrefined
+        return found
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
         """The study's sensors."""
         return tuple(signal for signal in self.signals if isinstance(signal, Sensor))
 
-    @property
-    def newmark(self) -> Newmark:
+    @cached_property
+    def scheme(self) -> Newmark | Alpha:
         """The scheme's coefficients."""
-        return Newmark(*self.model.study.solver.newmark)
+        return self.model.scheme.coefficients
 
     def table(self, segment: Segment) -> SegmentTable:
         """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
@@ -106,13 +123,14 @@ class SceneTables:
         contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
         watch = tabulate_watch(self.model, self.signals, along)
         guard = tabulate_watch(self.model, contacts, along) if contacts else watch
-        return SegmentTable(tabulate_ties(self.model, along, self.newmark), watch, guard)
+        return SegmentTable(tabulate_ties(self.model, along, self.scheme), watch, guard)
 
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""
         with self._lock:
             self._kept.clear()
-        self.__dict__.pop("with_accelerations", None)
+        for name in ("with_accelerations", "coarser"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def static_over_window(self) -> StaticUnit:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.modal import ModalBody
-from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Blow, Newmark, Ties
+from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Alpha, Blow, Newmark, Ties
 from engine.model import CarriageTie, SceneModel
 from engine.timeline import Segment
 
@@ -55,7 +55,7 @@ def _way(carriage: CarriageTie, segment: Segment, tau: Array, active: bool) -> W
     return Way(place, path.dS * segment.step, path.ddS * segment.step**2, active)
 
 
-def tabulate_ties(model: SceneModel, along: tuple[Way, ...], newmark: Newmark) -> Ties:
+def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | Alpha) -> Ties:
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment."""
     stations = along[0].s.size
     rows = np.zeros((stations, model.omega.size, model.ties, 4))
@@ -70,7 +70,7 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], newmark: Newmark) -
         rows[:, part.modes, r, RATE] = shape
     inertial = np.array([carriage.inertia != "force" for carriage in model.carriages] + [False] * len(model.dampers))
     rows[..., CLOSED] = np.where(inertial, rows[..., FORCE], 0.0)
-    rows[1:, ..., CLOSED] += newmark.gamma * rows[1:, ..., RATE] + newmark.beta * rows[1:, ..., CURVE]
+    rows[1:, ..., CLOSED] += scheme.gamma * rows[1:, ..., RATE] + scheme.beta * rows[1:, ..., CURVE]
     reacts = inertial.copy()
     reacts[len(model.carriages) :] = True
     return Ties(np.ascontiguousarray(rows), drive, np.flatnonzero(reacts), np.flatnonzero(~reacts))

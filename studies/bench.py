@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.execution import execute, march_seconds, warm_up
+from engine.fidelity import allow_any_steps
 from engine.plan import make_plan
 from engine.scene import Study
 
@@ -87,7 +88,7 @@ class Throughput:
 
 def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) -> Throughput:
     """March the scene several times and take the best; threads: None takes all cores."""
-    plan = make_plan(scene.study())
+    plan = make_plan(scene.study(), check_steps=allow_any_steps)
     warm_up(plan)
     threads = threads or os.cpu_count() or 1
     repeats = min(max(1, round(TIMED_SECONDS * threads / plan.seconds)), MOST_REPEATS)
@@ -105,5 +106,5 @@ def largest_deflections(scene: Scene) -> NDArray[np.float64]:
     def take(variants: NDArray[np.int64], arrays: dict[str, NDArray[Any]], selected: object) -> None:
         found[variants] = np.maximum(arrays[f"{MIDSPAN}_max"], -arrays[f"{MIDSPAN}_min"])
 
-    execute(make_plan(scene.study()), take)
+    execute(make_plan(scene.study(), check_steps=allow_any_steps), take)
     return found

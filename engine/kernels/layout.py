@@ -54,11 +54,15 @@ class Lanes(NamedTuple):
 
 
 class State(NamedTuple):
-    """Modal displacement, velocity and acceleration, each (blocks, modes, LANES), in SI units; updated in place."""
+    """Modal displacement, velocity and acceleration, each (blocks, modes, LANES), in SI units; updated in place.
+
+    memory: what an alpha scheme's auxiliary acceleration differs by from ``a``; zero for Newmark's family.
+    """
 
     q: FloatArray
     v: FloatArray
     a: FloatArray
+    memory: FloatArray
 
 
 class Watch(NamedTuple):
@@ -126,3 +130,27 @@ class Newmark(NamedTuple):
 
     beta: float
     gamma: float
+
+
+class Alpha(NamedTuple):
+    """Coefficients of generalized-alpha, derived in `schemes.AlphaScheme`.
+
+    beta, gamma: weights of the new true acceleration x in u and u', as in `Newmark`. The auxiliary acceleration is
+    a = kappa x + e; the memory e of the step before starts as  start_x x + start_a a  and goes on as
+    next_x x + next_e e. newmark_beta, newmark_gamma: weights of a. velocity_, displacement_: weights of x and e in
+    the predictors of the next step.
+    """
+
+    beta: float
+    gamma: float
+    kappa: float
+    start_x: float
+    start_a: float
+    newmark_beta: float
+    newmark_gamma: float
+    next_x: float
+    next_e: float
+    velocity_x: float
+    velocity_e: float
+    displacement_x: float
+    displacement_e: float

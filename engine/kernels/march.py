@@ -24,6 +24,7 @@ from engine.kernels.record import (
     KD,
     LEAD,
     LOAD,
+    PUSH,
     Q_NOW,
     RATE_0,
     RATE_1,
@@ -41,12 +42,13 @@ from engine.kernels.record import (
     keep,
     observe,
 )
+from engine.kernels.stepping import advance, corrected, first_predictors
 
 
 @piece
-def load_block(work, b, lanes, state, newmark, block):
+def load_block(work, carry, b, lanes, state, scheme, block):
     """Coefficients of the step, and the predictors of the first one, of one block of lanes."""
-    beta, gamma = newmark.beta, newmark.gamma
+    beta, gamma = scheme.beta, scheme.gamma
     for j in range(LANES):
         h = lanes.step[block, j]
         b[GRAVITY, j] = lanes.gravity[block, j]
@@ -59,44 +61,31 @@ def load_block(work, b, lanes, state, newmark, block):
             c = lanes.damping[block, k, j]
             s = lanes.stiffness[block, k, j]
             d = 1.0 / (1.0 + gamma * c + beta * s)
-            a = state.a[block, k, j] * h * h
-            v = state.v[block, k, j] * h
-            u = state.q[block, k, j] + v + (0.5 - beta) * a
-            v += (1.0 - gamma) * a
+            q, v, a = state.q[block, k, j], state.v[block, k, j] * h, state.a[block, k, j] * h * h
+            u, v, e = first_predictors(scheme, q, v, a, state.memory[block, k, j] * h * h)
             work[k, D, j] = d
             work[k, CD, j] = c * d
             work[k, KD, j] = s * d
             work[k, U, j] = u
             work[k, V, j] = v
             work[k, C, j] = c * d * v + s * d * u
+            carry[k, j] = e
 
 
 @piece
-def store_mode(work, b, force, state, newmark, block, k):
-    """Corrected state of mode k in SI units; ``force`` (lanes) is the sum of p F of the step just solved."""
+def store_mode(work, carry, b, state, scheme, block, k):
+    """Corrected state of mode k in SI units; b[PUSH] is the sum of p F of the step just solved."""
     for j in range(LANES):
-        a = work[k, D, j] * force[j] - work[k, C, j]
-        state.q[block, k, j] = work[k, U, j] + newmark.beta * a
-        state.v[block, k, j] = (work[k, V, j] + newmark.gamma * a) * b[RATE_1, j]
-        state.a[block, k, j] = a * b[RATE_2, j]
-
-
-@piece
-def advance(work, k, j, a, newmark):
-    """Correct one mode in one lane with its acceleration and predict the next step; returns q, v, u*, v*, c*."""
-    q = work[k, U, j] + newmark.beta * a
-    v = work[k, V, j] + newmark.gamma * a
-    v_next = v + (1.0 - newmark.gamma) * a
-    q_next = q + v + (0.5 - newmark.beta) * a
-    c = work[k, CD, j] * v_next + work[k, KD, j] * q_next
-    work[k, U, j] = q_next
-    work[k, V, j] = v_next
-    work[k, C, j] = c
-    return q, v, q_next, v_next, c
+        x = work[k, D, j] * b[PUSH, j] - work[k, C, j]
+        q, v, a, memory = corrected(scheme, work, carry, b, k, j, x)
+        state.q[block, k, j] = q
+        state.v[block, k, j] = v
+        state.a[block, k, j] = a
+        state.memory[block, k, j] = memory
 
 
 @kernel
-def march_one(ties, lanes, state, watch, record, newmark, count):
+def march_one(ties, lanes, state, watch, record, scheme, count):
     """March one segment with a single tie.
 
     Shapes as in ``layout``; ``count`` is the number of the scene's stations before this segment's station 0. The
@@ -110,12 +99,12 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
     lead_moves = 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, FIELDS, LANES))
+    carry = np.zeros((modes, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
-    force = np.empty(LANES)
     for block in range(lanes.step.shape[0]):
-        load_block(work, b, lanes, state, newmark, block)
+        load_block(work, carry, b, lanes, state, scheme, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
         for j in range(LANES):
@@ -141,8 +130,8 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
             if n == stations - 1:
                 for k in range(modes):
                     for j in range(LANES):
-                        force[j] = rows[n, k, 0, FORCE] * b[TIE, j]
-                    store_mode(work, b, force, state, newmark, block, k)
+                        b[PUSH, j] = rows[n, k, 0, FORCE] * b[TIE, j]
+                    store_mode(work, carry, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             at = lead_moves * n
             for k in range(modes):
@@ -158,7 +147,7 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                     row, second = watch.on_q[at, 0, k], watch.on_q[at, 1, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
                         b[LEAD, j] += row * q
                         b[SECOND, j] += second * q
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
@@ -167,14 +156,14 @@ def march_one(ties, lanes, state, watch, record, newmark, count):
                     row = watch.on_q[at, 0, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
                         b[LEAD, j] += row * q
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
                         b[FACTOR, j] += wp * work[k, D, j]
                 else:
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(work, k, j, a, newmark)
+                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
                         now[k, Q_NOW, j] = q
                         now[k, V_NOW, j] = v
                         now[k, A_NOW, j] = a
@@ -246,31 +235,31 @@ def close_ties(b, sums, factor, ties, lanes, block, n):
 
 
 @piece
-def force_on_mode(force, b, rows, n, k):
-    """force = sum over the ties of p F of mode k at station n."""
+def push_on_mode(b, rows, n, k):
+    """b[PUSH] = sum over the ties of p F of mode k at station n."""
     for j in range(LANES):
-        force[j] = 0.0
+        b[PUSH, j] = 0.0
     for r in range(rows.shape[2]):
         p = rows[n, k, r, FORCE]
         for j in range(LANES):
-            force[j] += p * b[TIE + r, j]
+            b[PUSH, j] += p * b[TIE + r, j]
 
 
 @kernel
-def march_many(ties, lanes, state, watch, record, newmark, count):
+def march_many(ties, lanes, state, watch, record, scheme, count):
     """March one segment with any number of ties; otherwise as ``march_one``."""
     rows = ties.rows
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, FIELDS, LANES))
+    carry = np.zeros((modes, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
-    force = np.empty(LANES)
     sums = np.zeros((ties.reacting.shape[0], LANES))
     factor = np.zeros((ties.reacting.shape[0], many, LANES))
     for block in range(lanes.step.shape[0]):
-        load_block(work, b, lanes, state, newmark, block)
+        load_block(work, carry, b, lanes, state, scheme, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
         sums[:] = 0.0
@@ -281,14 +270,14 @@ def march_many(ties, lanes, state, watch, record, newmark, count):
             close_ties(b, sums, factor, ties, lanes, block, n)
             if n == stations - 1:
                 for k in range(modes):
-                    force_on_mode(force, b, rows, n, k)
-                    store_mode(work, b, force, state, newmark, block, k)
+                    push_on_mode(b, rows, n, k)
+                    store_mode(work, carry, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             for k in range(modes):
-                force_on_mode(force, b, rows, n, k)
+                push_on_mode(b, rows, n, k)
                 for j in range(LANES):
-                    a = work[k, D, j] * force[j] - work[k, C, j]
-                    q, v, _, _, _ = advance(work, k, j, a, newmark)
+                    a = work[k, D, j] * b[PUSH, j] - work[k, C, j]
+                    q, v, _, _, _ = advance(scheme, work, carry, k, j, a)
                     now[k, Q_NOW, j] = q
                     now[k, V_NOW, j] = v
                     now[k, A_NOW, j] = a

@@ -20,7 +20,7 @@ from engine.kernels.layout import (
 )
 
 # rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
-SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, TIE = range(11)
+SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, PUSH, TIE = range(12)
 # fields of the per-mode work array
 U, V, C, D, CD, KD = range(6)
 FIELDS = 6

@@ -1,26 +1,178 @@
-"""Time integration schemes, each a small object that names its coefficients."""
+"""Time integration schemes, each a small object that names its coefficients, its limit and its phase.
+
+A scheme brings a new acceleration x of every mode into displacement and velocity with the weights beta and gamma, on
+top of predictors made of the step before. Everything else of the march is the same for all of them.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from engine.kernels.layout import Alpha, FloatArray, Newmark
+
+
+_FAR = 1e100  # omega h beyond which nothing changes, and whose square is a number
+
+
+class Scheme(Protocol):
+    """What the program asks of a scheme.
+
+    name: as in the study file. order: of its error on smooth, resolved scenes. coefficients: for the kernels.
+    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. stride: steps that its
+    coarsest march takes at once.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def stride(self) -> int: ...
+    @property
+    def coefficients(self) -> Newmark | Alpha: ...
+    @property
+    def stability_limit(self) -> float: ...
+    @property
+    def is_damped(self) -> bool:
+        """Whether it takes energy out of the highest frequencies."""
+
+    def phase(self, x: FloatArray) -> FloatArray:
+        """Angle (0 to pi) by which an undamped oscillator of omega h = x turns in one step of the scheme."""
 
 
 @dataclass(frozen=True)
-class Scheme:
+class NewmarkScheme:
     """A member of Newmark's family: u and u' advance with weights beta and gamma (Newmark 1959).
 
-    >>> Scheme(beta=1 / 4, gamma=1 / 2).stability_limit
+    >>> NewmarkScheme("average-acceleration", beta=1 / 4, gamma=1 / 2).stability_limit
     inf
-    >>> round(Scheme(beta=1 / 6, gamma=1 / 2).stability_limit, 3)
+    >>> round(NewmarkScheme("linear-acceleration", beta=1 / 6, gamma=1 / 2).stability_limit, 3)
     3.464
     """
 
+    name: str
     beta: float
     gamma: float
+    order: int = 2
+    stride: int = 1
+
+    @property
+    def coefficients(self) -> Newmark:
+        """beta and gamma."""
+        return Newmark(self.beta, self.gamma)
 
     @property
     def stability_limit(self) -> float:
-        """Largest omega h of an undamped oscillator: (gamma/2 - beta)^-1/2, infinite from beta >= gamma/2 on."""
+        """(gamma/2 - beta)^-1/2, infinite from beta >= gamma/2 on."""
         slack = 0.5 * self.gamma - self.beta
         return math.inf if slack <= 0.0 else 1.0 / math.sqrt(slack)
+
+    @property
+    def is_damped(self) -> bool:
+        """gamma > 1/2."""
+        return self.gamma > 0.5
+
+    def phase(self, x: FloatArray) -> FloatArray:
+        """Its cosine is half the trace of the amplification matrix over the root of its determinant."""
+        square = np.minimum(x, _FAR) ** 2
+        part = square / (1.0 + self.beta * square)
+        modulus = np.sqrt(np.maximum(1.0 - (self.gamma - 0.5) * part, np.finfo(float).tiny))
+        return np.asarray(np.arccos(np.clip((1.0 - 0.5 * (self.gamma + 0.5) * part) / modulus, -1.0, 1.0)))
+
+
+@dataclass(frozen=True)
+class AlphaScheme:
+    """Generalized-alpha (Chung and Hulbert 1993) in the form of Arnold and Bruels (2007).
+
+    The equation of motion holds at every station with the true accelerations x, and an auxiliary acceleration a with
+    (1 - m) a_new + m a = (1 - f) x_new + f x  enters Newmark's formulas: so a contact force that moves stays of second
+    order. m, f: the weights alpha_m and alpha_f.
+
+    >>> generalized_alpha(rho_inf=1.0).coefficients.gamma
+    0.5
+    """
+
+    name: str
+    m: float
+    f: float
+    order: int = 2
+    stride: int = 1
+
+    @property
+    def gamma(self) -> float:
+        """1/2 - m + f: of second order."""
+        return 0.5 - self.m + self.f
+
+    @property
+    def beta(self) -> float:
+        """(1 - m + f)^2/4: the most damping of the highest frequencies."""
+        return 0.25 * (1.0 - self.m + self.f) ** 2
+
+    @property
+    def coefficients(self) -> Alpha:
+        """Weights of x and of the memory e = (f x - m a)/(1 - m) of the step before, a = kappa x + e."""
+        b, g, m, f = self.beta, self.gamma, self.m, self.f
+        kappa, of_x, of_a = (1.0 - f) / (1.0 - m), f / (1.0 - m), -m / (1.0 - m)
+        next_x, next_e = of_x + of_a * kappa, of_a
+        return Alpha(
+            beta=b * kappa,
+            gamma=g * kappa,
+            kappa=kappa,
+            start_x=of_x,
+            start_a=of_a,
+            newmark_beta=b,
+            newmark_gamma=g,
+            next_x=next_x,
+            next_e=next_e,
+            velocity_x=(1.0 - g) * kappa + g * next_x,
+            velocity_e=(1.0 - g) + g * next_e,
+            displacement_x=(0.5 - b) * kappa + b * next_x,
+            displacement_e=(0.5 - b) + b * next_e,
+        )
+
+    @property
+    def stability_limit(self) -> float:
+        """None: m <= f <= 1/2 and beta >= 1/4 + (f - m)/2 hold for every member offered."""
+        return math.inf
+
+    @property
+    def is_damped(self) -> bool:
+        """Every member but the one that is average acceleration."""
+        return self.f > self.m
+
+    def phase(self, x: FloatArray) -> FloatArray:
+        """Of average acceleration, to which its phase is close where it damps little: 2 atan(x/2)."""
+        return np.asarray(2.0 * np.arctan(0.5 * x))
+
+
+def hht_alpha(alpha: float) -> AlphaScheme:
+    """Hilber, Hughes and Taylor (1977), alpha from -1/3 (most damping) to 0 (average acceleration)."""
+    return AlphaScheme("hht-alpha", 0.0, -alpha)
+
+
+def generalized_alpha(rho_inf: float) -> AlphaScheme:
+    """Chung and Hulbert (1993): rho_inf is the spectral radius of the highest frequencies, 0 to 1."""
+    return AlphaScheme("generalized-alpha", (2.0 * rho_inf - 1.0) / (rho_inf + 1.0), rho_inf / (rho_inf + 1.0))
+
+
+def _newmark(name: str, beta: float) -> Callable[[Mapping[str, float]], Scheme]:
+    return lambda given: NewmarkScheme(name, beta, 0.5)
+
+
+#: Every scheme of the march by its name in the study file, made of the parameters that stand there.
+SCHEMES: Mapping[str, Callable[[Mapping[str, float]], Scheme]] = {
+    "average-acceleration": _newmark("average-acceleration", 1 / 4),
+    "linear-acceleration": _newmark("linear-acceleration", 1 / 6),
+    "fox-goodwin": _newmark("fox-goodwin", 1 / 12),
+    "central-difference": _newmark("central-difference", 0.0),
+    "newmark": lambda given: NewmarkScheme("newmark", given["beta"], given["gamma"], 2 if given["gamma"] == 0.5 else 1),
+    "hht-alpha": lambda given: hht_alpha(given["alpha"]),
+    "generalized-alpha": lambda given: generalized_alpha(given["rho_inf"]),
+    # average acceleration with h and 2h: the march is the same, `engine.richardson` makes the pair
+    "richardson": lambda given: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2),
+}

@@ -93,6 +93,7 @@ def settle(ties, lanes, state):
                 for r in range(many):
                     a += rows[0, k, r, FORCE] * force[r]
                 state.a[block, k, j] = a / (h * h)
+                state.memory[block, k, j] = 0.0
 
 
 @kernel

@@ -47,7 +47,8 @@ def least_alias_steps(speed: float, modes: int) -> float:
 @pytest.mark.parametrize("speed", [0.01, 0.3, 1.0, 3.0, 20.0])
 @pytest.mark.parametrize("modes", [1, 6, 20])
 def test_alias_steps_are_the_root(speed: float, modes: int) -> None:
-    found = alias_steps(modes * math.pi, (modes * math.pi) ** 2, 1.0, np.array([1.0 / speed]))
+    scene = make_plan(study(beam(modes=modes), mass(1.0, cruise(0.0, 1.0, speed)))).base
+    found = alias_steps(scene, np.array([1.0 / speed]))
     assert found[0] == pytest.approx(least_alias_steps(speed, modes), rel=1e-9)
 
 

@@ -101,6 +101,8 @@ def closure(solver: dict[str, Any]) -> float:
 def test_average_acceleration_is_reversible() -> None:
     assert closure({"steps": 300}) < 1e-12
     assert closure({"steps": 300, "scheme": "newmark", "beta": 0.3025, "gamma": 0.6}) > 1e-3
+    assert closure({"steps": 300, "scheme": "hht-alpha", "alpha": -0.05}) > 1e-3
+    assert closure({"steps": 300, "scheme": "generalized-alpha", "rho_inf": 1.0}) < 1e-12
 
 
 def modal_history(given: Study, zeta: float, steps: int) -> tuple[Any, Array, Array, Array]:
@@ -148,6 +150,10 @@ SCHEMES: dict[str, tuple[dict[str, Any], float]] = {
     "half": ({"scheme": "newmark", "beta": 0.3, "gamma": 0.5}, 2.0),
     "damped": ({"scheme": "newmark", "beta": 0.3025, "gamma": 0.6}, 1.0),
     "fox-goodwin": ({"scheme": "fox-goodwin"}, 2.0),
+    "hht-alpha": ({"scheme": "hht-alpha", "alpha": -0.05}, 2.0),
+    "hht-alpha, most": ({"scheme": "hht-alpha", "alpha": -1 / 3}, 2.0),
+    "generalized-alpha": ({"scheme": "generalized-alpha", "rho_inf": 0.8}, 2.0),
+    "generalized-alpha, most": ({"scheme": "generalized-alpha", "rho_inf": 0.0}, 2.0),
 }
 COUNTS = (3200, 6400, 12800)
 

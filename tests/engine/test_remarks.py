@@ -27,8 +27,7 @@ CASES = {
     "are the units right": passing(car=mass(0.1, cruise(0.0, 1.0, 50.0))),
     "times its body": passing(car=mass(5.0, WAY)),
     "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
-    "resonate with the march": passing(car=mass(0.5, cruise(0.0, 1.0, 2.5)), solver={"steps": 3}),
-    "in a first period": passing(solver={"steps": 30}),
+    "in a first period": passing(beam(modes=1), solver={"steps": 30}),
 }
 
 

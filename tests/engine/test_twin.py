@@ -167,6 +167,14 @@ SCENES: dict[str, Callable[[], Study]] = {
     "damped Newmark, turning": lambda: case(
         beam(supports=DAMPED), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.0, 1)), **scheme("newmark", beta=0.4, gamma=0.7)
     ),
+    "HHT-alpha": lambda: case(beam(), HALF, **scheme("hht-alpha", alpha=-0.1)),
+    "generalized-alpha": lambda: case(beam(damping_ratio=0.02), HALF, **scheme("generalized-alpha", rho_inf=0.6)),
+    "generalized-alpha, smooth cycles": lambda: case(
+        beam(), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.2, 2)), **scheme("generalized-alpha", rho_inf=0.3)
+    ),
+    "generalized-alpha, turning, two ties": lambda: case(
+        beam(supports=DAMPED), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.0, 1)), **scheme("generalized-alpha", rho_inf=0.0)
+    ),
 }
 
 

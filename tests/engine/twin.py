@@ -225,10 +225,38 @@ def march_twin(study: Study, body: str, t: Array) -> Twin:
     start = scenes.equilibrium(scene, 0.0) if study.start == "equilibrium" else scenes.rest(scene)
     if own and study.start == "rest":
         start = State(-study.gravity * bed.own_modal / bed.omega**2, start.v)
-    scheme = naive.Newmark(*study.solver.newmark)
+    alpha = alpha_of(study)
+    if alpha is not None:
+        return Twin(bed, scene, riders, study.gravity, naive.march_alpha(scene, t, start, alpha))
+    scheme = newmark_of(study)
     on_sag = march_on_sag(scene, bed, study.gravity, t, start, scheme) if own else None
     history = naive.march(scene, t, start, scheme) if on_sag is None else on_sag
     return Twin(bed, scene, riders, study.gravity, history)
+
+
+BETA = {"average-acceleration": 1 / 4, "linear-acceleration": 1 / 6, "fox-goodwin": 1 / 12, "central-difference": 0.0}
+
+
+def newmark_of(study: Study) -> naive.Newmark:
+    """The member of Newmark's family that a study names."""
+    solver = study.solver
+    if solver.scheme == "newmark":
+        assert solver.beta is not None and solver.gamma is not None
+        return naive.Newmark(solver.beta, solver.gamma)
+    return naive.Newmark(BETA[solver.scheme], 0.5)
+
+
+def alpha_of(study: Study) -> naive.GeneralizedAlpha | None:
+    """The alpha scheme that a study names, if it does."""
+    solver = study.solver
+    if solver.scheme == "hht-alpha":
+        assert solver.alpha is not None
+        return naive.GeneralizedAlpha(0.0, -solver.alpha)
+    if solver.scheme == "generalized-alpha":
+        assert solver.rho_inf is not None
+        rho = solver.rho_inf
+        return naive.GeneralizedAlpha((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
+    return None
 
 
 def sagging_weight(bed: Bed, load: Load, gravity: float, t: float, side: scenes.Side) -> float:

@@ -29,6 +29,13 @@ class Newmark(NamedTuple):
     gamma: float = 0.5
 
 
+class GeneralizedAlpha(NamedTuple):
+    """Parameters alpha_m, alpha_f of Chung and Hulbert (1993); (0, -alpha) is Hilber, Hughes and Taylor's scheme."""
+
+    m: float
+    f: float
+
+
 class Event(NamedTuple):
     """What the histories do not show: the values just before an event at instant number `step`."""
 
@@ -105,6 +112,37 @@ def collect(scene: Scene, t: Array, states: Sequence[State], a: Sequence[Array],
                 under[n, j] = scene.phi(position[n, j], 0) @ states[n].q
     q, v = np.array([s.q for s in states]), np.array([s.v for s in states])
     return History(t, q, v, np.array(a), force, position, under, tuple(before))
+
+
+def march_alpha(scene: Scene, times: Sequence[float] | Array, start: State, scheme: GeneralizedAlpha) -> History:
+    """Generalized-alpha by Arnold and Bruels (2007), otherwise as `march`.
+
+    With true accelerations q'' that satisfy the equations of motion at every instant, and auxiliary ones a from
+    (1 - m) a_new + m a = (1 - f) q''_new + f q'', in q = u* + beta h^2 a_new, q' = v* + gamma h a_new. The two unknown
+    accelerations are solved for at once.
+    """
+    m_, f_ = scheme
+    gamma, beta = 0.5 - m_ + f_, 0.25 * (1.0 - m_ + f_) ** 2
+    t, inner = snapped(scene, times)
+    n_modes, one = len(scene.omega), np.eye(len(scene.omega))
+    states, true, before = [start], [acceleration(scene, t[0], start, "right")], []
+    a = true[0]
+    for n in range(1, len(t)):
+        h, (q, v) = t[n] - t[n - 1], states[-1]
+        u_star = q + h * v + (0.5 - beta) * h**2 * a
+        v_star = v + (1.0 - gamma) * h * a
+        m, c, k, f = system(scene, t[n], "left")
+        both = np.block([[m, gamma * h * c + beta * h**2 * k], [-(1.0 - f_) * one, (1.0 - m_) * one]])
+        x = np.linalg.solve(both, np.concatenate([f - c @ v_star - k @ u_star, f_ * true[-1] - m_ * a]))
+        now, a = x[:n_modes], x[n_modes:]
+        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
+        if n in inner:
+            before.append(Event(n, t[n], state.v, now, contact_forces(scene, t[n], state, now, "left")))
+            state = State(state.q, state.v + impulse(scene, t[n], state))
+            now = a = acceleration(scene, t[n], state, "right")
+        states.append(state)
+        true.append(now)
+    return collect(scene, t, states, true, before)
 
 
 def march(scene: Scene, times: Sequence[float] | Array, start: State, scheme: Newmark | None = None) -> History:

@@ -32,10 +32,10 @@ def test_values_and_defaults() -> None:
     assert study.carriage["table"].weight(study.gravity) == pytest.approx(981.0)
     assert [c.inertial for c in study.carriage.values()] == [True, False, False, True]
     assert study.carriage["probe"].weight(9.81) == -5.0
-    assert study.solver.newmark == (0.25, 0.5)
+    assert study.solver.integration.coefficients == (0.25, 0.5)
     assert study.body_of("table_moment") == "bed"
     small = load(MINIMAL)
-    assert (small.gravity, small.start, small.solver.newmark) == (STANDARD_GRAVITY, "rest", (0.25, 0.5))
+    assert (small.gravity, small.start, small.solver.scheme) == (STANDARD_GRAVITY, "rest", "average-acceleration")
     assert small.body["bed"].ends == ("pinned", "pinned")
     assert study.start == "equilibrium"
     assert load(SAMPLE.replace('initial = "equilibrium"\n', "")).start == "equilibrium"
@@ -139,7 +139,10 @@ def test_numbers_and_units() -> None:
         ("[sensor.midspan]", "[sensor.status]", ["status", "reserved"]),
         ("speed = {", "table_contact_force_min = {", ["sweep.table_contact_force_min", "result"]),
         ('"displacement"', '"displacment"', ["sensor.midspan.quantity", '"displacement"']),
-        ('scheme = "newmark"', 'scheme = "hht-alpha"', ["solver.scheme", "not built yet"]),
+        ('scheme = "newmark"', 'scheme = "hht-alpha"', ["solver", "hht-alpha", "needs alpha"]),
+        ('scheme = "newmark"', 'scheme = "generalized-alpha"', ["solver", "needs rho_inf"]),
+        ('scheme = "newmark"', 'scheme = "newmark"\nalpha = -0.05', ["solver", "alpha", "not for this scheme"]),
+        ('scheme = "newmark"', 'scheme = "newmark"\nrho_inf = 1.5', ["solver.rho_inf", "<= 1"]),
         ('scheme = "newmark"', 'scheme = "fox-goodwin"', ["solver", "beta and gamma", "not for this scheme"]),
         ("gamma = 0.5", "gamma = 0.4", ["solver.gamma", ">= 0.5"]),
         ('fidelity = "auto"', 'fidelity = "static"', ["not built yet"]),

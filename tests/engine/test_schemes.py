@@ -1,0 +1,134 @@
+"""What a scheme says of itself against its amplification matrix, and what is refused because of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, generalized_alpha, hht_alpha
+from engine.plan import make_plan
+from engine.scene import Study
+from results_schema.errors import BadInput
+from tests.engine.build import beam, cruise, force, mass, study
+
+Array = NDArray[np.float64]
+
+X = np.array([1e-3, 0.1, 0.7, 1.5, 1.99])
+CONDITIONAL = ("linear-acceleration", "fox-goodwin", "central-difference")
+
+
+def newmark_matrix(beta: float, gamma: float, x: float) -> Array:
+    """(u, h u') of one step to the next: u" = -x^2 u at both ends put into Newmark's formulas."""
+    new = np.array([[1.0 + beta * x**2, 0.0], [gamma * x**2, 1.0]])
+    old = np.array([[1.0 - (0.5 - beta) * x**2, 1.0], [-(1.0 - gamma) * x**2, 1.0]])
+    return np.asarray(np.linalg.solve(new, old))
+
+
+def alpha_matrix(m: float, f: float, x: float) -> Array:
+    """(u, h u', h^2 a) of one step to the next, as Chung and Hulbert (1993) write their scheme."""
+    gamma, beta = 0.5 - m + f, 0.25 * (1.0 - m + f) ** 2
+    new = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - f) * x**2, 0.0, 1.0 - m]])
+    old = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-f * x**2, 0.0, -m]])
+    return np.asarray(np.linalg.solve(new, old))
+
+
+def kernel_matrix(scheme: AlphaScheme, x: float) -> Array:
+    """(u, h u', e) of one step to the next by the coefficients that the kernels take."""
+    c = scheme.coefficients
+    columns = []
+    for u, v, e in np.eye(3):  # predictors and memory before the step; without a force the true acceleration is
+        true = -(x**2) * u / (1.0 + c.beta * x**2)
+        q, rate = u + c.beta * true, v + c.gamma * true
+        v_next = rate + c.velocity_x * true + c.velocity_e * e
+        u_next = q + rate + c.displacement_x * true + c.displacement_e * e
+        columns.append([u_next, v_next, c.next_x * true + c.next_e * e])
+    return np.array(columns).T
+
+
+def radius(matrix: Array) -> float:
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
+
+
+@pytest.mark.parametrize("name", ["average-acceleration", *CONDITIONAL, "newmark"])
+def test_phase_is_that_of_the_amplification_matrix(name: str) -> None:
+    scheme = SCHEMES[name]({"beta": 0.3025, "gamma": 0.6})
+    assert isinstance(scheme, NewmarkScheme)
+    found = scheme.phase(X)
+    wanted = [np.abs(np.angle(np.linalg.eigvals(newmark_matrix(scheme.beta, scheme.gamma, x)))).max() for x in X]
+    np.testing.assert_allclose(found, wanted, rtol=1e-7, equal_nan=False)
+
+
+def test_phase_of_average_acceleration() -> None:
+    x = np.array([0.0, 1e-8, 1.0, 30.0, 1e12, 1e200])
+    found = SCHEMES["average-acceleration"]({}).phase(x)
+    np.testing.assert_allclose(found, 2.0 * np.arctan(x / 2.0), rtol=0, atol=1e-7, equal_nan=False)
+
+
+@pytest.mark.parametrize("name", CONDITIONAL)
+def test_phase_is_half_a_turn_at_the_limit(name: str) -> None:
+    scheme = SCHEMES[name]({})
+    assert float(scheme.phase(np.array([scheme.stability_limit * (1.0 - 1e-9)]))[0]) == pytest.approx(math.pi, abs=1e-3)
+    assert isinstance(scheme, NewmarkScheme)
+    assert radius(newmark_matrix(scheme.beta, scheme.gamma, 0.999 * scheme.stability_limit)) < 1.0 + 1e-12
+    assert radius(newmark_matrix(scheme.beta, scheme.gamma, 1.001 * scheme.stability_limit)) > 1.01
+
+
+ALPHA = [hht_alpha(0.0), hht_alpha(-0.05), hht_alpha(-1 / 3), *map(generalized_alpha, (0.0, 0.3, 0.8, 1.0))]
+
+
+@pytest.mark.parametrize("scheme", ALPHA, ids=repr)
+def test_alpha_schemes_are_chung_and_hulberts(scheme: AlphaScheme) -> None:
+    """Equal eigenvalues: for one oscillator the form with true accelerations is the same scheme."""
+    for x in (0.01, 0.3, 2.0, 50.0):
+        found = np.sort_complex(np.linalg.eigvals(kernel_matrix(scheme, x)))
+        wanted = np.sort_complex(np.linalg.eigvals(alpha_matrix(scheme.m, scheme.f, x)))
+        assert np.abs(np.poly(found) - np.poly(wanted)).max() < 1e-12
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.3, 0.8, 1.0])
+def test_rho_inf_is_the_radius_at_high_frequency(rho: float) -> None:
+    assert radius(kernel_matrix(generalized_alpha(rho), 1e6)) == pytest.approx(rho, abs=2e-3)
+
+
+@pytest.mark.parametrize("scheme", ALPHA, ids=repr)
+def test_alpha_schemes_have_no_limit(scheme: AlphaScheme) -> None:
+    largest = max(radius(kernel_matrix(scheme, x)) for x in np.geomspace(1e-3, 1e6, 60))
+    assert largest < 1.0 + 1e-7
+    assert scheme.stability_limit == math.inf
+    assert scheme.is_damped == (radius(kernel_matrix(scheme, 100.0)) < 0.999)
+
+
+def passing(steps: int, scheme: str, car: Any = None, **parameters: float) -> Study:
+    solver = {"steps": steps, "scheme": scheme, **parameters}
+    return study(beam(modes=12), car or mass(0.5, cruise(0.0, 1.0, 0.3)), solver=solver)
+
+
+def least_steps(scheme: Scheme) -> float:
+    """The alias rule of the 12th mode, k v h + phase = pi, by scanning."""
+    steps = np.geomspace(10.0, 1e5, 400_001)
+    h = 1.0 / (0.3 * steps)
+    turned = 12 * math.pi * 0.3 * h + scheme.phase((12 * math.pi) ** 2 * h)
+    return float(steps[np.argmax(turned < math.pi)])
+
+
+@pytest.mark.parametrize("name", ["average-acceleration", "richardson", *CONDITIONAL])
+def test_too_few_steps_for_the_alias_rule_are_refused(name: str) -> None:
+    least = SCHEMES[name]({}).stride * least_steps(SCHEMES[name]({})) * (1.1 if name in CONDITIONAL else 1.0)
+    assert make_plan(passing(math.ceil(1.001 * least), name)).buckets
+    with pytest.raises(BadInput) as caught:
+        make_plan(passing(math.floor(0.999 * least), name))
+    assert "solver.steps" in str(caught.value) and "steps = " in caught.value.remedy
+    suggested = int(caught.value.remedy.split()[2])
+    assert make_plan(passing(suggested, name)).buckets
+    assert suggested < 1.2 * least
+
+
+def test_the_alias_rule_is_for_masses_and_schemes_without_damping() -> None:
+    few = math.floor(0.5 * least_steps(SCHEMES["average-acceleration"]({})))
+    assert make_plan(passing(few, "hht-alpha", alpha=-0.05)).buckets
+    assert make_plan(passing(few, "generalized-alpha", rho_inf=0.8)).buckets
+    assert make_plan(passing(few, "average-acceleration", force(1.0, cruise(0.0, 1.0, 0.3)))).buckets
