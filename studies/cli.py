@@ -117,13 +117,14 @@ def list_() -> None:
 @click.option("--modes", type=click.IntRange(1, 64), default=10, show_default=True, help="Modes of the beam.")
 @click.option("--steps", type=click.IntRange(1, 10**6), default=1000, show_default=True, help="Steps of a passage.")
 @click.option("--variants", type=click.IntRange(1, 10**6), default=16384, show_default=True, help="Variants at once.")
+@click.option("--scheme", default="average-acceleration", show_default=True, help="Time integration scheme.")
 @_THREADS
 @_JSON
-def bench(modes: int, steps: int, variants: int, threads: int | None, as_json: bool) -> None:
+def bench(modes: int, steps: int, variants: int, scheme: str, threads: int | None, as_json: bool) -> None:
     """Measure the pace of the march on this machine."""
     from studies import actions, console
 
-    found = actions.bench(modes, steps, variants, threads)
+    found = actions.bench(modes, steps, variants, scheme, threads)
     if as_json:
         console.say_json(found.as_json())
     else:

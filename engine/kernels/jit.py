@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import llvmlite.binding as llvm
 import numba
+from numba.extending import overload
 
 #: LLVM unrolls short loops of constant length completely before its vectoriser sees them, and a loop over the lanes
 #: then stays scalar; with this limit they are vectorised (twice the pace of the march).
@@ -71,6 +72,11 @@ def kernel(function: Callable[..., None]) -> Callable[..., None]:
 def piece(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that kernels take into their own body."""
     return cast(Callable[..., Any], numba.njit(inline="always", **_POLICY)(function))
+
+
+def chosen_for(stub: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorate what picks, by the types of a call's arguments, the piece that stands for ``stub`` inside kernels."""
+    return cast(Callable[[Callable[..., Any]], Callable[..., Any]], overload(stub, inline="always"))
 
 
 def cache_is_damaged(error: BaseException) -> bool:

@@ -18,7 +18,6 @@ from engine.kernels.record import (
     A_NOW,
     CD,
     FACTOR,
-    FIELDS,
     GAIN,
     GRAVITY,
     KD,
@@ -42,11 +41,11 @@ from engine.kernels.record import (
     keep,
     observe,
 )
-from engine.kernels.stepping import advance, corrected, first_predictors
+from engine.kernels.stepping import advance, corrected, fields_of, first_predictors, remember
 
 
 @piece
-def load_block(work, carry, b, lanes, state, scheme, block):
+def load_block(work, b, lanes, state, scheme, block):
     """Coefficients of the step, and the predictors of the first one, of one block of lanes."""
     beta, gamma = scheme.beta, scheme.gamma
     for j in range(LANES):
@@ -69,15 +68,15 @@ def load_block(work, carry, b, lanes, state, scheme, block):
             work[k, U, j] = u
             work[k, V, j] = v
             work[k, C, j] = c * d * v + s * d * u
-            carry[k, j] = e
+            remember(scheme, work, k, j, e)
 
 
 @piece
-def store_mode(work, carry, b, state, scheme, block, k):
+def store_mode(work, b, state, scheme, block, k):
     """Corrected state of mode k in SI units; b[PUSH] is the sum of p F of the step just solved."""
     for j in range(LANES):
         x = work[k, D, j] * b[PUSH, j] - work[k, C, j]
-        q, v, a, memory = corrected(scheme, work, carry, b, k, j, x)
+        q, v, a, memory = corrected(scheme, work, b, k, j, x)
         state.q[block, k, j] = q
         state.v[block, k, j] = v
         state.a[block, k, j] = a
@@ -98,13 +97,12 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
     leads = channels if channels <= 2 and watch.on_q.shape[1] == channels else 0
     lead_moves = 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
-    work = np.zeros((modes, FIELDS, LANES))
-    carry = np.zeros((modes, LANES))
+    work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     for block in range(lanes.step.shape[0]):
-        load_block(work, carry, b, lanes, state, scheme, block)
+        load_block(work, b, lanes, state, scheme, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
         for j in range(LANES):
@@ -131,7 +129,7 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
                 for k in range(modes):
                     for j in range(LANES):
                         b[PUSH, j] = rows[n, k, 0, FORCE] * b[TIE, j]
-                    store_mode(work, carry, b, state, scheme, block, k)
+                    store_mode(work, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             at = lead_moves * n
             for k in range(modes):
@@ -147,7 +145,7 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
                     row, second = watch.on_q[at, 0, k], watch.on_q[at, 1, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
+                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
                         b[LEAD, j] += row * q
                         b[SECOND, j] += second * q
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
@@ -156,14 +154,14 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
                     row = watch.on_q[at, 0, k]
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
+                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
                         b[LEAD, j] += row * q
                         b[SUM, j] += w * c - (rate * v_next + curve * q_next)
                         b[FACTOR, j] += wp * work[k, D, j]
                 else:
                     for j in range(LANES):
                         a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, carry, k, j, a)
+                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
                         now[k, Q_NOW, j] = q
                         now[k, V_NOW, j] = v
                         now[k, A_NOW, j] = a
@@ -251,15 +249,14 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
     rows = ties.rows
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
     # allocated here and not in a piece: only so does the compiler know their strides
-    work = np.zeros((modes, FIELDS, LANES))
-    carry = np.zeros((modes, LANES))
+    work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
     sums = np.zeros((ties.reacting.shape[0], LANES))
     factor = np.zeros((ties.reacting.shape[0], many, LANES))
     for block in range(lanes.step.shape[0]):
-        load_block(work, carry, b, lanes, state, scheme, block)
+        load_block(work, b, lanes, state, scheme, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
         sums[:] = 0.0
@@ -271,13 +268,13 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
             if n == stations - 1:
                 for k in range(modes):
                     push_on_mode(b, rows, n, k)
-                    store_mode(work, carry, b, state, scheme, block, k)
+                    store_mode(work, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             for k in range(modes):
                 push_on_mode(b, rows, n, k)
                 for j in range(LANES):
                     a = work[k, D, j] * b[PUSH, j] - work[k, C, j]
-                    q, v, _, _, _ = advance(scheme, work, carry, k, j, a)
+                    q, v, _, _, _ = advance(scheme, work, k, j, a)
                     now[k, Q_NOW, j] = q
                     now[k, V_NOW, j] = v
                     now[k, A_NOW, j] = a

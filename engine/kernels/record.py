@@ -21,8 +21,8 @@ from engine.kernels.layout import (
 
 # rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
 SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, PUSH, TIE = range(12)
-# fields of the per-mode work array
-U, V, C, D, CD, KD = range(6)
+# fields of the per-mode work array; Newmark's family has the first six
+U, V, C, D, CD, KD, E = range(7)
 FIELDS = 6
 # column of a block's own marks, beyond those of Record: the signal's value at the station
 VALUE = MARKS

@@ -1,28 +1,40 @@
 """One mode's step in each family of schemes: the first predictors, the correction with the next predictors, the end.
 
 The functions named for what they do are chosen when a kernel is compiled, by the class of the scheme's coefficients,
-so that Newmark's family does not pay for the memory of the alpha schemes (``carry``, one number per mode and lane).
+so that Newmark's family does not pay for the memory of the alpha schemes (field E of the work array).
 """
 
-from numba.extending import overload
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
+from engine.kernels.jit import chosen_for
 from engine.kernels.layout import Alpha
-from engine.kernels.record import CD, KD, RATE_1, RATE_2, C, U, V
+from engine.kernels.record import CD, FIELDS, KD, RATE_1, RATE_2, C, E, U, V
+
+
+def fields_of(scheme):
+    """Number of fields that a mode has in the work array."""
+    return _family(type(scheme)).fields(scheme)
+
+
+def remember(scheme, work, k, j, e):
+    """Keep the memory of mode k of lane j for its first step."""
+    return _family(type(scheme)).remember(scheme, work, k, j, e)
 
 
 def first_predictors(scheme, q, v, a, memory):
     """u*, v* and the memory of the first step, from a state in step units."""
-    return _BODIES[isinstance(scheme, Alpha)][0](scheme, q, v, a, memory)
+    return _family(type(scheme)).first(scheme, q, v, a, memory)
 
 
-def advance(scheme, work, carry, k, j, x):
+def advance(scheme, work, k, j, x):
     """Correct mode k of lane j with its acceleration x and predict the next step; returns q, v, u*, v*, c*."""
-    return _BODIES[isinstance(scheme, Alpha)][1](scheme, work, carry, k, j, x)
+    return _family(type(scheme)).advance(scheme, work, k, j, x)
 
 
-def corrected(scheme, work, carry, b, k, j, x):
+def corrected(scheme, work, b, k, j, x):
     """Displacement, velocity, acceleration and memory of mode k of lane j in SI units, from its acceleration x."""
-    return _BODIES[isinstance(scheme, Alpha)][2](scheme, work, carry, b, k, j, x)
+    return _family(type(scheme)).corrected(scheme, work, b, k, j, x)
 
 
 def _first_newmark(scheme, q, v, a, memory):
@@ -39,7 +51,7 @@ def _first_alpha(scheme, q, v, a, memory):
     )
 
 
-def _advance_newmark(scheme, work, carry, k, j, x):
+def _advance_newmark(scheme, work, k, j, x):
     q = work[k, U, j] + scheme.beta * x
     v = work[k, V, j] + scheme.gamma * x
     v_next = v + (1.0 - scheme.gamma) * x
@@ -51,8 +63,8 @@ def _advance_newmark(scheme, work, carry, k, j, x):
     return q, v, q_next, v_next, c
 
 
-def _advance_alpha(scheme, work, carry, k, j, x):
-    e = carry[k, j]
+def _advance_alpha(scheme, work, k, j, x):
+    e = work[k, E, j]
     q = work[k, U, j] + scheme.beta * x
     v = work[k, V, j] + scheme.gamma * x
     v_next = v + (scheme.velocity_x * x + scheme.velocity_e * e)
@@ -61,39 +73,77 @@ def _advance_alpha(scheme, work, carry, k, j, x):
     work[k, U, j] = q_next
     work[k, V, j] = v_next
     work[k, C, j] = c
-    carry[k, j] = scheme.next_x * x + scheme.next_e * e
+    work[k, E, j] = scheme.next_x * x + scheme.next_e * e
     return q, v, q_next, v_next, c
 
 
-def _corrected_newmark(scheme, work, carry, b, k, j, x):
+def _corrected_newmark(scheme, work, b, k, j, x):
     q = work[k, U, j] + scheme.beta * x
     v = work[k, V, j] + scheme.gamma * x
     return q, v * b[RATE_1, j], x * b[RATE_2, j], 0.0
 
 
-def _corrected_alpha(scheme, work, carry, b, k, j, x):
+def _corrected_alpha(scheme, work, b, k, j, x):
     q = work[k, U, j] + scheme.beta * x
     v = work[k, V, j] + scheme.gamma * x
-    memory = (scheme.kappa - 1.0) * x + carry[k, j]
+    memory = (scheme.kappa - 1.0) * x + work[k, E, j]
     return q, v * b[RATE_1, j], x * b[RATE_2, j], memory * b[RATE_2, j]
 
 
-_BODIES = (
-    (_first_newmark, _advance_newmark, _corrected_newmark),
-    (_first_alpha, _advance_alpha, _corrected_alpha),
-)
+def _fields_newmark(scheme):
+    return FIELDS
 
 
-@overload(first_predictors, inline="always")
+def _fields_alpha(scheme):
+    return FIELDS + 1
+
+
+def _remember_newmark(scheme, work, k, j, e):
+    pass
+
+
+def _remember_alpha(scheme, work, k, j, e):
+    work[k, E, j] = e
+
+
+class Family(NamedTuple):
+    """The functions of one family of schemes."""
+
+    fields: Callable[..., int]
+    first: Callable[..., Any]
+    remember: Callable[..., None]
+    advance: Callable[..., Any]
+    corrected: Callable[..., Any]
+
+
+_NEWMARK = Family(_fields_newmark, _first_newmark, _remember_newmark, _advance_newmark, _corrected_newmark)
+_ALPHA = Family(_fields_alpha, _first_alpha, _remember_alpha, _advance_alpha, _corrected_alpha)
+
+
+def _family(coefficients: type) -> Family:
+    return _ALPHA if coefficients is Alpha else _NEWMARK
+
+
+@chosen_for(fields_of)
+def _choose_fields(scheme):
+    return _family(scheme.instance_class).fields
+
+
+@chosen_for(remember)
+def _choose_remember(scheme, work, k, j, e):
+    return _family(scheme.instance_class).remember
+
+
+@chosen_for(first_predictors)
 def _choose_first(scheme, q, v, a, memory):
-    return _BODIES[scheme.instance_class is Alpha][0]
+    return _family(scheme.instance_class).first
 
 
-@overload(advance, inline="always")
-def _choose_advance(scheme, work, carry, k, j, x):
-    return _BODIES[scheme.instance_class is Alpha][1]
+@chosen_for(advance)
+def _choose_advance(scheme, work, k, j, x):
+    return _family(scheme.instance_class).advance
 
 
-@overload(corrected, inline="always")
-def _choose_corrected(scheme, work, carry, b, k, j, x):
-    return _BODIES[scheme.instance_class is Alpha][2]
+@chosen_for(corrected)
+def _choose_corrected(scheme, work, b, k, j, x):
+    return _family(scheme.instance_class).corrected

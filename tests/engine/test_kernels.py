@@ -36,13 +36,14 @@ def small(name: str) -> Study:
     given: dict[str, Any] = {"sensor": sensors, "output": {"histories": "all"}, "sweep": sweep}
     short = cruise(-0.1, 1.1, 0.9, after=0.02)
     if name == "one":
-        return study(beam(modes=3), mass(0.3, short), **given, solver={"steps": 12})
+        return study(beam(modes=3), mass(0.3, short), **given, solver={"steps": 24})
     if name == "quiet":
-        return study(beam(modes=4), mass(0.3, short), sweep=sweep, solver={"steps": 1})
+        pushed = {"weight": sweep["weight"] | {"of": "carriage.car.force"}}
+        return study(beam(modes=4), force(0.3, short), sweep=pushed, solver={"steps": 1})
     if name == "turning":
-        return study(beam(modes=2), mass(0.3, shuttle(0.2, 0.8, 1.0, 0.0, 2)), **given, solver={"steps": 6})
+        return study(beam(modes=2), mass(0.3, shuttle(0.2, 0.8, 1.0, 0.0, 2)), **given, solver={"steps": 16})
     riding = {"car": mass(0.3, short), "next": force(2.0, cruise(1.0, 0.0, 1.1), delay=0.2)}
-    return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 9})
+    return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 26})
 
 
 NAMES = ("one", "quiet", "turning", "many")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine.execution import march_seconds
+from engine.kernels.schemes import SCHEMES
 from engine.plan import Plan
 from studies import bench
 from studies.bench import Scene, Throughput
@@ -58,3 +59,16 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["best_of"] >= 3 and found["case_mode_steps_per_second"] > 0
     assert main(["bench", "--modes", "3", "--steps", "50", "--variants", "32"]) == 0
     assert "per second" in capsys.readouterr().out
+
+
+def test_every_scheme_stays_finite(capsys: pytest.CaptureFixture[str]) -> None:
+    compared = 0
+    for name in SCHEMES:
+        found = bench.largest_deflections(Scene(modes=4, steps=200, variants=16, scheme=name))
+        assert np.isfinite(found).all() and found.min() > 0.0
+        compared += 1
+    assert compared >= 8
+    assert main(["bench", "--scheme", "hht"]) == 2
+    assert "hht-alpha" in capsys.readouterr().err
+    assert main(["bench", "--scheme", "fox-goodwin", "--modes", "60", "--steps", "10"]) == 2
+    assert "more steps or fewer modes" in capsys.readouterr().err
