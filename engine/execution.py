@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from results_schema.errors import BadInput, Interrupted
 if TYPE_CHECKING:
     import xarray as xr
 
+    from engine.march import March
     from results_schema.parts import Rows
 
 Counts = NDArray[np.int64]
@@ -111,8 +112,6 @@ def warm_up(plan: Plan) -> None:
 def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
     """Wall time of marching every variant once with the study's sensors alone, without compiling, tabulating, and
     gathering results; the mean over ``repeats`` marches in a row."""
-    import dask.threaded
-
     from engine.lanes import padded
     from engine.march import prepare
     from engine.tables import SceneTables
@@ -122,26 +121,40 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     workers = threads or os.cpu_count() or 1
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     marches = [prepare(tables[id(bucket)], plan.values(bucket, padded(part)), nothing) for bucket, part in chunks]
+    return seconds_of(marches, workers) / repeats
+
+
+def seconds_of(marches: Sequence[March], threads: int) -> float:
+    """Wall time of marches that are ready to go, on threads, without tabulating; each can go once."""
     for march in marches:
         for segment in march.tables.timeline.segments:
             march.tables.table(segment)
         for part in march.state:
             part += 0.0  # the operating system hands memory out at the first touch
-    graph = {("march", i): (march.go,) for i, march in enumerate(marches)}
+    return seconds_of_jobs([march.go for march in marches], threads)
+
+
+def seconds_of_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> float:
+    """Wall time of jobs on threads."""
+    import dask.threaded
+
+    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
     start = time.perf_counter()
-    dask.threaded.get(graph, list(graph), num_workers=workers)
-    return (time.perf_counter() - start) / repeats
+    dask.threaded.get(graph, list(graph), num_workers=threads)
+    return time.perf_counter() - start
 
 
 def _first_steps(plan: Plan, bucket: Bucket) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
     from engine.lanes import padded
-    from engine.march import Halted, march
+    from engine.march import Halted
+    from engine.richardson import march_chosen
     from engine.tables import SceneTables
 
-    tables = SceneTables(bucket.scene, 2, plan.window)
+    tables = SceneTables(bucket.scene, 4, plan.window, refinement=bucket.tables.refinement)
     with suppress(Halted):
-        march(tables, plan.values(bucket, padded(bucket.variants[:1])), np.zeros(0, dtype=np.int64), 1, lambda: True)
+        values = plan.values(bucket, padded(bucket.variants[:1]))
+        march_chosen(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 
 def _compute(

@@ -121,23 +121,19 @@ def allow_any_steps(model: SceneModel, time_scale: Array, steps: Array | Counts)
 def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
     limit = model.scheme.stability_limit
     highest = float(model.omega.max())
-    worst = int(np.argmax(time_scale / steps))
-    found = highest * float(time_scale[worst] / steps[worst])
+    found = highest * float(np.max(time_scale / steps))
     if found > limit:
-        enough = math.ceil(LIMIT_MARGIN * highest * float(time_scale[worst]) / limit)
         raise BadInput(
             "the step is beyond the scheme's stability limit",
             where=model.study.source.where("solver.steps"),
             expected=f"omega h <= {limit:.4g} with the highest mode kept ({highest:.4g} rad/s)",
             received=f"omega h = {found:.4g}",
-            remedy=f'steps = {enough} or more, steps = "auto", or scheme = "average-acceleration"',
+            remedy=f'{_enough(model, time_scale)}, steps = "auto", or scheme = "average-acceleration"',
         )
 
 
 def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
-    least = alias_steps(model, time_scale)
-    if math.isfinite(model.scheme.stability_limit):
-        least = CONDITIONAL_MARGIN * least
+    least = _least_steps(model, time_scale)
     worst = int(np.argmax(least / steps))
     if least[worst] > steps[worst]:
         raise BadInput(
@@ -145,9 +141,22 @@ def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
             where=model.study.source.where("solver.steps"),
             expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle (the alias rule)",
             received=str(int(steps[worst])),
-            remedy=f'steps = {math.ceil(LIMIT_MARGIN * float(least[worst]))} or more, steps = "auto", fewer modes, '
-            'or scheme = "hht-alpha" with alpha = -0.05, which damps it',
+            remedy=f'{_enough(model, time_scale)}, steps = "auto", fewer modes, or scheme = "hht-alpha" with '
+            "alpha = -0.05, which damps it",
         )
+
+
+def _least_steps(model: SceneModel, time_scale: Array) -> Array:
+    """(V,) the fewest steps that the alias rule allows, with the margin that a conditionally stable scheme needs."""
+    margin = CONDITIONAL_MARGIN if math.isfinite(model.scheme.stability_limit) else 1.0
+    return margin * alias_steps(model, time_scale)
+
+
+def _enough(model: SceneModel, time_scale: Array) -> str:
+    """A number of steps that is refused for no variant."""
+    inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
+    enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, _least_steps(model, time_scale))))
+    return f"steps = {math.ceil(enough)} or more"
 
 
 def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:

@@ -18,10 +18,12 @@ from engine.kernels.layout import (
     SQUARES,
 )
 from engine.lanes import LaneValues, padded
-from engine.march import Marched, march
+from engine.march import Marched
 from engine.model import SceneModel
 from engine.plan import Bucket, Plan
 from engine.reduction import Cycle
+from engine.resolution import RESOLVED, phase_errors
+from engine.richardson import march_chosen, relative_error
 from engine.tables import SceneTables
 from results_schema.parts import Rows
 from results_schema.status import Status
@@ -43,7 +45,7 @@ def run_chunk(
     if plan.reduction is not None:
         counts = counts_reduced(tables.timeline, plan.reduction.stations)
     values = plan.values(bucket, padded(variants))
-    marched = march(tables, values, counts, variants.size, halted)
+    marched, gap = march_chosen(tables, values, counts, variants.size, halted)
     values = plan.values(bucket, variants)
     flat: Flat = {
         **_extremes(tables, marched),
@@ -52,6 +54,10 @@ def run_chunk(
         **_reduced(plan, tables, values, counts, marched.history),
     }
     status, diverged_step = _status(tables.model, marched)
+    if gap is not None:
+        resolved = phase_errors(tables, values) <= RESOLVED
+        status = np.where(resolved, status, np.maximum(status, Status.UNRESOLVED)).astype(np.int8)
+        flat["error_steps"] = np.where(resolved, _relative(tables, marched, gap, flat), np.nan)
     for name, array in flat.items():
         if array.dtype == np.float64:
             array[status >= Status.NOT_CONVERGED] = np.nan
@@ -155,6 +161,12 @@ def _largest_static(force: Array, offset: Array, weights: Array, gravity: Array)
     return found
 
 
+def _relative(tables: SceneTables, marched: Marched, gap: Array, flat: Flat) -> Array:
+    """(V,) estimated errors of the sensors, the largest relative one."""
+    statics = [np.asarray(flat[f"{sensor.name}_static"], dtype=np.float64) for sensor in tables.sensors]
+    return relative_error(tables, marched, gap, np.stack(statics))
+
+
 def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts, history: Array) -> Flat:
     """The study's own results from the cycle."""
     if plan.reduction is None:
@@ -184,7 +196,7 @@ def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[]
     tables = bucket.tables.with_accelerations if plan.reads_accelerations else bucket.tables
     counts = plan.counts_shown(bucket)
     values = plan.values(bucket, padded(kept))
-    marched = march(tables, values, counts, kept.size, halted)
+    marched, _ = march_chosen(tables, values, counts, kept.size, halted)
     time_scale = plan.values(bucket, kept).time_scale(tables.model.carriages[0].name)
     elapsed = _elapsed(tables, counts, time_scale)
     arrays: dict[str, Array] = {"elapsed": elapsed}

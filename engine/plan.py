@@ -19,6 +19,7 @@ from engine.kernels.layout import LANES
 from engine.lanes import LANE_KEYS, LaneValues
 from engine.model import SceneModel, build_model, check_moves
 from engine.reduction import Reduction
+from engine.resolution import steps_to_resolve
 from engine.scene import Study
 from engine.sweep import Cases, expand
 from engine.tables import SceneTables
@@ -30,12 +31,14 @@ Counts = NDArray[np.int64]
 CheckSteps = Callable[[SceneModel, NDArray[np.float64], Counts], None]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
+PAIR = 2.5  # times the work of one march: a Richardson pair, 1.5 of it by its steps; for expected times only
 START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
 MOST_LANES = 65536  # of one chunk
 MOST_HISTORY_BYTES = 48 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
+MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
 SHOWN = 64  # variants whose histories are kept by default
 
@@ -63,7 +66,8 @@ class Bucket:
         """Expected time on one thread."""
         signals = 1.0 + 0.1 * len(self.tables.signals)
         ties = self.scene.ties**1.5
-        return float(self.scene.omega.size * self.tables.timeline.steps * signals * ties / PACE)
+        marches = 1.0 if self.scene.scheme.stride == 1 else PAIR
+        return float(self.scene.omega.size * self.tables.timeline.steps * marches * signals * ties / PACE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +162,9 @@ class Plan:
         if self.reduction is not None:
             rows = min(2 * self.reduction.stations, bucket.steps)
             lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
+        if bucket.tables.refinement > 1:  # a pair has all histories of a segment in memory
+            stations = 1.5 * max(segment.steps for segment in bucket.tables.timeline.segments)
+            lanes = min(lanes, MOST_PAIR_BYTES / (8 * stations * len(bucket.tables.signals)))
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
 
     def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Bucket, Counts]]:
@@ -284,7 +291,7 @@ def _buckets(
     steps, reasons = _steps(scene, values, check_steps)
     pace = values.time_scale(scene.carriages[0].name)  # variants of like pace rise and fall together: fewer extremes
     for part in _split(np.arange(variants.size), steps):
-        tables = SceneTables(scene, int(steps[part[0]]), window)
+        tables = SceneTables(scene, int(steps[part[0]]), window, refinement=scene.scheme.stride)
         _check_readings(scene, tables)
         yield Bucket(tables, variants[part[np.argsort(pace[part], kind="stable")]], reasons(part))
 
@@ -293,12 +300,17 @@ def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tu
     """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
     time_scale = values.time_scale(scene.carriages[0].name)
     if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
-        steps = values.of("solver.steps").astype(np.int64)
+        wanted = values.of("solver.steps").astype(np.int64)
+        steps = -(-wanted // scene.scheme.stride) * scene.scheme.stride
         check_most_steps(scene, steps)
         check_steps(scene, time_scale, steps)
         return steps, lambda part: "as the study says"
     distinct, inverse = np.unique(time_scale, return_inverse=True)
     needs = needed_steps(scene, distinct)
+    if scene.scheme.stride > 1:
+        per_rule = {name: needed[inverse] for name, needed in needs.per_rule.items()}
+        needs = Needs(per_rule | {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)})
+        inverse = np.arange(values.size)
     check_most_steps(scene, needs.total)
     return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
 

@@ -91,6 +91,8 @@ class SceneTables:
     @cached_property
     def coarser(self) -> SceneTables:
         """The same with half the steps, for a Richardson pair; ``refinement`` must be even."""
+        if self.refinement % 2:
+            raise ValueError(f"refinement: expected an even number, received {self.refinement}")
         found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
         found._unrefined = self._unrefined
         return found
@@ -119,11 +121,15 @@ class SceneTables:
         return found
 
     def _build(self, segment: Segment) -> SegmentTable:
-        along = ways(self.model, segment)
+        along = self._ways(segment)
         contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
         watch = tabulate_watch(self.model, self.signals, along)
         guard = tabulate_watch(self.model, contacts, along) if contacts else watch
         return SegmentTable(tabulate_ties(self.model, along, self.scheme), watch, guard)
+
+    def _ways(self, segment: Segment) -> tuple[Way, ...]:
+        """The ways of all carriages along a segment."""
+        return ways(self.model, segment)
 
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""

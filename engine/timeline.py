@@ -10,7 +10,7 @@ from __future__ import annotations
 import bisect
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -241,6 +241,18 @@ def build_timeline(riders: tuple[Rider, ...], steps: int, window: Window, free_s
     span = (kept[0].first, kept[-1].first + kept[-1].steps)
     repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
     return Timeline(riders, tuple(segments), span, repeats, free)
+
+
+def refined(timeline: Timeline, by: int) -> Timeline:
+    """The same timeline with every step cut into ``by`` equal ones: its station n is the new station n times ``by``.
+
+    >>> whole = build_timeline((Rider(Cruise(kind="cruise", start=0.0, end=1.0, speed=1.0), 1.0),), 5, "whole")
+    >>> refined(whole, 2).window
+    (0, 10)
+    """
+    segments = tuple(s._replace(steps=s.steps * by, first=s.first * by) for s in timeline.segments)
+    first, last = timeline.window
+    return replace(timeline, segments=segments, window=(first * by, last * by))
 
 
 def _between(riders: tuple[Rider, ...], ends: tuple[float, float], steps: int, count: int) -> list[Segment]:

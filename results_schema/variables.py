@@ -192,11 +192,11 @@ declare(
     _axis("peak", "number of the peak in the cycle", dtype="int64"),
     _axis("mode", "number of the mode, from 1", dtype="int64"),
     _planned("sample", "number of the variant that was run again", dtype="int64"),
-    _planned("scheme", "time integration scheme", dtype="str"),
-    _planned("step_count", "steps over one passage or cycle", dtype="int64"),
-    _planned("mode_count", "number of modes", dtype="int64"),
-    _planned("quantity", "measured quantity", dtype="str"),
-    _planned("relative_step", "omega_1 times the time step"),
+    _axis("scheme", "time integration scheme", dtype="str"),
+    _axis("step_count", "steps over one passage or cycle", dtype="int64"),
+    _axis("mode_count", "number of modes", dtype="int64"),
+    _axis("quantity", "measured quantity", dtype="str"),
+    _axis("relative_step", "omega_1 times the time step"),
     _planned("robot", "robot", dtype="str"),
     _planned("component", "component of the vector", dtype="str"),
 )
@@ -224,6 +224,15 @@ declare(
         nan_allowed=True,
         planned=True,
     ),
+    Variable(
+        "error_steps",
+        long_name="part of the estimated relative error that comes from the time step",
+        meaning="of the finer march of a Richardson pair: largest over the sensors of a third of the largest "
+        "difference of both marches over time, divided by the largest static value of that sensor (velocity and "
+        "acceleration: by their own largest value); NaN where a mode is not resolved",
+        required=False,
+        nan_allowed=True,
+    ),
     *(
         Variable(
             f"error_{source}",
@@ -232,7 +241,7 @@ declare(
             nan_allowed=True,
             planned=True,
         )
-        for source, what in (("steps", "time step"), ("modes", "number of modes"), ("fidelity", "choice of model"))
+        for source, what in (("modes", "number of modes"), ("fidelity", "choice of model"))
     ),
 )
 

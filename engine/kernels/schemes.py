@@ -15,7 +15,6 @@ import numpy as np
 
 from engine.kernels.layout import Alpha, FloatArray, Newmark
 
-
 _FAR = 1e100  # omega h beyond which nothing changes, and whose square is a number
 
 

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
 from engine.scene import Study
-from tests.naive import motions
+from tests.naive import motions, ode
 from tests.naive import newmark as naive
 from tests.naive import scene as scenes
 from tests.naive.scene import Array, Damper, Load, Phase, Scene, State
@@ -214,9 +214,29 @@ class Twin(NamedTuple):
 
 def march_twin(study: Study, body: str, t: Array) -> Twin:
     """March one body of a study at the instants t."""
+    bed, scene, riders, start = scene_of(study, body, float(t[-1]))
+    alpha = alpha_of(study)
+    if alpha is not None:
+        return Twin(bed, scene, riders, study.gravity, naive.march_alpha(scene, t, start, alpha))
+    scheme, own = newmark_of(study), study.body[body].own_weight
+    on_sag = march_on_sag(scene, bed, study.gravity, t, start, scheme) if own else None
+    history = naive.march(scene, t, start, scheme) if on_sag is None else on_sag
+    return Twin(bed, scene, riders, study.gravity, history)
+
+
+def solve_twin(study: Study, body: str, t: Array) -> Twin:
+    """One body of a study, on which no weight of its own acts, at the instants t by DOP853."""
+    bed, scene, riders, start = scene_of(study, body, float(t[-1]))
+    scale = sum(load.weight * float(np.abs(bed.phi(0.5 * bed.length, 0)).max()) for load in scene.loads)
+    softest = float(bed.omega[bed.omega > 0.0].min())
+    return Twin(bed, scene, riders, study.gravity, ode.solve(scene, t, start, scale / softest**2))
+
+
+def scene_of(study: Study, body: str, end: float) -> tuple[Bed, Scene, tuple[str, ...], State]:
+    """One body of a study up to an instant, the names of its carriages, and its first state."""
     bed = bed_of(study, body)
     riders = tuple(name for name, carriage in study.carriage.items() if carriage.on == body)
-    loads = tuple(load_of(study, name, bed.length, float(t[-1])) for name in riders)
+    loads = tuple(load_of(study, name, bed.length, end) for name in riders)
     dampers = tuple(Damper(bed.phi(at, 0), c) for at, c in bed.dampers)
     table: Any = study.body[body]
     zeta = damping_of(table.damping_ratio, bed.omega)
@@ -225,13 +245,7 @@ def march_twin(study: Study, body: str, t: Array) -> Twin:
     start = scenes.equilibrium(scene, 0.0) if study.start == "equilibrium" else scenes.rest(scene)
     if own and study.start == "rest":
         start = State(-study.gravity * bed.own_modal / bed.omega**2, start.v)
-    alpha = alpha_of(study)
-    if alpha is not None:
-        return Twin(bed, scene, riders, study.gravity, naive.march_alpha(scene, t, start, alpha))
-    scheme = newmark_of(study)
-    on_sag = march_on_sag(scene, bed, study.gravity, t, start, scheme) if own else None
-    history = naive.march(scene, t, start, scheme) if on_sag is None else on_sag
-    return Twin(bed, scene, riders, study.gravity, history)
+    return bed, scene, riders, start
 
 
 BETA = {"average-acceleration": 1 / 4, "linear-acceleration": 1 / 6, "fox-goodwin": 1 / 12, "central-difference": 0.0}

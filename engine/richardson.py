@@ -1,0 +1,134 @@
+"""Richardson pairs: average acceleration with the steps h and 2h, an answer of fourth order, and an error estimate.
+
+Both marches go segment by segment side by side, so only one segment's histories are in memory. The stations of the
+coarser one are every second station of the finer one (`SceneTables.coarser`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.histories import rows_sampled
+from engine.kernels.layout import LANES, LARGEST, SMALLEST, Record, Watch
+from engine.kernels.pairs import extrapolate, survey
+from engine.lanes import LaneValues, from_blocks
+from engine.march import Halted, March, Marched, march, prepare
+from engine.tables import SceneTables
+from engine.timeline import Segment
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+def march_chosen(
+    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+) -> tuple[Marched, Array | None]:
+    """March by the study's scheme; a pair gives its largest estimated errors (sensors, V) too. Raises Halted."""
+    if tables.model.scheme.stride == 1:
+        return march(tables, values, counts, size, halted), None
+    return march_pair(tables, values, counts, size, halted)
+
+
+def march_pair(
+    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+) -> tuple[Marched, Array]:
+    """March with the tables' steps, whose refinement is even, and with half of them.
+
+    Returns what `march` does of the extrapolated histories, extremes also from between stations, and (sensors, V) the
+    largest estimated error of the finer march over its whole recorded history. Raises Halted.
+    """
+    fine, coarse = (_whole_histories(part, values, counts) for part in (tables, tables.coarser))
+    pair = _Pair(fine, coarse, *_blank(fine))
+    for short, long in zip(fine.tables.timeline.segments, coarse.tables.timeline.segments, strict=True):
+        pair.along(short, long)
+        if halted():
+            raise Halted
+    return fine.result(size), from_blocks(pair.gap, size)[: len(tables.sensors)]
+
+
+def relative_error(tables: SceneTables, marched: Marched, gap: Array, statics: Array) -> Array:
+    """(V,) the largest of the sensors' errors ``gap`` (sensors, V), each relative to its largest static value
+    (``statics``: sensors, V), and to its own largest value where that is none: velocity and acceleration."""
+    worst = np.zeros(gap.shape[1])
+    for j in range(len(tables.sensors)):
+        own = np.maximum(marched.marks[j, LARGEST], -marched.marks[j, SMALLEST])
+        scale = np.where(statics[j] > 0.0, statics[j], own)
+        worst = np.maximum(worst, np.divide(gap[j], scale, out=np.zeros_like(worst), where=scale > 0.0))
+    return worst
+
+
+@dataclass(frozen=True, eq=False)
+class _Histories(March):
+    """A march that hands over the histories of all its signals, segment by segment."""
+
+    def along(self, segment: Segment) -> Array:
+        """(blocks, S, signals, LANES): march a segment; its signals at all stations, whether they count or not."""
+        signals = self.watch(segment).offset.shape[1]
+        history = np.empty((self.marks.shape[0], segment.steps + 1, signals, LANES))
+        replace(self, history=history)._segment(segment, True)
+        return history
+
+    def watch(self, segment: Segment) -> Watch:
+        """What is observed along a segment."""
+        table = self.tables.table(segment)
+        return table.watch if segment.recorded else table.guard
+
+    def _observed(self, segment: Segment) -> tuple[Watch, Record]:
+        watch = self.watch(segment)
+        marks = np.zeros_like(self.marks[:, : watch.offset.shape[1]])
+        marks[:, :, LARGEST], marks[:, :, SMALLEST] = np.inf, -np.inf  # nothing is news: `survey` looks for extremes
+        record = Record(marks, np.arange(segment.steps + 1), self.history)
+        return watch._replace(counted=np.ones_like(watch.counted)), record
+
+
+def _whole_histories(tables: SceneTables, values: LaneValues, counts: Counts) -> _Histories:
+    """A march that is ready to go."""
+    ready = prepare(tables, values, counts)
+    return _Histories(ready.tables, ready.lanes, counts, ready.state, ready.marks, ready.guard, ready.history)
+
+
+def _blank(fine: March) -> tuple[Array, Array]:
+    """What a pair carries over from segment to segment before the first."""
+    blocks, signals = fine.marks.shape[:2]
+    return np.zeros((blocks, signals, 3, LANES)), np.zeros((blocks, signals, LANES))
+
+
+@dataclass(eq=False)
+class _Pair:
+    """A pair under way. carry: the values before a segment (blocks, signals, 3, LANES); gap (blocks, signals, LANES):
+    the largest estimated errors so far; before: the segment before."""
+
+    fine: _Histories
+    coarse: _Histories
+    carry: Array
+    gap: Array
+    before: Segment | None = None
+
+    def along(self, segment: Segment, coarse_segment: Segment) -> None:
+        """One segment of both, extrapolated and observed."""
+        fine, coarse = self.fine.along(segment), self.coarse.along(coarse_segment)
+        counted = self.fine.watch(segment).counted
+        signals = fine.shape[2]
+        gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
+        extrapolate(fine, coarse, counted, gap)
+        marks = self.fine.marks if segment.recorded else self.fine.guard
+        carry = np.ascontiguousarray(self.carry[:, :signals])
+        survey(fine, counted, marks, carry, _joined(self.before, segment), segment.first)
+        self.carry[:, :signals] = carry
+        self.before = segment
+        if segment.recorded:
+            rows = rows_sampled(segment, self.fine.counts)
+            here, sensors = np.flatnonzero(rows >= 0), self.fine.history.shape[2]
+            found = np.where(counted[here, :sensors, None], fine[:, here, :sensors], np.nan)
+            self.fine.history[:, rows[here]] = found
+
+
+def _joined(before: Segment | None, segment: Segment) -> bool:
+    """Whether a segment goes on at an equal step where another ends, without an event between them."""
+    if before is None or segment.fresh or before.recorded != segment.recorded:
+        return False
+    return abs(before.step - segment.step) <= 1e-9 * segment.step

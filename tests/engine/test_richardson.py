@@ -1,0 +1,376 @@
+"""Richardson pairs: of fourth order against DOP853, with estimates of the finer march's error that can be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.dataset import Collector
+from engine.execution import execute, run
+from engine.histories import counts_reduced
+from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, MARKS
+from engine.kernels.pairs import survey
+from engine.plan import make_plan
+from engine.reduction import Cycle
+from engine.resolution import RESOLVED, phase_errors
+from engine.richardson import march_pair
+from engine.scene import Study
+from engine.tables import SceneTables
+from results_schema.status import Status
+from tests.calibration import richardson as calibration
+from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.engine.reading import Reading
+from tests.engine.test_determinism import digest, mixed
+from tests.engine.twin import solve_twin
+
+Array = NDArray[np.float64]
+
+SENSORS = {
+    "place": fixed(0.61),
+    "rate": fixed(0.61, "velocity"),
+    "jerked": fixed(0.61, "acceleration"),
+    "moment": fixed(0.37, "bending_moment"),
+    "below": under("car"),
+    "below_acceleration": under("car", "acceleration"),
+}
+PAIR = {"scheme": "richardson"}
+SPRINGS = [{"at": 0.0, "stiffness": 60.0, "rotational": 0.3}, {"at": 1.0, "stiffness": 90.0}]
+DAMPED = [{"at": 0.0, "stiffness": 60.0, "damping": 2.0}, {"at": 0.9, "stiffness": 90.0, "damping": 0.7}]
+TWO = {"car": mass(0.4, cruise(-0.25, 1.25, 1.0, after=0.4)), "next": mass(0.3, cruise(1.0, 0.0, 1.0), delay=0.25)}
+
+
+def case(bed: dict[str, Any], carriages: dict[str, Any], **changes: Any) -> Study:
+    return study(bed, carriages, **({"sensor": SENSORS, "output": {"histories": "all"}} | changes))
+
+
+SCENES: dict[str, Callable[[], Study]] = {
+    "cruise of a mass": lambda: case(beam(modes=3), mass(0.5, cruise(0.0, 1.0, 0.9))),
+    "sinusoidal shuttle": lambda: case(beam(modes=2, damping_ratio=0.01), mass(0.5, swing(0.5, 0.4, 0.3, 2))),
+    "smooth turns": lambda: case(beam(modes=3, damping_ratio=0.03), mass(0.5, shuttle(0.1, 0.8, 1.0, 0.3, 1))),
+    "instant turn": lambda: case(beam(modes=3, damping_ratio=0.03), mass(0.5, shuttle(0.1, 0.8, 1.0, 0.0, 1))),
+    "two masses that arrive on springs": lambda: case(beam(modes=2, supports=SPRINGS, damping_ratio=0.02), TWO),
+    "dampers": lambda: case(beam(modes=3, supports=DAMPED), mass(0.5, cruise(0.0, 1.0, 1.2))),
+}
+SMOOTH = ("cruise of a mass", "sinusoidal shuttle")
+
+
+def with_solver(given: Study, **solver: Any) -> Study:
+    return Study(**(dict(given.data) | {"solver": solver}))
+
+
+def readings(given: Study, t: Array) -> dict[str, Array]:
+    """What all sensors read by DOP853 at instants t."""
+    twin = solve_twin(given, "bed", t)
+    return {name: Reading(given, twin, sensor).values for name, sensor in given.sensor.items()}
+
+
+@cache
+def exact(name: str, t: tuple[float, ...]) -> Mapping[str, Array]:
+    """The readings of a scene."""
+    return readings(SCENES[name](), np.array(t))
+
+
+@cache
+def errors(name: str, scheme: str, steps: int) -> Mapping[str, float]:
+    """Largest error of every sensor's history over its largest value, at some 25 instants."""
+    ds = run(with_solver(SCENES[name](), scheme=scheme, steps=steps))
+    stride = 36 * steps // 900
+    t = np.round(ds.elapsed.values[::stride], 11)
+    found = {}
+    for sensor, values in exact(name, tuple(t.tolist())).items():
+        seen = np.isfinite(values) & np.isfinite(ds[sensor].values[::stride])
+        assert seen.sum() > 10
+        found[sensor] = float(np.abs(ds[sensor].values[::stride] - values)[seen].max() / np.abs(values[seen]).max())
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_order_is_four(name: str) -> None:
+    """Halving the step divides the error of every history by about 16, that of one march by about 4."""
+    steps = 900
+    one, two = errors(name, "richardson", steps), errors(name, "richardson", 2 * steps)
+    for sensor in SENSORS:
+        order = math.log2(one[sensor] / two[sensor])
+        assert order == pytest.approx(4.0, abs=0.35 if name in SMOOTH else 0.6), (sensor, order, one[sensor])
+    if name in SMOOTH:
+        alone, again = errors(name, "average-acceleration", steps), errors(name, "average-acceleration", 2 * steps)
+        assert all(math.log2(alone[s] / again[s]) == pytest.approx(2.0, abs=0.1) for s in SENSORS)
+        assert all(two[sensor] < 0.2 * again[sensor] for sensor in SENSORS)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_stations_between_those_of_both_marches_are_as_good(name: str) -> None:
+    given = SCENES[name]()
+    one, two = (run(with_solver(given, scheme="richardson", steps=steps)) for steps in (900, 7200))
+    nearest = np.searchsorted(two.elapsed.values, one.elapsed.values - 1e-9)
+    same = np.abs(two.elapsed.values[nearest] - one.elapsed.values) < 1e-9
+    assert same.sum() > 200
+    for sensor in SENSORS:
+        off = np.where(same, np.abs(one[sensor].values - two[sensor].values[nearest]), np.nan)
+        assert np.nanmax(off[1::2]) <= 3.0 * np.nanmax(off[::2]), sensor
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_estimate_is_the_error_of_the_finer_march(name: str) -> None:
+    """Against DOP853: `error_steps` of a study with one sensor is what one march with as many steps is off."""
+    given = SCENES[name]()
+    place = Study(**(dict(given.data) | {"sensor": {"place": SENSORS["place"]}}))
+    ds = run(with_solver(place, scheme="richardson", steps=800))
+    alone = run(with_solver(place, scheme="average-acceleration", steps=800))
+    t = alone.elapsed.values[::4]
+    off = np.abs(alone.place.values[::4] - readings(place, t)["place"]).max()
+    assert int(ds.status) == Status.OK
+    assert float(ds.error_steps) == pytest.approx(off / float(ds.place_static), rel=0.1)
+    assert "error_steps" not in alone
+    assert ds.error_steps.attrs["units"] == "1"
+
+
+def test_estimates_of_a_random_sample_can_be_believed() -> None:
+    """Within a factor 2 of the true error for 95 % of at least 500 variants that are called resolved."""
+    found = calibration.sample()
+    resolved = found.resolved
+    assert np.isfinite(found.true).all() and np.all(found.true > 0.0)
+    assert resolved.sum() >= 500
+    assert found.within_two[resolved].mean() >= 0.95
+    assert (~resolved).sum() >= 300
+    far = found.phase > 30.0 * RESOLVED
+    assert far.sum() >= 50
+    assert found.within_two[far].mean() < 0.75, "the condition refuses what need not be refused"
+
+
+def test_reference_of_the_sample_is_exact() -> None:
+    """What the calibration calls true errors, by DOP853."""
+    given = with_solver(SCENES["sinusoidal shuttle"](), scheme="richardson", steps=400)
+    plan = make_plan(given)
+    bucket = plan.buckets[0]
+    values = plan.values(bucket, np.zeros(16, dtype=np.int64))
+    measured = calibration.measure(bucket, values, 400)
+    t = run(given).elapsed.values[::2]
+    exact, alone = readings(given, t), run(with_solver(given, scheme="average-acceleration", steps=400))
+    statics = calibration.statics_of(bucket.tables, values)[:, 0]
+    largest = 0.0
+    for name, static in zip(SENSORS, statics, strict=True):
+        off = np.abs(alone[name].values[::2] - exact[name]).max()
+        largest = max(largest, off / (static or np.abs(exact[name]).max()))
+    assert measured.true[0] == pytest.approx(largest, rel=0.02)
+
+
+def test_phase_error_of_one_mode() -> None:
+    """Formula and limit by damping, on a beam whose only mode is pi^2: two variants, undamped and damped."""
+    sweep = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.5]}}
+    given = study(beam(modes=1), force(1.0, cruise(0.0, 1.0, 0.1)), solver=PAIR | {"steps": 1000}, sweep=sweep)
+    plan = make_plan(given)
+    found = phase_errors(plan.buckets[0].tables, plan.values(plan.buckets[0], np.arange(2)))
+    omega, h = math.pi**2, 0.01
+    np.testing.assert_allclose(found, [omega**3 * h**2 * 10.0 / 12.0, omega**2 * h**2 / 12.0 / 0.5], rtol=1e-9)
+
+
+def test_phase_error_is_what_average_acceleration_falls_behind() -> None:
+    """Of free vibration after a force has left: the zeros of the velocity come late by the phase error of the way."""
+    motion = cruise(0.0, 1.0, 2.5, after=30.0)
+    given = study(
+        beam(modes=1),
+        force(1.0, motion),
+        sensor={"rate": fixed(0.5, "velocity")},
+        solver={"scheme": "average-acceleration", "steps": 20},
+        output={"histories": "all"},
+    )
+    ds = run(given)
+    plan = make_plan(given)
+    values = plan.values(plan.buckets[0], np.arange(1))
+    t, v = ds.elapsed.values, ds.rate.values
+    zeros = np.flatnonzero((v[:-1] < 0.0) & (v[1:] >= 0.0) & (t[:-1] > 0.4))
+    at = t[zeros] - v[zeros] * (t[zeros + 1] - t[zeros]) / (v[zeros + 1] - v[zeros])
+    behind = math.pi**2 * (at[-1] - at[0]) - 2.0 * math.pi * (len(at) - 1)
+    share = (at[-1] - at[0]) / (30.0 * 2.0 / math.pi)
+    found = phase_errors(SceneTables(plan.base, 20, "whole"), values)[0]
+    whole = found - math.pi**6 / 12.0 * 0.02**2 * 0.4  # without the passage's own part
+    assert behind == pytest.approx(whole * share, rel=0.02)
+
+
+def test_unresolved_is_said_and_values_are_kept() -> None:
+    sweep = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.4]}}
+    given = study(beam(modes=8), mass(0.05, cruise(0.0, 1.0, 1.0)), solver=PAIR | {"steps": 601}, sweep=sweep)
+    ds = run(given)
+    assert ds.status.values.tolist() == [Status.UNRESOLVED, Status.OK]
+    assert np.isfinite(ds.midspan_max.values).all()
+    assert np.isnan(ds.error_steps.values).tolist() == [True, False]
+    assert set(ds.steps_used.values.tolist()) == {602}
+
+
+def test_automatic_steps_resolve_every_mode() -> None:
+    sweep = {
+        "zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.01, 0.1]},
+        "speed": {"of": "carriage.car.motion.speed", "values": [0.3, 3.0]},
+    }
+    given = study(beam(modes=6), mass(0.2, cruise(0.0, 1.0, 1.0, after=0.5)), solver=PAIR, sweep=sweep)
+    plan = make_plan(given)
+    ds = run(given)
+    assert set(np.unique(ds.status.values).tolist()) <= {Status.OK, Status.SEPARATED}
+    assert np.all(ds.error_steps.values < 0.02)
+    assert "every mode of a Richardson pair resolved" in {bucket.reason for bucket in plan.buckets}
+    for bucket in plan.buckets:
+        phase = phase_errors(bucket.tables, plan.values(bucket, bucket.variants))
+        assert np.all(phase <= RESOLVED)
+        assert bucket.steps == 200 or np.any(phase > RESOLVED / 30.0)
+
+
+def test_damping_asks_for_fewer_steps() -> None:
+    sweep = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.1]}}
+    ds = run(study(beam(modes=6), mass(0.2, cruise(0.0, 1.0, 1.0)), solver=PAIR, sweep=sweep))
+    assert 3 * int(ds.steps_used[1]) < int(ds.steps_used[0])
+
+
+def test_extremes_lie_between_stations() -> None:
+    """Against a march of 32 times as many steps: values, places, rms, contact forces, separation."""
+    bed, car = beam(modes=4, damping_ratio=0.01), mass(1.0, cruise(0.0, 1.0, 0.55 * math.pi))
+    given = study(bed, car, sensor={"mid": fixed(0.5), "m": fixed(0.3)})
+    exact = run(with_solver(given, scheme="fox-goodwin", steps=51200))
+    ds = run(with_solver(given, scheme="richardson", steps=1600))
+    alone = run(with_solver(given, scheme="average-acceleration", steps=1600))
+
+    def off(found: Any, name: str) -> float:
+        return abs(float(found[name]) - float(exact[name]))
+
+    for name, tolerance in (("mid_max", 2e-7), ("mid_min", 2e-7), ("m_max", 2e-7), ("m_min", 2e-7)):
+        assert off(ds, name) <= tolerance < max(off(alone, name), 1e-6)
+    for name in ("car_contact_force_max", "car_contact_force_min"):
+        assert off(ds, name) < 0.25 * off(alone, name)
+        assert off(ds, name) < 3e-5 * 9.81
+    for name in ("mid_max_position", "mid_min_position", "m_min_position", "car_separation_position"):
+        assert off(ds, name) <= 3e-5 < off(alone, name)
+    assert float(ds.mid_rms) == pytest.approx(float(exact.mid_rms), rel=1e-3)
+    assert int(ds.status) == int(exact.status) == Status.SEPARATED
+
+
+@pytest.mark.parametrize("steps", [700, 18_000])
+def test_extremes_are_those_of_the_history(steps: int) -> None:
+    """Parabolas over the kept history, here by numpy; with segments that are cut where a table is full."""
+    motion = swing(0.45, 0.4, 0.7, 3)
+    given = study(beam(modes=2), mass(0.3, motion), solver=PAIR | {"steps": steps}, output={"histories": "all"})
+    ds = run(given)
+    x = ds.midspan.values
+    assert x.size == 3 * steps + 1
+    before, here, after = x[:-2], x[1:-1], x[2:]
+    slope, bend = 0.5 * (after - before), after - 2.0 * here + before
+    peak = (here > before) & (here > after)
+    expected = max(x.max(), (here - 0.5 * slope**2 / bend)[peak].max())
+    assert float(ds.midspan_max) == pytest.approx(expected, rel=1e-13)
+    assert expected > x.max()
+    weights = np.tile([4.0, 2.0], 3 * steps // 2)[:-1] / 3.0
+    squares = x[0] ** 2 / 3.0 + np.sum(weights * x[1:-1] ** 2) + x[-1] ** 2 / 3.0
+    assert float(ds.midspan_rms) == pytest.approx(math.sqrt(squares / (3 * steps)), rel=1e-9)
+
+
+def test_a_peak_where_segments_meet_is_found() -> None:
+    """A sine cut at the station of its peak and marched on without an event, and with one."""
+    x = np.broadcast_to(np.sin(0.1 + 0.1 * np.arange(31))[None, :, None, None], (1, 31, 1, LANES)).copy()
+    counted = np.ones((31, 1), dtype=np.bool_)
+
+    def largest(*pieces: tuple[int, int, bool]) -> tuple[float, float]:
+        marks, carry = np.zeros((1, 1, MARKS, LANES)), np.zeros((1, 1, 3, LANES))
+        for first, last, joined in pieces:
+            survey(np.ascontiguousarray(x[:, first : last + 1]), counted[first : last + 1], marks, carry, joined, first)
+        return float(marks[0, 0, LARGEST, 0]), float(marks[0, 0, LARGEST_AT, 0])
+
+    whole = largest((0, 30, False))
+    assert whole == pytest.approx((1.0, 5.0 * math.pi - 1.0), abs=2e-3)
+    assert largest((0, 14, False), (14, 30, True)) == largest((0, 15, False), (15, 30, True)) == whole
+    assert largest((0, 15, False), (15, 30, False)) == (x.max(), 15.0)
+
+
+class Kept:
+    """A reduction that returns the cycle itself."""
+
+    stations = 100
+
+    def outputs(self, given: Study) -> Mapping[str, tuple[str, ...]]:
+        return {"cycle": ("station_of_cycle",)}
+
+    def sizes(self, given: Study) -> Mapping[str, int]:
+        return {"station_of_cycle": 100}
+
+    def __call__(self, cycle: Cycle) -> dict[str, Array]:
+        return {"cycle": np.ascontiguousarray(cycle.history[:, 0].T)}
+
+
+def test_reduction_gets_the_extrapolated_cycle() -> None:
+    """The last of three cycles, the contact force judged in those before too."""
+    given = study(beam(modes=3, damping_ratio=0.05), mass(0.5, swing(0.5, 0.3, 0.4, 3)), solver=PAIR | {"steps": 400})
+    reduced = run(given, reduction=Kept())
+    whole = run(Study(**(dict(given.data) | {"output": {"histories": "all"}})))
+    plan = make_plan(given, reduction=Kept())
+    counts = counts_reduced(plan.buckets[0].tables.timeline, 100)
+    np.testing.assert_array_equal(reduced.cycle.values, whole.midspan.values[counts])
+    last = whole.midspan.values[800:]
+    assert float(reduced.midspan_max) == pytest.approx(last.max(), rel=1e-4)
+    assert float(reduced.midspan_max) >= last.max()
+    assert float(reduced.error_steps) <= float(whole.error_steps)
+
+
+def test_contact_that_opens_before_the_last_cycle_is_seen() -> None:
+    motion = shuttle(0.1, 0.9, 1.0, 0.0, 2)
+    given = study(beam(modes=4, damping_ratio=0.3), mass(3.0, motion), solver=PAIR | {"steps": 2000}, initial="rest")
+    reduced = run(given, reduction=Kept())
+    whole = run(given)
+    alone = run(with_solver(given, scheme="average-acceleration", steps=2000), reduction=Kept())
+    assert float(alone.car_separation_position) == pytest.approx(float(whole.car_separation_position), abs=2e-3)
+    assert float(reduced.car_separation_position) == float(whole.car_separation_position)
+    assert int(reduced.status) == Status.SEPARATED
+
+
+def pairs_of_mixed() -> Study:
+    data = dict(mixed().data)
+    return Study(**(data | {"solver": PAIR | {"steps": 600}}))
+
+
+def test_same_bits_for_any_chunks_and_threads() -> None:
+    plan = make_plan(pairs_of_mixed())
+    collector = Collector(plan.size)
+    execute(plan, collector.add)
+    assert {Status.OK, Status.SEPARATED, Status.UNRESOLVED} & set(collector.arrays["status"].tolist())
+    assert len({digest(plan, chunk, threads) for chunk, threads in ((1, 2), (7, 1), (64, 2), (None, 1))}) == 1
+
+
+def test_same_bits_alone() -> None:
+    whole = run(pairs_of_mixed())
+    data = dict(pairs_of_mixed().data)
+    axes = {name: axis for name, axis in data["sweep"].items() if name != "zeta"}
+    alone = run(Study(**(data | {"sweep": axes, "body": {"bed": data["body"]["bed"] | {"damping_ratio": 0.01}}})))
+    for name in ("midspan_max", "below_min", "moment_rms", "error_steps", "status"):
+        np.testing.assert_array_equal(alone[name].values, whole[name].sel(zeta=0.01).values)
+
+
+def test_divergence_is_told() -> None:
+    """Parametric resonance without damping grows until nothing is left; its neighbours are well."""
+    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
+    sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
+    ds = run(study(beam(modes=3, damping_ratio=0.0), mass(0.5, way), solver=PAIR | {"steps": 200}, sweep=sweep))
+    assert ds.status.values.tolist() == [Status.UNRESOLVED, Status.DIVERGED, Status.UNRESOLVED]
+    assert 0 < ds.diverged_step.values[1] < 200 * 200
+    assert np.isnan(ds.midspan_max.values).tolist() == [False, True, False]
+
+
+def test_stations_of_the_coarser_march_are_every_second() -> None:
+    plan = make_plan(with_solver(SCENES["two masses that arrive on springs"](), scheme="richardson", steps=333))
+    fine = plan.buckets[0].tables
+    assert fine.steps == 334
+    pairs = list(zip(fine.timeline.segments, fine.coarser.timeline.segments, strict=True))
+    assert len(pairs) == 4
+    for short, long in pairs:
+        assert (short.start, short.end, short.first) == (long.start, long.end, 2 * long.first)
+        assert short.steps == 2 * long.steps
+    assert sum(short.free for short, _ in pairs) >= 1
+
+
+def test_a_timeline_without_half_the_steps_is_refused() -> None:
+    plan = make_plan(with_solver(SCENES["cruise of a mass"](), scheme="richardson", steps=200))
+    tables = SceneTables(plan.base, 200, "whole")
+    with pytest.raises(ValueError, match="even"):
+        march_pair(tables, plan.values(plan.buckets[0], np.zeros(16, dtype=np.int64)), np.arange(3), 16)
