@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.lanes import LaneValues
+from engine.model import SceneModel
 from engine.plan import Plan
 from results_schema.parts import Rows
 from results_schema.variables import QUANTITY_UNITS, Variable, axes, declarations, expand
@@ -77,14 +78,14 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     return dataset
 
 
-def model_groups(plan: Plan) -> dict[str, xr.Dataset]:
-    """The bodies of the unswept scene, by group: frequencies, damping and mode shapes on the track."""
+def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
+    """The bodies of an unswept scene, by group: frequencies, damping and mode shapes on the track."""
     import xarray as xr
 
-    values = LaneValues(plan.base.study, {}, 1)
+    values = LaneValues(model.study, {}, 1)
     declared = {variable.name: variable for variable in declarations("/model")}
     found = {}
-    for part in plan.base.bodies:
+    for part in model.bodies:
         x = np.linspace(0.0, part.modal.length, SHAPE_STATIONS)
         omega = part.modal.omega
         rates = values.damping_rates(part.name, omega)[:, 0]

@@ -25,7 +25,8 @@ SCHEMA_VERSION = 1
 STANDARD_GRAVITY = 9.80665
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
-FIXED = ("schema_version", "sweep", "output", "solver.audit")  # numbers that do not belong to the model
+# numbers that do not belong to the model
+FIXED = ("schema_version", "sweep", "output", "question", "solver.audit")
 
 
 def _known_version(version: int) -> int:
@@ -55,6 +56,7 @@ class Scene(Spec):
     sweep: Sweep = Field(default_factory=lambda: Sweep.model_validate({}))
     solver: Solver = Field(default_factory=Solver)
     output: Output = Field(default_factory=Output)
+    question: dict[str, Any] = Field(default_factory=dict)  # of the kind of study, which validates it
 
 
 class Study(Scene):

@@ -10,14 +10,13 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from results_schema import files
-from results_schema.errors import ArchiveError, BadInput
-from results_schema.locks import Lock
+from results_schema.errors import ArchiveError
+from results_schema.run_folder import RunFolder, folder_of
 
 Arrays = dict[str, np.ndarray]
 
@@ -34,73 +33,12 @@ class Rows(NamedTuple):
     arrays: Mapping[str, np.ndarray]
 
 
-class PartStore:
-    """The parts of one archive, locked while the `with` block lasts.
-
-    key: what the results depend on: the study's hash with the kernels' hash.
-    Entering raises ArchiveBusy when another run holds the archive, and BadInput when the parts there have another
-    key (see `discard_foreign`).
-    """
+class PartStore(RunFolder):
+    """The parts of one archive, locked while the `with` block lasts. Entering raises as `RunFolder`."""
 
     def __init__(self, archive_path: Path | str, key: str) -> None:
-        archive_path = Path(archive_path)
-        self._archive = archive_path
-        self._folder = archive_path.with_name(archive_path.name + ".parts")
-        self._lock = Lock(archive_path.with_name(archive_path.name + ".lock"))
-        self._key = key
-        self._discard = False
+        super().__init__(archive_path, key)
         self._valid: dict[Path, np.ndarray] | None = None
-
-    @classmethod
-    def discard_foreign(cls, archive_path: Path | str, key: str) -> PartStore:
-        """A store that removes parts with another key on entering instead of refusing them (`--overwrite`)."""
-        store = cls(archive_path, key)
-        store._discard = True
-        return store
-
-    def __enter__(self) -> PartStore:
-        self._lock.take()
-        try:
-            self._open()
-        except BaseException:
-            self._lock.release()
-            raise
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._lock.release()
-
-    def _open(self) -> None:
-        files.clean_leftovers(self._archive)
-        if self._folder.exists() and not self._folder.is_dir():
-            raise BadInput("a file is in the way of the parts", where=str(self._folder), remedy="move it away")
-        found = self._stored_key()
-        if found and found != self._key and not self._discard:
-            raise BadInput(
-                "unfinished parts of another study or program version are there",
-                where=str(self._folder),
-                expected=f"key {self._key}",
-                received=f"key {found}",
-                remedy="finish that run with its own study and version, or discard its parts with --overwrite",
-            )
-        if found != self._key:
-            # Without a key (a power cut before the first part) nothing in the folder can be trusted.
-            files.remove_folder(self._folder)
-        files.make_folder(self._folder)
-        if found != self._key:
-            files.write_text(self._key_file, self._key + "\n")
-
-    @property
-    def _key_file(self) -> Path:
-        return self._folder / "key"
-
-    def _stored_key(self) -> str:
-        try:
-            return self._key_file.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError):
-            return ""
 
     def write(self, variants: np.ndarray, arrays: Mapping[str, np.ndarray], selected: Rows | None = None) -> Path:
         """Store one finished chunk: variants (n,), arrays (n, ...), and rows of a few variants of it (histories).
@@ -200,7 +138,7 @@ class PartStore:
 
     def remove(self) -> None:
         """Remove all parts: the archive is written."""
-        files.remove_folder(self._folder)
+        super().remove()
         self._valid = {}
 
 
@@ -209,8 +147,7 @@ def finished_so_far(archive_path: Path | str) -> int | None:
 
     Only reads: another run may be at work there.
     """
-    archive_path = Path(archive_path)
-    folder = archive_path.with_name(archive_path.name + ".parts")
+    folder = folder_of(archive_path)
     if not folder.is_dir():
         return None
     found = [np.empty(0, np.int64)]

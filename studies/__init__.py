@@ -2,7 +2,7 @@
 
 >>> import studies
 >>> studies.kind_names()
-('asymmetry', 'double-peak', 'passage', 'trajectory')
+('asymmetry', 'double-peak', 'passage', 'stability', 'trajectory', 'work-precision')
 """
 
 from __future__ import annotations

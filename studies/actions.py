@@ -33,12 +33,18 @@ def init(kind: str, file: Path | None) -> None:
 def check(study: str) -> None:
     """Validate a study and print what a run would do."""
     import engine
-    from studies.preview import preview
+    from studies.measuring import MeasuringKind
+    from studies.preview import preview, preview_of_pieces
     from studies.study import kind_of
 
     loaded = engine.load(catalogue.find_study(study))
-    plan = engine.make_plan(loaded, reduction=kind_of(loaded).reduction(loaded))
-    console.show_preview(preview(plan, len(os.sched_getaffinity(0))))
+    kind = kind_of(loaded)
+    if isinstance(kind, MeasuringKind):
+        shown = preview_of_pieces(kind, loaded)
+    else:
+        plan = engine.make_plan(loaded, reduction=kind.reduction(loaded))
+        shown = preview(plan, len(os.sched_getaffinity(0)))
+    console.show_preview(shown)
 
 
 def run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
@@ -56,10 +62,14 @@ def run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
 
 
 def exit_code(outcome: Outcome) -> int:
-    """Exit code of a finished run: 3 where some variants are not ok."""
-    from studies.summary import all_ok
+    """Exit code of a finished run: 3 where some variants are not ok.
 
-    return 0 if all_ok(outcome.results) else SOME_NOT_OK
+    A study that measures asks where methods fail: a method that diverges is its answer, and nothing that a script has
+    to look after. So it ends with 0.
+    """
+    from studies.summary import all_ok, is_measured
+
+    return 0 if is_measured(outcome.results) or all_ok(outcome.results) else SOME_NOT_OK
 
 
 def list_studies() -> None:
@@ -92,20 +102,22 @@ def info(archive: Path) -> None:
 def _refuse_unfinished(archive: Path) -> None:
     """Tell of an unfinished run where its archive is not there yet. Raises BadInput."""
     from results_schema.parts import finished_so_far
+    from results_schema.pieces import pieces_so_far
 
     if archive.exists() or (finished := finished_so_far(archive)) is None:
         return
+    pieces = pieces_so_far(archive)
     raise BadInput(
         "not there yet; an unfinished run of it is",
         where=str(archive),
         expected="a finished archive",
-        received=f"parts with {counted(finished, 'finished variant')}",
+        received=counted(pieces, "finished piece") if pieces else f"parts with {counted(finished, 'finished variant')}",
         remedy=f"wait for the run if one is at work, or go on from there: wanderlast run STUDY -o {archive}",
     )
 
 
-def bench(modes: int, steps: int, variants: int, threads: int | None) -> Throughput:
+def bench(modes: int, steps: int, variants: int, scheme: str, threads: int | None) -> Throughput:
     """Measure the throughput of the march."""
     from studies.bench import Scene, measure
 
-    return measure(Scene(modes, steps, variants), threads)
+    return measure(Scene(modes, steps, variants, scheme), threads)

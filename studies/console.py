@@ -139,31 +139,35 @@ def show_outcome(outcome: Outcome) -> None:
         for found in summary.ranges(results)
     ]
     table(results.attrs["title"], ("result", "smallest", "where", "largest", "where"), rows)
-    say(*_about_statuses(summary.counts(results)), _about_work(outcome))
+    say(*_about_statuses(summary.counts(results), summary.noun(results)), _about_work(outcome))
 
 
 def show_throughput(found: Throughput) -> None:
     """What `bench` measured."""
     say(
-        f"{found.modes} modes, {found.steps} steps, {found.variants} variants, {counted(found.threads, 'thread')}, "
-        f"best of {found.best_of}: {number(found.seconds)} s",
+        f"{found.scheme}, {found.modes} modes, {found.steps} steps, {found.variants} variants, "
+        f"{counted(found.threads, 'thread')}, best of {found.best_of}: {number(found.seconds)} s",
         f"{number(found.case_mode_steps_per_second / 1e9)} thousand million modes x steps x variants per second, "
         f"{number(found.variants_per_second, 4)} variants per second",
     )
 
 
-def _about_statuses(counts: Mapping[str, int]) -> Iterator[str]:
+def _about_statuses(counts: Mapping[str, int], noun: str) -> Iterator[str]:
     for status in Status:
         if label(status) in counts:
             message = "" if status == Status.OK else f" ({status.message})"
-            yield f"{counted(counts[label(status)], 'variant')} {label(status)}{message}"
+            yield f"{counted(counts[label(status)], noun)} {label(status)}{message}"
 
 
 def _about_work(outcome: Outcome) -> str:
-    variants = counted(int(outcome.results["status"].size), "variant")
+    from studies import summary
+
+    measured = summary.is_measured(outcome.results)
+    variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))
     if outcome.was_finished:
         return f"{outcome.archive} holds the finished results of this very study; nothing to do"
-    earlier = f", {outcome.resumed:,} of them finished by an earlier start" if outcome.resumed else ""
+    resumed = counted(outcome.resumed, "piece") if measured else f"{outcome.resumed:,} of them"
+    earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
     return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"
 
 

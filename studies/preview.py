@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,15 @@ from engine.plan import Bucket, Plan, explain
 from engine.remarks import remarks
 from studies.words import counted, number, unit_text
 
+if TYPE_CHECKING:
+    from engine.scene import Study
+    from studies.measuring import MeasuringKind
+
 Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
 BUCKETS_SHOWN = 30
+PIECES_BYTES = 64 * 2**20  # more than any study that measures leaves on the disk
 
 
 class Table(NamedTuple):
@@ -45,6 +50,22 @@ def preview(plan: Plan, threads: int) -> Preview:
         f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk."
     )
     return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks(plan)))
+
+
+def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
+    """The explanation of a study that measures: its pieces, one after another, and the time they take."""
+    pieces = kind.pieces(study)
+    rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
+    work = [(piece.name, piece.words, duration(piece.seconds)) for piece in pieces]
+    tables = (
+        Table(study.title or study.source.name, ("", ""), rows),
+        Table("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work),
+    )
+    cost = (
+        f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
+        f"{size(PIECES_BYTES)} on the disk."
+    )
+    return Preview(tables, cost, ())
 
 
 def duration(seconds: float) -> str:

@@ -24,7 +24,7 @@ from results_schema.variables import Variable, expand
 from studies.figures import Figure, png, svg
 from studies.results import Results
 from studies.study import kind_named, sensor_units
-from studies.summary import ranges
+from studies.summary import noun, ranges
 from studies.words import counted, number, quantity, unit_text
 
 if TYPE_CHECKING:
@@ -67,6 +67,7 @@ class Page:
 
     title: str
     question: str
+    noun: str
     facts: Sequence[Row]
     findings: Sequence[Finding]
     figures: Sequence[Drawn]
@@ -106,7 +107,8 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
     return Page(
         title=results.study.title or str(source.root.attrs.get("title", "")) or kind.name,
         question=kind.question,
-        facts=_facts(results),
+        noun=noun(source.root),
+        facts=_facts(results, noun(source.root)),
         findings=[_finding(results, text) for text in kind.findings(results)],
         figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
         statuses=[_status_row(status, count) for status, count in results.status_counts.items()],
@@ -163,7 +165,7 @@ def _drawn(place: int, figure: Figure) -> Drawn:
     return Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
 
 
-def _facts(results: Results) -> list[Row]:
+def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
     dataset = results.dataset
     steps = dataset["steps_used"].values
@@ -172,7 +174,7 @@ def _facts(results: Results) -> list[Row]:
     fine = results.status_counts.get(Status.OK, 0)
     return [
         Row("kind of study", results.study.kind),
-        Row("variants", f"{results.size:,}"),
+        Row(f"{noun}s", f"{results.size:,}"),
         Row("status ok", f"{fine:,}"),
         Row("modes", " to ".join(str(count) for count in dict.fromkeys((modes[0], modes[-1])))),
         Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}"),

@@ -6,10 +6,10 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,14 @@ from results_schema import files
 from results_schema.archive import OutputState, open_archive, output_state, write_archive
 from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
+from results_schema.pieces import PieceStore
 from studies.gathering import Gatherer
+from studies.measuring import MeasuringKind, Work, key_of, measure
 from studies.options import RunOptions
+from studies.preview import PIECES_BYTES
 from studies.provenance import attributes
 from studies.stopping import Stop
-from studies.study import finish, kind_of
+from studies.study import Kind, finish, gathered, kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,8 +39,9 @@ Progress = Callable[[int, int], None]
 class Outcome:
     """What became of a run.
 
-    results: the archive's root. resumed: variants that an earlier start had finished. was_finished: there was
-    nothing to do. seconds: of this run. remarks: what is worth knowing about a study that was run.
+    results: the archive's root. resumed: variants (of a study that measures: pieces) that an earlier start had
+    finished. was_finished: there was nothing to do. seconds: of this run. remarks: what is worth knowing about a study
+    that was run.
     """
 
     archive: Path
@@ -57,9 +61,6 @@ def run_to_archive(
     computed or written; later Interrupted, OutputFailed and ArchiveBusy with finished work kept; ArchiveError when
     this study's archive is there and damaged.
     """
-    from engine.plan import make_plan
-    from engine.remarks import remarks
-
     started, stop = time.perf_counter(), stop or Stop()
     kind = kind_of(study)
     files.check_output_place(archive)
@@ -67,20 +68,64 @@ def run_to_archive(
     if _state(study, archive, options) == "same study, finished":
         root = open_archive(archive).root
         return Outcome(archive, root, int(root["status"].size), True, time.perf_counter() - started)
-    plan = make_plan(study, reduction=kind.reduction(study))
-    files.check_free(archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
+    run = _Run(study, archive, options, progress, stop, started)
+    return _measured(kind, run) if isinstance(kind, MeasuringKind) else _marched(kind, run)
+
+
+class _Run(NamedTuple):
+    """What a run is asked; started: clock at its start."""
+
+    study: Study
+    archive: Path
+    options: RunOptions
+    progress: Progress | None
+    stop: Stop
+    started: float
+
+
+def _marched(kind: Kind, run: _Run) -> Outcome:
+    """A study of one scene and its sweep: all variants of its plan, in parts."""
+    from engine.dataset import model_groups
+    from engine.plan import make_plan
+    from engine.remarks import remarks
+
+    plan = make_plan(run.study, reduction=kind.reduction(run.study))
+    files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
     worth_knowing = tuple(remarks(plan))
-    with _store(plan, archive, options) as store:
+    with (PartStore.discard_foreign if run.options.overwrite else PartStore)(run.archive, plan.key) as store:
         done = store.finished()
-        _march(plan, store, done, options, progress, stop)
-        stop.check()
+        _march(plan, store, done, run)
+        run.stop.check()
         root = _finished_dataset(plan, store)
-        seconds = time.perf_counter() - started
-        root = root.assign_attrs(attributes(study, plan.key, seconds))
-        stop.check()
-        write_archive(archive, root, _groups(plan))
+        seconds = _write(run, root, plan.key, model_groups(plan.base))
         store.remove()
-    return Outcome(archive, root, int(done.size), False, seconds, worth_knowing)
+    return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing)
+
+
+def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
+    """A study that measures: its pieces, one after another."""
+    files.check_free(run.archive.parent, PIECES_BYTES, "the pieces and the archive")
+    key = key_of(run.study, kind)
+    with (PieceStore.discard_foreign if run.options.overwrite else PieceStore)(run.archive, key) as store:
+        pieces = kind.pieces(run.study)
+        names = {piece.name for piece in pieces}
+        done = {name: found for name, found in store.finished().items() if name in names}
+        work, progress = Work(run.options.threads, run.stop), run.progress or (lambda finished, total: None)
+        found = measure(pieces, work, done=done, keep=store.write, progress=progress)
+        run.stop.check()
+        root = _as_declared(gathered, found, run.study)
+        seconds = _write(run, root, key, {})
+        store.remove()
+    return Outcome(run.archive, root, len(done), False, seconds)
+
+
+def _write(run: _Run, root: xr.Dataset, key: str, groups: Mapping[str, xr.Dataset]) -> float:
+    """Write the archive; the seconds that the run has taken."""
+    seconds = time.perf_counter() - run.started
+    root = root.assign_attrs(attributes(run.study, key, seconds))
+    run.stop.check()
+    write_archive(run.archive, root, groups)
+    return seconds
 
 
 def _check_target(study: Study, archive: Path) -> None:
@@ -106,22 +151,17 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
     return state
 
 
-def _store(plan: Plan, archive: Path, options: RunOptions) -> PartStore:
-    return (PartStore.discard_foreign if options.overwrite else PartStore)(archive, plan.key)
-
-
-def _march(
-    plan: Plan, store: PartStore, done: np.ndarray, options: RunOptions, progress: Progress | None, stop: Stop
-) -> None:
+def _march(plan: Plan, store: PartStore, done: np.ndarray, run: _Run) -> None:
     from engine.execution import execute
 
-    if progress is not None:
-        progress(int(done.size), plan.size)
+    if run.progress is not None:
+        run.progress(int(done.size), plan.size)
     if done.size == plan.size:
         return
+    threads, stop = run.options.threads, run.stop
     try:
         with Gatherer(store.write) as parts:
-            execute(plan, parts.add, threads=options.threads, progress=progress, stop=stop.event, done=done)
+            execute(plan, parts.add, threads=threads, progress=run.progress, stop=stop.event, done=done)
     except Interrupted:
         stop.check()
         raise
@@ -133,13 +173,11 @@ def _finished_dataset(plan: Plan, store: PartStore) -> xr.Dataset:
 
     arrays, selected = store.assemble(plan.size), store.assemble_selected()
     dataset = build(plan, arrays, selected if selected.variants.size else None)
+    return _as_declared(finish, dataset, plan.study)
+
+
+def _as_declared(make: Callable[[Any, Study], xr.Dataset], found: Any, study: Study) -> xr.Dataset:
     try:
-        return finish(dataset, plan.study)
+        return make(found, study)
     except ArchiveError as error:
         raise AssertionError(str(error)) from error
-
-
-def _groups(plan: Plan) -> dict[str, xr.Dataset]:
-    from engine.dataset import model_groups
-
-    return dict(model_groups(plan))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from results_schema.errors import BadInput
+from studies.measuring import MeasuringKind, Work, check_measurable, measure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +24,8 @@ KINDS_FOLDER = Path(__file__).parent / "kinds"
 
 
 class Kind(Protocol):
-    """One kind of question. A module in `studies/kinds` has one as its attribute KIND, and declares its results.
+    """One kind of question about one scene and its sweep. A module in `studies/kinds` has one as its attribute KIND,
+    and declares its results; or it has a `studies.measuring.MeasuringKind`.
 
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
     """
@@ -54,7 +56,10 @@ def kind_names() -> tuple[str, ...]:
     return tuple(sorted(module.name.replace("_", "-") for module in modules))
 
 
-def kind_named(name: str, where: str = "kind") -> Kind:
+AnyKind = Kind | MeasuringKind
+
+
+def kind_named(name: str, where: str = "kind") -> AnyKind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
     known = kind_names()
     if name not in known:
@@ -62,21 +67,36 @@ def kind_named(name: str, where: str = "kind") -> Kind:
         remedy = f'did you mean "{near[0]}"?' if near else ""
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
-    return cast(Kind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
+    return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
 
 
-def kind_of(study: Study) -> Kind:
+def kind_of(study: Study) -> AnyKind:
     """The kind of a study, after its check. Raises BadInput."""
     kind = kind_named(study.kind, study.source.where("kind"))
+    if isinstance(kind, MeasuringKind):
+        check_measurable(study, kind)
+    elif study.question:
+        raise BadInput(
+            f"studies of the kind {kind.name} have no options",
+            where=study.source.where("question"),
+            expected="no table [question]",
+            received=f"the keys {', '.join(study.question)}",
+        )
     kind.check(study)
     return kind
 
 
 def run(study: Study, **options: Any) -> xr.Dataset:
-    """Run a study in memory: the dataset of its archive. options: as of `engine.run`. Raises BadInput."""
+    """Run a study in memory: the dataset of its archive. Raises BadInput.
+
+    options: as of `engine.run`; of a study that measures only `threads` and `progress`.
+    """
     from engine.execution import run as march
 
     kind = kind_of(study)
+    if isinstance(kind, MeasuringKind):
+        work = Work(options.pop("threads", None))
+        return gathered(measure(kind.pieces(study), work, **options), study)
     return finish(march(study, reduction=kind.reduction(study), **options), study)
 
 
@@ -85,22 +105,38 @@ def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
     Raises ArchiveError where the two differ.
     """
-    from results_schema.validate import validate
     from results_schema.variables import expand
 
     kind = kind_named(study.kind)
+    assert not isinstance(kind, MeasuringKind)
     finished = kind.summarise(dataset, study)
     declared = expand(kind.name, sensor_units(study), tuple(study.carriage))
     # The engine offers static values to every summary; they are results only where the kind says so.
     offered = [f"{sensor}_static" for sensor in study.sensor]
-    finished = finished.drop_vars([name for name in offered if name not in declared], errors="ignore")
-    if "sensor" in finished.dims:
+    return _compared(finished.drop_vars([n for n in offered if n not in declared], errors="ignore"), study)
+
+
+def gathered(pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+    """The dataset of a study that measures from its finished pieces, compared with the declarations.
+
+    Raises ArchiveError where the two differ.
+    """
+    kind = kind_named(study.kind)
+    assert isinstance(kind, MeasuringKind)
+    return _compared(kind.gather(pieces, study), study)
+
+
+def _compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """With units of sensors and the study's attributes, and as declared."""
+    from results_schema.validate import validate
+
+    if "sensor" in dataset.dims:
         units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
-        finished = finished.assign_coords(sensor_unit=units)
-    missing = {key: value for key, value in study_attributes(study).items() if key not in finished.attrs}
-    finished = finished.assign_attrs(missing)
-    validate(finished, kind.name, sensor_units(study), tuple(study.carriage))
-    return finished
+        dataset = dataset.assign_coords(sensor_unit=units)
+    missing = {key: value for key, value in study_attributes(study).items() if key not in dataset.attrs}
+    dataset = dataset.assign_attrs(missing)
+    validate(dataset, study.kind, sensor_units(study), tuple(study.carriage))
+    return dataset
 
 
 def study_attributes(study: Study) -> Mapping[str, str]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from results_schema.status import Status, label
 from studies.words import quantity
@@ -22,15 +21,15 @@ _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 @dataclass(frozen=True)
 class Extreme:
-    """One end of a result's range: its value, and the swept numbers of that variant by name, with units."""
+    """One end of a result's range: its value, and the swept numbers (or names) of that variant by name, with units."""
 
     value: float
-    variant: Mapping[str, tuple[float, str]]
+    variant: Mapping[str, tuple[float | str, str]]
 
     @property
     def where(self) -> str:
         """The variant in words."""
-        return ", ".join(f"{name} {quantity(value, unit)}" for name, (value, unit) in self.variant.items())
+        return ", ".join(f"{name} {_shown(value, unit)}" for name, (value, unit) in self.variant.items())
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,19 @@ class Range:
         return max(abs(self.smallest.value), abs(self.largest.value))
 
 
+def is_measured(results: xr.Dataset) -> bool:
+    """Whether these are results of a study that measures: its grid is no sweep."""
+    from studies.measuring import MeasuringKind
+    from studies.study import kind_named
+
+    return isinstance(kind_named(str(results.attrs["study_kind"])), MeasuringKind)
+
+
+def noun(results: xr.Dataset) -> str:
+    """What a status belongs to."""
+    return "point" if is_measured(results) else "variant"
+
+
 def counts(results: xr.Dataset) -> dict[str, int]:
     """Number of variants by status, those that occur."""
     values, found = np.unique(results["status"].values, return_counts=True)
@@ -61,8 +73,14 @@ def all_ok(results: xr.Dataset) -> bool:
 
 
 def ranges(results: xr.Dataset) -> Iterator[Range]:
-    """The range of every result that is one number per variant, or one per variant and sensor."""
+    """The range of every result that is one number per variant, or one per variant and sensor; of studies that
+    measure, which have no variants, of every result."""
     grid = results["status"].dims
+    if is_measured(results):
+        for name, array in results.data_vars.items():
+            if array.dtype.kind == "f":
+                yield from _range(results, str(name), "", array)
+        return
     for name, array in results.data_vars.items():
         if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
             continue
@@ -109,19 +127,23 @@ def _range(results: xr.Dataset, name: str, sensor: str, array: xr.DataArray) -> 
     if not np.isfinite(values).any():
         return
     units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
-    smallest, largest = (_extreme(results, values, pick(values)) for pick in (np.nanargmin, np.nanargmax))
+    smallest, largest = (_extreme(results, array, pick(values)) for pick in (np.nanargmin, np.nanargmax))
     yield Range(name, sensor, units, smallest, largest)
 
 
-def _extreme(results: xr.Dataset, values: NDArray[np.float64], flat: np.intp) -> Extreme:
-    place = dict(zip(results["status"].dims, np.unravel_index(flat, values.shape), strict=True))
-    variant = {}
+def _extreme(results: xr.Dataset, array: xr.DataArray, flat: np.intp) -> Extreme:
+    place = dict(zip(array.dims, np.unravel_index(flat, array.shape), strict=True))
+    variant: dict[str, tuple[float | str, str]] = {}
     for name, coordinate in results.coords.items():
-        swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "if"
+        swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "ifU"
         if swept and name not in _DERIVED:
-            index = place[coordinate.dims[0]]
-            variant[str(name)] = (float(coordinate.values[index]), str(coordinate.attrs.get("units", "1")))
-    return Extreme(float(values.reshape(-1)[flat]), variant)
+            value = coordinate.values[place[coordinate.dims[0]]].item()
+            variant[str(name)] = (value, str(coordinate.attrs.get("units", "1")))
+    return Extreme(float(array.values.reshape(-1)[flat]), variant)
+
+
+def _shown(value: float | str, unit: str) -> str:
+    return value if isinstance(value, str) else quantity(value, unit)
 
 
 _DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

@@ -17,13 +17,15 @@ PACKAGES = ("results_schema", "engine", "studies")
 
 # The stages of the engine: a module imports modules of its own stage and of those before.
 STAGES = {
+    "formulas": "kernels kernels.layout kernels.schemes",
     "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
     "bodies bodies.beam",
-    "numbers only": "kernels kernels.jit kernels.layout kernels.schemes kernels.record kernels.start kernels.march",
+    "numbers only": "kernels.jit kernels.record kernels.pairs kernels.stepping kernels.start kernels.march "
+    "kernels.comparison_steps kernels.comparison",
     "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics",
-    "scenes as arrays": "timeline model track signals lanes fidelity tables",
+    "scenes as arrays": "timeline model track signals lanes fidelity tables resolution",
     "all work of a study": "reduction plan histories remarks",
-    "the run": "march outcome dataset execution",
+    "the run": "march richardson ode transition comparison outcome dataset execution",
 }
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"}
 # Packages that only these modules of ours may import.

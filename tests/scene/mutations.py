@@ -14,7 +14,8 @@ from engine.document import write_document
 from results_schema.errors import BadInput
 
 How = Literal["drop", "misspell", "retype", "text", "nan"]
-NAMED = ("body", "carriage", "sensor", "sweep")  # tables whose keys are the user's own names
+# tables whose keys are the user's own names
+OWN_NAMES = (("body",), ("carriage",), ("sensor",), ("sweep",), ("question", "scenes"))
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Mutation:
     @property
     def must_fail(self) -> bool:
         """Dropping an optional key and renaming a thing nobody refers to leave a valid study."""
-        own_name = len(self.path) == 2 and self.path[0] in NAMED
+        own_name = self.path[:-1] in OWN_NAMES
         return self.how not in ("drop", "misspell") or (self.how == "misspell" and not own_name)
 
 

@@ -1,0 +1,114 @@
+"""Where do methods fail? Maps of stability, computed by running the march itself, with the theory beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity, Status
+from results_schema.variables import axes, declare
+from studies.maps.ground import Ground
+from studies.maps.mapping import Asked
+from studies.maps.table import MAPS
+from studies.measuring import Piece, question_of, usual
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.carriages import Carriage
+    from engine.scene import Study
+    from studies.figures import Figure
+    from studies.results import Results
+
+for _map in MAPS.values():
+    declare("stability", *(axis for axis in _map.axes if axis.name not in axes()))
+    declare("stability", *_map.variables)
+
+
+class Stability:
+    """The kind "stability"."""
+
+    name = "stability"
+    summary = "where schemes and couplings grow without reason: limits, thresholds and maps, with the theory beside"
+    question = "With which step, mass and speed does a method of time integration stop telling the truth?"
+    settings = Asked
+
+    def check(self, study: Study) -> None:
+        """One mass that crosses one held body, and maps that exist."""
+        _check_scene(study)
+        for name in question_of(study, Asked).maps:
+            if name not in MAPS:
+                where, expected = study.source.where("question.maps"), f"some of {', '.join(MAPS)}"
+                raise BadInput("no such map", where=where, expected=expected, received=repr(name))
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        asked, ground = question_of(study, Asked), Ground(study)
+        chosen = [one for name, one in MAPS.items() if name in asked.maps]
+        return [Piece(one.name, one.words, partial(one.compute, ground, asked), one.seconds) for one in chosen]
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        import xarray as xr
+
+        modes, steps = (
+            max(int(np.max(piece.attrs[name])) for piece in pieces.values()) for name in ("most_modes", "most_steps")
+        )
+        plain = [piece.drop_attrs(deep=False) for piece in pieces.values()]
+        whole = xr.merge(plain, combine_attrs="override", join="exact", compat="equals")
+        return whole.assign(usual((), status=int(Status.OK), fidelity=int(Fidelity.MASS), modes=modes, steps=steps))
+
+    def findings(self, results: Results) -> list[str]:
+        return [text for one in _present(results) for text in MAPS[one].sentences(results.dataset)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import stability
+
+        return stability.pictures(results.dataset, _present(results))
+
+
+def _present(results: Results) -> list[str]:
+    """Names of the maps that the archive holds, in their order."""
+    asked = question_of(results.study, Asked).maps
+    return [name for name in MAPS if name in asked]
+
+
+def _check_scene(study: Study) -> None:
+    """Refuse what the maps cannot stand on. Raises BadInput."""
+    if len(study.carriage) != 1:
+        raise BadInput(
+            "the maps vary one carriage",
+            where=study.source.where("carriage"),
+            expected="exactly one table [carriage.name]",
+            received=f"{len(study.carriage)} of them",
+        )
+    ((name, carriage),) = study.carriage.items()
+    _check_carriage(study, name, carriage)
+    body, here = study.body[carriage.on], f"body.{carriage.on}"
+    if getattr(body, "own_weight", False):
+        where = study.source.where(f"{here}.own_weight")
+        raise BadInput("the maps leave the body's own weight out", where=where, expected="own_weight = false")
+    if any(coefficient > 0.0 for _, _, coefficient in body.dampers()):
+        where = study.source.where(f"{here}.supports")
+        raise BadInput("the maps know damping of the modes only", where=where, expected="supports without damping")
+    if not isinstance(body.damping_ratio, float):
+        where = study.source.where(f"{here}.damping_ratio")
+        raise BadInput("the maps vary the number of modes", where=where, expected="one damping ratio for all modes")
+    if Ground(study).is_loose:
+        where = study.source.where(f"{here}.supports")
+        raise BadInput("nothing holds this body", where=where, expected="supports that hold it")
+
+
+def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
+    """A mass that crosses. Raises BadInput."""
+    if not carriage.inertial:
+        where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
+        raise BadInput("a force has no inertia that could fail", where=where, expected=expected)
+    if getattr(carriage.motion, "kind", "") != "cruise":
+        where, expected = study.source.where(f"carriage.{name}.motion.kind"), '"cruise"'
+        raise BadInput("the maps start from a passage", where=where, expected=expected)
+
+
+KIND = Stability()

@@ -1,0 +1,395 @@
+"""What does which accuracy cost? Error against cost of every scheme, number of steps and number of modes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field, Strict
+
+from engine.document import shortened
+from engine.spec import Spec, one_of
+from engine.units import fault
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity, Status
+from results_schema.variables import Variable, declare
+from studies.measuring import Piece, Work, described, question_of, usual
+from studies.results import Results
+from studies.telling import check_sensors, first_carriage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene import Study
+    from studies.figures import Figure
+
+STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
+SCHEMES = (
+    *("average-acceleration", "linear-acceleration", "fox-goodwin", "central-difference"),
+    *("hht-alpha", "generalized-alpha", "richardson"),
+    *("wilson-theta", "rk4", "lagged-inertia", "lagged-convective", "picard", "picard-relaxed"),
+)
+LADDER = (50, 100, 200, 400, 800, 1600, 3200, 6400, 12800, 25600)
+MODES = (2, 3, 5, 8, 12, 20, 32, 48)
+WANTED = (1e-3, 1e-4, 1e-6)
+FLOOR = 30.0  # times the reference's own error: less is no error of a scheme
+
+
+def _even(count: int) -> int:
+    if count % 2:
+        raise fault("a Richardson pair halves the number of steps", expected="an even number", received=str(count))
+    return count
+
+
+def _ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    if list(values) != sorted(set(values)):
+        raise fault("a list in ascending order is wanted here", expected="each once", received=shortened(list(values)))
+    return values
+
+
+def _distinct(values: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(values)) != len(values):
+        raise fault("a name stands twice", expected="each once", received=shortened(list(values)))
+    return values
+
+
+_Steps = Annotated[int, Field(ge=4, le=1_000_000), AfterValidator(_even)]
+_Modes = Annotated[int, Field(ge=1, le=64)]
+_Part = Annotated[float, Field(gt=0, lt=1)]
+_Scheme = Annotated[str, AfterValidator(one_of(*SCHEMES))]
+
+
+class Question(Spec):
+    """The table [question].
+
+    scenes: name -> other values of the study's scene by dotted key. schemes, step_counts: what is compared, at the
+    study's own number of modes. mode_counts: what the schemes of the march are compared at too, against
+    reference_modes. wanted: errors for which the report names the cheapest choice.
+    """
+
+    scenes: dict[str, dict[str, Any]] = Field(default={"the scene": {}}, min_length=1)
+    schemes: Annotated[tuple[_Scheme, ...], Strict(False), Field(min_length=1), AfterValidator(_distinct)] = SCHEMES
+    step_counts: Annotated[tuple[_Steps, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = LADDER
+    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = MODES
+    reference_modes: int = Field(default=64, ge=4, le=64)
+    wanted: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1)] = WANTED
+
+
+_POINT = ("scene", "mode_count", "correction", "scheme", "step_count", "quantity")
+_WHERE = "history and extremes over the scene's largest static value, contact_force over the weight"
+ERROR = Variable(
+    "error",
+    ("quantity",),
+    long_name="error of the time steps",
+    meaning=f"against DOP853 on the same modal equations; {_WHERE}",
+    nan_allowed=True,
+)
+SECONDS = Variable(
+    "seconds_per_variant",
+    units="s",
+    long_name="wall time per variant",
+    meaning="in a batch on all threads of this machine, the best of a few; tables of the scene and compiling left out",
+    nan_allowed=True,
+)
+ORDER = Variable(
+    "fitted_order",
+    ("scene", "scheme", "quantity"),
+    long_name="power with which the error falls with the steps",
+    meaning="slope of a line through the finest three or more errors whose slopes agree; NaN where there are none",
+    lead="none",
+    nan_allowed=True,
+)
+COMPARISON_ONLY = Variable(
+    "comparison_only",
+    ("scheme",),
+    "int8",
+    long_name="whether a scheme is for comparison alone",
+    meaning="1: no study can choose it; 0: a scheme of the march",
+    lead="none",
+)
+REFERENCE_ERROR = Variable(
+    "reference_error",
+    ("scene", "quantity"),
+    long_name="error of the reference of `error`",
+    meaning="difference of DOP853 with relative tolerances 1e-12 and 1e-10, which is above it",
+    lead="none",
+    nan_allowed=True,
+)
+TOTAL_ERROR = Variable(
+    "total_error",
+    _POINT,
+    long_name="error of the time steps and of the modes together",
+    meaning=f"against a reference converged in both; {_WHERE}; NaN where it diverged and for comparison-only schemes",
+    lead="none",
+    nan_allowed=True,
+)
+TOTAL_SECONDS = Variable(
+    "total_seconds_per_variant",
+    ("scene", "mode_count", "scheme", "step_count"),
+    units="s",
+    long_name="wall time per variant",
+    meaning="as seconds_per_variant; the static correction costs nothing, as the kernels do the same work without it",
+    lead="none",
+    nan_allowed=True,
+)
+TOTAL_REFERENCE_ERROR = Variable(
+    "total_reference_error",
+    ("scene", "quantity"),
+    long_name="estimated error of the reference of `total_error`",
+    meaning="a third of the change from half as many modes, as errors fall with the second power at least, plus the "
+    "change from half as many steps",
+    lead="none",
+    nan_allowed=True,
+)
+ON_FRONT = Variable(
+    "on_front",
+    _POINT,
+    "int8",
+    long_name="whether a point is on the Pareto front",
+    meaning="1 where no other point of the scene and quantity is both cheaper and better; the error of a point counts "
+    "as that of its worst finer step count, so that lucky points do not",
+    lead="none",
+)
+SOLVER_ERROR = Variable(
+    "solver_error",
+    ("scene", "solver", "quantity"),
+    long_name="error of a solver of SciPy",
+    meaning="as `error`",
+    lead="none",
+    nan_allowed=True,
+)
+SOLVER_SECONDS = Variable(
+    "solver_seconds_per_variant",
+    ("scene", "solver"),
+    units="s",
+    long_name="wall time per variant of a solver",
+    meaning="one variant after another on one thread, as these solvers work",
+    lead="none",
+)
+JAX_ERROR = Variable(
+    "jax_error",
+    ("scene", "step_count"),
+    long_name="error of histories of average acceleration by jax.vmap",
+    meaning="as `error`; only where jax is installed, and up to 4096 steps",
+    lead="none",
+    required=False,
+    nan_allowed=True,
+)
+JAX_SECONDS = Variable(
+    "jax_seconds_per_variant",
+    ("scene", "step_count"),
+    units="s",
+    long_name="wall time per variant of average acceleration by jax.vmap",
+    meaning="in a batch of 256 variants, the best of a few, compiling left out",
+    lead="none",
+    required=False,
+    nan_allowed=True,
+)
+RESULTS = (
+    *(ERROR, SECONDS, ORDER, COMPARISON_ONLY, REFERENCE_ERROR, TOTAL_ERROR, TOTAL_SECONDS, TOTAL_REFERENCE_ERROR),
+    *(ON_FRONT, SOLVER_ERROR, SOLVER_SECONDS, JAX_ERROR, JAX_SECONDS),
+)
+declare("work-precision", *RESULTS)
+
+
+def _axis(name: str, long_name: str, dtype: str, meaning: str = "") -> Variable:
+    return Variable(name, (name,), dtype, "", long_name, meaning, required=False, lead="none")
+
+
+COORDINATES = (
+    _axis("scene", "scene", "str"),
+    _axis("correction", "whether the static correction is added", "int8", "1 with, 0 without"),
+    _axis("solver", "solver of SciPy and its relative tolerance", "str"),
+)
+declare("work-precision", *COORDINATES)
+
+
+class WorkPrecision:
+    """The kind "work-precision"."""
+
+    name = "work-precision"
+    summary = "error against cost of schemes, steps, modes and static correction; what to take for which accuracy"
+    question = "Which scheme, how many steps and how many modes give which accuracy at the least cost?"
+    settings: type[Spec] = Question
+
+    def check(self, study: Study) -> None:
+        """One mass on one smooth way in every scene, and sensors with a static value."""
+        from engine.ode import check_smooth
+        from studies.precision import scene_model
+
+        asked = question_of(study, Question)
+        first_carriage(study)
+        check_sensors(study)
+        _check_slugs(study, asked)
+        _check_ladder(study, asked)
+        for name, overrides in asked.scenes.items():
+            try:
+                check_smooth(scene_model(study, overrides, asked.mode_counts[-1]), STATIC_QUANTITIES)
+            except BadInput as error:
+                raise BadInput(
+                    f"{error.where.rpartition(': ')[2]}: {error.what}",
+                    where=study.source.where(f"question.scenes.{name}"),
+                    expected=error.expected,
+                    received=error.received,
+                    remedy=error.remedy,
+                ) from None
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        """Per scene the steps, SciPy's solvers, and the modes."""
+        asked = question_of(study, Question)
+        found = []
+        for name, overrides in asked.scenes.items():
+            for part, (words, seconds) in _parts().items():
+                job = partial(_compute, part, study, asked, overrides)
+                found.append(Piece(f"{part}-{_slug(name)}", f"{words}: {name}", job, seconds))
+        return found
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        """Scenes side by side, with fitted orders and fronts."""
+        return _gathered(pieces, question_of(study, Question))
+
+    def findings(self, results: Results) -> list[str]:
+        from studies import advice
+
+        return advice.findings(results.dataset, question_of(results.study, Question).wanted)
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import work_precision
+
+        return work_precision.pictures(results.dataset)
+
+
+KIND = WorkPrecision()
+
+
+def _parts() -> Mapping[str, tuple[str, float]]:
+    """The parts of a scene's work on this machine."""
+    from studies.jax_march import is_there
+
+    return {**_PARTS, **({"jax": ("average acceleration by jax.vmap", 10.0)} if is_there() else {})}
+
+
+def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, Any], work: Work) -> xr.Dataset:
+    """One piece."""
+    from studies import ladders
+
+    ladder = ladders.Ladder(asked.schemes, asked.step_counts, asked.mode_counts, asked.reference_modes)
+    if part == "solvers":
+        return ladders.solvers(study, overrides, work)
+    measured = {"steps": ladders.steps, "modes": ladders.modes, "jax": ladders.by_jax}
+    return measured[part](study, overrides, ladder, work)
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+def _check_slugs(study: Study, asked: Question) -> None:
+    """Names of scenes that differ as names of pieces too."""
+    slugs = [_slug(name) for name in asked.scenes]
+    for name, slug in zip(asked.scenes, slugs, strict=True):
+        if not slug or slugs.count(slug) > 1 or len(name) > 60:
+            raise BadInput(
+                "not a usable name of a scene",
+                where=study.source.where(f"question.scenes.{name}"),
+                expected="up to 60 characters whose letters and digits differ from those of other names",
+            )
+
+
+#: The parts of a scene's work, each a function of `studies.ladders`: words, expected seconds.
+_PARTS: Mapping[str, tuple[str, float]] = {
+    "steps": ("every scheme over the steps", 6.0),
+    "solvers": ("SciPy's solvers on the same equations", 3.0),
+    "modes": ("the march over steps and modes", 10.0),
+}
+
+
+def _check_ladder(study: Study, asked: Question) -> None:
+    """At least one scheme that a study could take, and a reference of more modes than are compared."""
+    from studies.precision import MARCHED
+
+    if not set(asked.schemes) & set(MARCHED):
+        where = study.source.where("question.schemes")
+        expected = f"at least one scheme of the march: {', '.join(MARCHED)}"
+        raise BadInput("these schemes are for comparison only", where=where, expected=expected)
+    if asked.mode_counts[-1] >= asked.reference_modes:
+        raise BadInput(
+            "the reference has no more modes than what is compared with it",
+            where=study.source.where("question.reference_modes"),
+            expected=f"more than {asked.mode_counts[-1]}",
+            received=str(asked.reference_modes),
+        )
+
+
+def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
+    import xarray as xr
+
+    from studies.precision import COMPARED, MARCHED, QUANTITIES
+    from studies.trade import fitted_order, fronts
+
+    steps, solvers, modes = (
+        [pieces[f"{part}-{_slug(name)}"] for name in asked.scenes] for part in ("steps", "solvers", "modes")
+    )
+    error = np.stack([piece["error"].values for piece in steps])
+    floors = np.stack([piece["reference_error"].values for piece in steps])
+    marched = [place for place, scheme in enumerate(asked.schemes) if scheme in MARCHED]
+    total = np.full((len(modes), len(asked.mode_counts), 2, *error.shape[1:]), np.nan)
+    total[:, :, :, marched] = np.stack([piece["error"].values for piece in modes])
+    seconds = np.full((len(modes), len(asked.mode_counts), *error.shape[1:3]), np.nan)
+    seconds[:, :, marched] = np.stack([piece["seconds"].values for piece in modes])
+    order = [
+        [[fitted_order(asked.step_counts, e[:, q], FLOOR * f) for q, f in enumerate(floor)] for e in errors]
+        for errors, floor in zip(error, floors, strict=True)
+    ]
+    grid = ("scene", "scheme", "step_count")
+    diverged = np.isnan(error).all(axis=-1)
+    counts = np.array(asked.step_counts)
+    only = [int(scheme in COMPARED) for scheme in asked.schemes]
+    data = {
+        ERROR: ((*grid, "quantity"), error),
+        SECONDS: (grid, np.stack([piece["seconds"].values for piece in steps])),
+        ORDER: (ORDER.dims, order),
+        COMPARISON_ONLY: (COMPARISON_ONLY.dims, only),
+        REFERENCE_ERROR: (REFERENCE_ERROR.dims, floors),
+        TOTAL_ERROR: (TOTAL_ERROR.dims, total),
+        TOTAL_SECONDS: (TOTAL_SECONDS.dims, seconds),
+        TOTAL_REFERENCE_ERROR: (REFERENCE_ERROR.dims, np.stack([piece["reference_error"].values for piece in modes])),
+        ON_FRONT: (ON_FRONT.dims, fronts(total, seconds)),
+        SOLVER_ERROR: (SOLVER_ERROR.dims, np.stack([piece["error"].values for piece in solvers])),
+        SOLVER_SECONDS: (SOLVER_SECONDS.dims, np.stack([piece["seconds"].values for piece in solvers])),
+    }
+    used = np.stack([np.full(error.shape[1:3], int(piece["modes"])) for piece in steps])
+    shared = usual(
+        grid,
+        status=np.where(diverged, int(Status.DIVERGED), int(Status.OK)),
+        fidelity=np.full(diverged.shape, int(Fidelity.MASS)),
+        modes=used,
+        steps=np.broadcast_to(counts, diverged.shape).copy(),
+    )
+    found = {variable.name: described(variable, *values) for variable, values in data.items()}
+    by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{_slug(scene)}") in pieces]
+    for variable, name in ((JAX_ERROR, "error"), (JAX_SECONDS, "seconds")) if by_jax else ():
+        found[variable.name] = described(variable, variable.dims, np.stack([piece[name].values for piece in by_jax]))
+    told = {"jax": "measured" if by_jax else "not installed, so there are no points of jax.vmap"}
+    return xr.Dataset(shared | found, coords=_coordinates(asked, QUANTITIES), attrs=told)
+
+
+def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
+    from results_schema.variables import axes
+    from studies.ladders import SOLVERS
+
+    named = [f"{method} {tolerance:g}" for method, tolerances in SOLVERS.items() for tolerance in tolerances]
+    values = {
+        "scene": list(asked.scenes),
+        "scheme": list(asked.schemes),
+        "step_count": np.array(asked.step_counts, dtype=np.int64),
+        "mode_count": np.array(asked.mode_counts, dtype=np.int64),
+        "correction": np.array([0, 1], dtype=np.int8),
+        "quantity": list(quantities),
+        "solver": named,
+    }
+    known = axes() | {variable.name: variable for variable in COORDINATES}
+    return {name: (name, value, known[name].attributes()) for name, value in values.items()}

@@ -1,0 +1,118 @@
+"""The measurements of a work-precision study: one scene over schemes, steps, modes, and SciPy's solvers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from engine.ode import ModalEquations
+from engine.scene import Study
+from studies import jax_march, precision
+from studies.measuring import Work
+
+SOLVERS = {"DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10), "Radau": (1e-2, 1e-4, 1e-6, 1e-8)}
+REFERENCE_TOLERANCES = (1e-12, 1e-10)
+
+
+class Ladder(NamedTuple):
+    """What is compared."""
+
+    schemes: tuple[str, ...]
+    step_counts: tuple[int, ...]
+    mode_counts: tuple[int, ...]
+    reference_modes: int
+
+
+def steps(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+    """Every scheme over the ladder of steps, at the study's own number of modes."""
+    model = precision.scene_model(study, overrides)
+    solutions = [ModalEquations(model).solve("DOP853", tol, work.halted) for tol in REFERENCE_TOLERANCES]
+    reference, other = (precision.modal_reference(model, solved) for solved in solutions)
+    shape = (len(asked.schemes), len(asked.step_counts))
+    errors, seconds = np.full((*shape, len(precision.QUANTITIES)), np.nan), np.full(shape, np.nan)
+    marched = {s: precision.with_scheme(model, s) if s in precision.MARCHED else model for s in asked.schemes}
+    for n, count in enumerate(asked.step_counts):
+        shared: dict[Any, Any] = {}
+        for i, scheme in enumerate(asked.schemes):
+            tables = precision.tables_of(marched[scheme], count, shared)
+            found = precision.run_scheme(tables, scheme, work)
+            errors[i, n] = reference.errors(found)
+            if not found.diverged:
+                seconds[i, n] = precision.seconds_per_variant(tables, scheme, work)
+    apart = reference.errors(precision.as_run(other, model))
+    return xr.Dataset(
+        {
+            "error": (("scheme", "step_count", "quantity"), errors),
+            "seconds": (("scheme", "step_count"), seconds),
+            "reference_error": ("quantity", apart),
+            "modes": model.omega.size,
+        }
+    )
+
+
+def solvers(study: Study, overrides: Mapping[str, Any], work: Work) -> xr.Dataset:
+    """SciPy's solvers on the same equations, one variant."""
+    model = precision.scene_model(study, overrides)
+    equations = ModalEquations(model)
+    reference = precision.modal_reference(model, equations.solve("DOP853", REFERENCE_TOLERANCES[0], work.halted))
+    errors, seconds = [], []
+    for method, tolerances in SOLVERS.items():
+        for tolerance in tolerances:
+            start = time.perf_counter()
+            solved = equations.solve(method, tolerance, work.halted)
+            seconds.append(time.perf_counter() - start)
+            errors.append(reference.errors(precision.as_run(precision.modal_reference(model, solved), model)))
+    return xr.Dataset({"error": (("solver", "quantity"), np.array(errors)), "seconds": ("solver", seconds)})
+
+
+def by_jax(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+    """Average acceleration by jax.vmap over the steps that fit one table: error of histories, seconds per variant."""
+    model = precision.with_scheme(precision.scene_model(study, overrides), "average-acceleration")
+    reference = precision.modal_reference(
+        model, ModalEquations(model).solve("DOP853", REFERENCE_TOLERANCES[0], work.halted)
+    )
+    shape = len(asked.step_counts)
+    errors, seconds = np.full(shape, np.nan), np.full(shape, np.nan)
+    for n, count in enumerate(asked.step_counts):
+        work.check()
+        if count <= jax_march.MOST_STEPS:
+            tables = precision.tables_of(model, count)
+            found, seconds[n] = jax_march.march(tables)
+            sensors = found.shape[1]
+            exact = reference.read(tables, np.arange(1, found.shape[0] + 1))[:, :sensors]
+            errors[n] = (np.abs(found - exact).max(axis=0) / reference.scale).max()
+    return xr.Dataset({"error": ("step_count", errors), "seconds": ("step_count", seconds)})
+
+
+def modes(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+    """The schemes of the march over steps and modes, with and without static correction, against what is converged."""
+    schemes = [scheme for scheme in asked.schemes if scheme in precision.MARCHED]
+    reference, apart = precision.converged(study, overrides, asked.reference_modes, asked.step_counts[-1], work)
+    shape = (len(asked.mode_counts), 2, len(schemes), len(asked.step_counts))
+    errors = np.full((*shape, len(precision.QUANTITIES)), np.nan)
+    seconds = np.full((shape[0], *shape[2:]), np.nan)
+    for m, number in enumerate(asked.mode_counts):
+        bare = precision.scene_model(study, overrides, number)
+        models = [
+            [precision.with_correction(precision.with_scheme(bare, s), c) for c in (False, True)] for s in schemes
+        ]
+        for n, count in enumerate(asked.step_counts):
+            shared: dict[Any, Any] = {}
+            for i, c in np.ndindex(len(schemes), 2):
+                tables = precision.tables_of(models[i][c], count, shared)
+                found = precision.run_scheme(tables, schemes[i], work)
+                errors[m, c, i, n] = reference.errors(found)
+                if c and not found.diverged:
+                    seconds[m, i, n] = precision.seconds_per_variant(tables, schemes[i], work)
+    dims = ("mode_count", "correction", "scheme", "step_count", "quantity")
+    return xr.Dataset(
+        {
+            "error": (dims, errors),
+            "seconds": (("mode_count", "scheme", "step_count"), seconds),
+            "reference_error": ("quantity", apart),
+        }
+    )

@@ -1,0 +1,106 @@
+"""What if the mass is tied to the body by its place instead of by its inertia? The contact force then rings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.maps.ground import Ground
+from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.methods import METHODS, Method, generalized, hht
+from studies.words import listed, number, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from studies.measuring import Work
+
+Array = NDArray[np.float64]
+
+MODES, STEPS, COUNTED = 8, 400, 0.98
+INERTIAL = "as inertia"
+TIED: tuple[Method, ...] = (
+    METHODS[0],
+    METHODS[1],
+    METHODS[4],
+    hht(-0.05),
+    hht(-0.3),
+    generalized(0.8),
+    generalized(0.0),
+)
+LOST = 1e6  # weights: a force beyond means nothing any more
+CALM = 0.1  # of the weight: ringing below is none to speak of
+
+AXES = (
+    axis("tie", "how the mass is tied, and the scheme", dtype="str"),
+    axis("passage_fraction", "place of the mass over the length"),
+)
+VARIABLES = (
+    result("contact_force", ("tie", "passage_fraction"), "contact force", "over the weight; NaN "
+           "beyond a million", nan_allowed=True),
+    result("contact_ringing", ("tie",), "ringing of the contact force", "over the weight: rms of the part that changes "
+           "its sign from step to step, (F[n+1] - 2 F[n] + F[n-1])/4; NaN where it blows up", nan_allowed=True),
+    result("contact_departure", ("tie",), "largest departure of the contact force from that of the mass as inertia",
+           "over the weight; NaN where it blows up", nan_allowed=True),
+)  # fmt: skip
+
+
+def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
+    """The study's own mass and speed, once as inertia and then tied by its place, by several schemes."""
+    rows = [_inertial(ground, work)]
+    for method in TIED:
+        work.check()
+        rows.append(_tied(ground, method))
+    counted = int(COUNTED * STEPS)
+    force = np.array(rows)[:, : counted + 1]
+    force = np.where(np.abs(force) < LOST, force, np.nan)
+    ringing = np.sqrt(np.mean((0.25 * np.diff(force, 2)) ** 2, axis=1))
+    departure = np.abs(force - force[0]).max(axis=1)
+    values = {
+        "contact_force": force,
+        "contact_ringing": ringing,
+        "contact_departure": departure,
+    }
+    along = {"tie": [INERTIAL, *(method.label for method in TIED)], "passage_fraction": np.arange(counted + 1) / STEPS}
+    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+
+
+def _inertial(ground: Ground, work: Work) -> Array:
+    """(steps + 1,) contact force over the weight, as all other studies march it."""
+    scene = ground.passage(MODES)
+    values = scene.values(np.array([ground.mass_ratio]), np.array([ground.speed_ratio]))
+    return scene.march(STEPS, values, work, np.arange(STEPS + 1)).history[:, 0, 0] / ground.weight
+
+
+def _tied(ground: Ground, method: Method) -> Array:
+    """The same by a tie at position level."""
+    from engine.comparison import march_comparison, rigid_tie
+
+    scene = ground.passage(MODES, method.table)
+    tables, lanes = scene.laid_out(STEPS, scene.values(np.array([ground.mass_ratio]), np.array([ground.speed_ratio])))
+    scheme = rigid_tie(scene.model.scheme.coefficients)
+    marched = march_comparison(scheme, tables, lanes, np.arange(STEPS + 1), 1, sampled=1)
+    return np.asarray(marched.history[:, 0, 0] / ground.weight)
+
+
+def sentences(dataset: xr.Dataset) -> list[str]:
+    """Which schemes ring, and which calm it at what price."""
+    ringing = {str(n): float(v) for n, v in zip(dataset["tie"].values, dataset["contact_ringing"].values, strict=True)}
+    departure = dict(zip(ringing, dataset["contact_departure"].values.tolist(), strict=True))
+    tied = [name for name in ringing if name != INERTIAL]
+    lost = [name for name in tied if not np.isfinite(ringing[name])]
+    wild = [f"{name} {number(ringing[name])} times the weight" for name in tied if ringing[name] > CALM]
+    calm = sorted((departure[name], name) for name in tied if ringing[name] <= CALM)
+    said = f"the contact force rings from step to step with {listed(wild)}" if wild else "no scheme rings"
+    if lost:
+        said += f", and {listed(lost)} blow{'s' if len(lost) == 1 else ''} up altogether"
+    told = [f"Rigid tie: tied by its place instead of its inertia, the mass is an ill-posed partner: {said}."]
+    if calm:
+        best = f"{calm[0][1]} follows the true force most closely, within {percent(calm[0][0])} of the weight"
+        told.append(f"Numerical damping calms it ({listed([name for _, name in calm])}); {best}.")
+    return told
+
+
+MAP = Map("rigid-tie", "the contact force of a mass tied by its place", 2.0, AXES, VARIABLES, compute, sentences)

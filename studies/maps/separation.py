@@ -1,0 +1,118 @@
+"""From which speed on would the mass lift off? Smallest contact force of a passage over speed and mass."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.maps.ground import Ground, MapScene
+from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.words import listed, number, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from studies.measuring import Work
+
+Array = NDArray[np.float64]
+
+MODES, STEPS = 20, 6000
+SLOWEST, FASTEST = 0.05, 1.5  # speed ratios
+REFINED = 48  # speeds between the last that holds and the first that does not
+
+AXES = (
+    axis("separation_mass_ratio", "carriage mass over body mass"),
+    axis("separation_speed_ratio", "speed over omega_1 L / pi"),
+)
+VARIABLES = (
+    result("smallest_contact_force", tuple(a.name for a in AXES), "smallest contact force over the weight",
+           "over the weight, on 0-98 % of the span; NaN where the march overflows", nan_allowed=True),
+    result("separation_onset", ("separation_mass_ratio",), "onset of separation",
+           "speed ratio from which on the contact opens; NaN where it holds", nan_allowed=True),
+    result("separation_place", ("separation_mass_ratio",), "place of separation", "in lengths, at that speed",
+           nan_allowed=True),
+)  # fmt: skip
+
+
+class Contact(NamedTuple):
+    """Smallest contact force over the weight (n,), and where it turns negative first, in lengths (n,)."""
+
+    smallest: Array
+    opens_at: Array
+
+
+class Onset(NamedTuple):
+    """Speed ratio and place (lengths) of the first opening."""
+
+    speed: float
+    place: float
+
+
+def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
+    """Passages from rest under the weight."""
+    scene = ground.passage(MODES)
+    speed = np.linspace(SLOWEST, FASTEST, asked.points(146))
+    rows, onsets = [], []
+    for mass in asked.mass_ratios:
+        smallest = contact(scene, mass, speed, work).smallest
+        rows.append(smallest)
+        onsets.append(onset(scene, mass, speed, smallest, work))
+    values = {
+        "smallest_contact_force": rows,
+        "separation_onset": [found.speed for found in onsets],
+        "separation_place": [found.place for found in onsets],
+    }
+    along = {"separation_mass_ratio": asked.mass_ratios, "separation_speed_ratio": speed}
+    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+
+
+def contact(scene: MapScene, mass: float, speed: Array, work: Work) -> Contact:
+    """The contact of passages at speed ratios (n,)."""
+    from engine.kernels.layout import BELOW_AT, SMALLEST
+
+    values = scene.values(np.full_like(speed, mass), speed)
+    marks = scene.march(STEPS, values, work).marks[-1]
+    weight = mass * scene.model.leading_body.modal.mass * scene.study.gravity
+    return Contact(marks[SMALLEST] / weight, np.where(marks[BELOW_AT] >= 0.0, marks[BELOW_AT] / STEPS, np.nan))
+
+
+def onset(scene: MapScene, mass: float, speed: Array, smallest: Array, work: Work) -> Onset:
+    """The lowest speed at which the contact opens, between two of the scanned ones."""
+    open_at = np.flatnonzero(smallest < 0.0)
+    if open_at.size == 0:
+        return Onset(math.nan, math.nan)
+    first = int(open_at[0])
+    fine = np.linspace(speed[max(0, first - 1)], speed[first], REFINED)
+    found = contact(scene, mass, fine, work)
+    at = int(np.argmax(found.smallest < 0.0))
+    return Onset(float(fine[at]), float(found.opens_at[at]))
+
+
+def sentences(dataset: xr.Dataset) -> list[str]:
+    """The onset per mass."""
+    onset_of, mass = dataset["separation_onset"].values, dataset["separation_mass_ratio"].values
+    place = dataset["separation_place"].values
+    known = np.isfinite(onset_of)
+    top = number(float(dataset["separation_speed_ratio"].max()))
+    if not known.any():
+        return [f"Separation: the mass stays on its track up to speed ratio {top}."]
+    slowest = float(dataset["separation_speed_ratio"].min())
+    least = {i: " or less" if onset_of[i] <= slowest else "" for i in np.flatnonzero(known)}
+    told = listed([f"{number(onset_of[i])}{less} for mass ratio {number(mass[i])}" for i, less in least.items()])
+    kept = f"; the other masses hold up to {top}" if not known.all() else ""
+    return [
+        f"Separation: the mass would first lift off at speed ratio {told}{kept}, {_range(place)} of "
+        "the way. Beyond, the equations say no more."
+    ]
+
+
+def _range(place: Array) -> str:
+    """The first and last place, or the only one."""
+    ends = dict.fromkeys(percent(float(end)) for end in (np.nanmin(place), np.nanmax(place)))
+    return f"at {' to '.join(ends)}"
+
+
+MAP = Map("separation", "where a crossing mass would lift off", 2.0, AXES, VARIABLES, compute, sentences)

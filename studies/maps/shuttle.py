@@ -1,0 +1,147 @@
+"""When does a mass that swings to and fro make its body vibrate ever more? Floquet multipliers of one period."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.maps.ground import Ground, MapScene
+from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.words import listed, number, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from studies.measuring import Work
+
+Array = NDArray[np.float64]
+
+MODES, STEPS = 3, 600
+SLOWEST, FASTEST, HEAVIEST = 0.3, 1.4, 1.0  # frequency ratios, mass ratio
+DAMPING = (0.0, 0.02)
+UNSTABLE = 1.0 + 1e-3
+FINE = 401  # frequencies about a tongue
+NEAR = (0.8, 1.25)  # times the formula: where the main tongue is looked for
+CYCLE_POINTS = 720
+UNSHAKEN = "Swinging mass: near the formula for one mode nothing grows"
+TOLD = (0.1, 0.5, 1.0)
+
+AXES = (
+    axis("shuttle_damping_ratio", "damping ratio of all modes"),
+    axis("shuttle_mass_ratio", "carriage mass over body mass"),
+    axis("shuttle_frequency_ratio", "frequency of the shuttle over omega_1"),
+)
+VARIABLES = (
+    result("multiplier", tuple(a.name for a in AXES), "largest Floquet multiplier", "of one period, in magnitude",
+           nan_allowed=True),
+    result("tongue_low", ("shuttle_mass_ratio",), "lower end of the main tongue", "of the main unstable interval "
+           "without damping, frequency over omega_1; NaN where there is none", nan_allowed=True),
+    result("tongue_high", ("shuttle_mass_ratio",), "upper end of the main tongue", "as tongue_low", nan_allowed=True),
+    result("tongue_theory", ("shuttle_mass_ratio",), "centre of the main tongue by theory", "by the first mode alone, "
+           "frequency over omega_1"),
+)  # fmt: skip
+
+
+class Tongue(NamedTuple):
+    """Ends of an unstable interval, frequency ratios."""
+
+    low: float
+    high: float
+
+
+def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
+    """s = L/2 + L/2 sin(Om t): unit states marched over one period."""
+    scene = ground.shuttle(MODES)
+    frequency = np.linspace(SLOWEST, FASTEST, asked.points(331))
+    mass = np.linspace(0.0, HEAVIEST, asked.points(20) + 1)[1:]
+    rows = []
+    for damping in DAMPING:
+        for ratio in mass:
+            work.check()
+            rows.append(multipliers(scene, float(ratio), frequency, damping))
+    tongues = [main_tongue(scene, float(ratio), frequency) for ratio in mass]
+    values = {
+        "multiplier": np.reshape(rows, (len(DAMPING), mass.size, frequency.size)),
+        "tongue_low": [tongue.low for tongue in tongues],
+        "tongue_high": [tongue.high for tongue in tongues],
+        "tongue_theory": one_mode(scene, mass),
+    }
+    along = dict(zip((a.name for a in AXES), (DAMPING, mass, frequency), strict=True))
+    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+
+
+def multipliers(scene: MapScene, mass: float, frequency: Array, damping: float) -> Array:
+    """(n,) largest multipliers of one period for frequencies (n,) over omega_1."""
+    alike = np.ones_like(frequency)
+    return scene.growth(STEPS, scene.values(mass * alike, frequency, damping * alike))
+
+
+def main_tongue(scene: MapScene, mass: float, frequency: Array) -> Tongue:
+    """The unstable interval with the largest multiplier near the formula, without damping; its ends on a finer grid."""
+    centre = float(one_mode(scene, np.array([mass]))[0])
+    coarse = interval(frequency, multipliers(scene, mass, frequency, 0.0), centre)
+    if math.isnan(coarse.low):
+        return coarse
+    margin = 2.0 * float(np.diff(frequency).max())
+    fine = np.linspace(coarse.low - margin, coarse.high + margin, FINE)
+    return interval(fine, multipliers(scene, mass, fine, 0.0), centre)
+
+
+def interval(frequency: Array, multiplier: Array, centre: float) -> Tongue:
+    """The connected unstable interval about the largest multiplier near a frequency; NaN where all is stable there.
+
+    >>> interval(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 1.5, 1.2, 1.0]), 2.1)
+    Tongue(low=2.0, high=3.0)
+    """
+    near = (frequency > NEAR[0] * centre) & (frequency < NEAR[1] * centre)
+    unstable = multiplier > UNSTABLE
+    top = int(np.argmax(np.where(near, multiplier, 0.0)))
+    if not (near[top] and unstable[top]):
+        return Tongue(math.nan, math.nan)
+    stable = np.flatnonzero(~unstable)
+    first = int(stable[stable < top].max(initial=-1)) + 1
+    last = int(stable[stable > top].min(initial=frequency.size)) - 1
+    return Tongue(float(frequency[first]), float(frequency[last]))
+
+
+def one_mode(scene: MapScene, mass: Array) -> Array:
+    """(n,) centre of the principal tongue over omega_1 for mass ratios (n,), by the first mode alone.
+
+    With the phase as time its kinetic energy holds the mass by the means of (phi q)'^2 over a cycle:
+    Om/omega_1 = [1 + m <phi^2 + phi'^2 s'^2>]^(-1/2). For a pinned beam that is mechanics section 7.5,
+    [1 + mu (1 + J0(z) + pi^2 a^2 (1/2 - J1(z)/z))]^(-1/2) with z = 2 pi a.
+    """
+    part = scene.model.leading_body.modal
+    path = scene.model.carriages[0].rider.motion.path(np.arange(CYCLE_POINTS) / CYCLE_POINTS)
+    shape, slope = (part.shape(path.S, derivative)[:, part.rigid_modes] for derivative in (0, 1))
+    inertia = float(np.mean(shape**2 + (slope * path.dS / (2.0 * math.pi)) ** 2)) * part.mass
+    return np.asarray((1.0 + mass * inertia) ** -0.5)
+
+
+def sentences(dataset: xr.Dataset) -> list[str]:
+    """Where the main tongue lies, how wide it is, and what damping does."""
+    mass = dataset["shuttle_mass_ratio"].values
+    low, high = dataset["tongue_low"].values, dataset["tongue_high"].values
+    places = sorted({int(np.argmin(np.abs(mass - wanted))) for wanted in TOLD if wanted <= mass.max() + 1e-9})
+    shown = [i for i in places if math.isfinite(low[i])]
+    told = listed([f"{number(low[i])} to {number(high[i])} for mass ratio {number(mass[i])}" for i in shown])
+    said = (
+        f"Swinging mass: one that swings over the whole body shakes it ever more at frequencies over omega_1 of {told}"
+    )
+    theory = dataset["tongue_theory"].values
+    away = [percent(abs(0.5 * (low[i] + high[i]) / theory[i] - 1.0)) for i in shown]
+    said = f"{said}; the formula for one mode is {listed(away)} off the middle" if shown else UNSHAKEN
+    largest = dataset["multiplier"].max(["shuttle_mass_ratio", "shuttle_frequency_ratio"]).values
+    unstable = (dataset["multiplier"] > UNSTABLE).mean(["shuttle_mass_ratio", "shuttle_frequency_ratio"]).values
+    return [
+        f"{said}.",
+        f"In one period the vibration grows up to {number(float(largest[0]))} times without damping and "
+        f"{number(float(largest[-1]))} times with {percent(float(dataset['shuttle_damping_ratio'].values[-1]))}, which "
+        f"shrinks the unstable part of the map from {percent(float(unstable[0]))} to {percent(float(unstable[-1]))}.",
+    ]
+
+
+MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, AXES, VARIABLES, compute, sentences)

@@ -1,0 +1,10 @@
+"""All maps, in the order of the report."""
+
+from collections.abc import Mapping
+
+from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
+from studies.maps.mapping import Map
+
+MAPS: Mapping[str, Map] = {
+    module.MAP.name: module.MAP for module in (schemes, lagged, alias, shuttle, frozen, separation, overshoot, rigid)
+}

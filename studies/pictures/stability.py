@@ -1,0 +1,190 @@
+"""Figures of the maps of stability: what was run as lines and cells, the theory over it in vermilion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+
+from studies.figures import (
+    BLUE,
+    DISTINCT,
+    HAIR,
+    INK,
+    MUTED,
+    VERMILION,
+    Figure,
+    banded,
+    colour_bar,
+    draw,
+    legend_beside,
+    logarithmic,
+    printed,
+    shades,
+)
+from studies.pictures.stability_more import OVERSHOOT, RIGID_TIE, SEPARATION, Drawn
+from studies.words import counted, number
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+
+def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:
+    """One figure per map, in the order of the names."""
+    found = []
+    for name in names:
+        drawn = DRAWN[name]
+        found.append(draw(name, drawn.title, drawn.caption, drawn.height, partial(drawn.fill, dataset)))
+    return found
+
+
+def _schemes(dataset: xr.Dataset, drawing: Drawing) -> None:
+    """Growth per step over omega h: schemes with a limit above, those without below."""
+    rows = drawing.subplots(2, 1, sharex=True)
+    limited = np.isfinite(dataset["critical_step"].values)
+    for axes, chosen, title in zip(rows, (limited, ~limited), ("with a limit", "without a limit"), strict=True):
+        x = dataset["frequency_step"].values
+        labels = dataset["scheme"].values[chosen]
+        for place, (label, colour) in enumerate(zip(labels, (*DISTINCT, MUTED), strict=False)):
+            one = dataset.sel(scheme=label)
+            axes.plot(x, one["scheme_growth"], color=colour, label=str(label))
+            axes.plot(x[place % 5 :: 5], one["scheme_radius_theory"].values[place % 5 :: 5], ".", color=INK, ms=3.0)
+        axes.plot([], [], ".", color=INK, ms=3.0, label="theory")
+        axes.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+        axes.set(ylim=(0.85, 2.0) if title == "with a limit" else (0.0, 1.1), ylabel="growth per step", title=title)
+        legend_beside(axes)
+        logarithmic(axes.xaxis)
+    for value in dataset["critical_step"].values[limited]:
+        rows[0].axvline(value, color=HAIR, linewidth=0.8, zorder=1.0)
+    rows[1].set_xlabel("ω h: natural frequency times the step")
+
+
+def _lagged(dataset: xr.Dataset, drawing: Drawing) -> None:
+    """Threshold over the number of modes, and growth over the mass."""
+    left, right = drawing.subplots(1, 2)
+    counts, steps = dataset["mode_count"].values, dataset["relative_step"].values
+    for step, marker, size in zip(steps, "os^vD", (7.0, 4.5, 3.0, 2.5, 2.0), strict=False):
+        critical = dataset["critical_mass_ratio"].sel(relative_step=step)
+        style = {"mfc": "none", "linestyle": "none", "marker": marker, "ms": size}
+        left.plot(counts, critical, color=BLUE, label=f"run, ω₁ h = {printed(step)}", **style)
+    left.plot(counts, dataset["critical_mass_ratio_theory"], color=VERMILION, lw=1.0, label="theory m φ·φ = 1")
+    left.set(xlabel="number of modes", ylabel="mass ratio from which on it grows")
+    logarithmic(left.yaxis)
+    left.legend()
+    middle = dataset["lagged_growth"].isel(relative_step=len(steps) // 2)
+    shown = counts[np.unique(np.linspace(0, len(counts) - 1, 5).round().astype(int))]
+    for count, colour in zip(shown, shades(len(shown)), strict=True):
+        right.plot(dataset["lagged_mass_ratio"], middle.sel(mode_count=count), color=colour, label=str(count))
+    right.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+    right.set(ylim=(0.8, 3.0), xlabel="mass ratio", ylabel="growth per step")
+    logarithmic(right.xaxis)
+    right.legend(title="modes")
+
+
+def _alias(dataset: xr.Dataset, drawing: Drawing) -> None:
+    """Largest growth over the masses, a curve per number of modes and speed, for both schemes."""
+    rows = drawing.subplots(2, 1, sharex=True, sharey=True)
+    worst = dataset["growth"].max("alias_mass_ratio")
+    counts = dataset["alias_mode_count"].values
+    for axes, scheme in zip(rows, dataset["alias_scheme"].values, strict=True):
+        for count, colour in zip(counts, shades(len(counts)), strict=True):
+            curves = worst.sel(alias_scheme=scheme, alias_mode_count=count).transpose("step_multiple", ...)
+            lines = axes.plot(dataset["step_multiple"], curves.values, color=colour, lw=0.8)
+            lines[0].set_label(str(count))
+        axes.axvline(1.0, color=VERMILION, linewidth=1.5)
+        axes.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+        axes.set(ylabel="growth per passage", title=str(scheme))
+    legend_beside(rows[0], "modes")
+    rows[0].annotate("the alias rule", (1.02, 0.92), xycoords=("data", "axes fraction"), color=VERMILION, va="top")
+    logarithmic(rows[1].xaxis)
+    ticks = [t for t in (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0) if t <= float(dataset["step_multiple"].max())]
+    rows[1].set_xticks(ticks)
+    rows[1].set_xlabel("steps over the steps of the alias rule")
+
+
+def _shuttle(dataset: xr.Dataset, drawing: Drawing) -> None:
+    """Multipliers over frequency and mass, without and with damping, and the tongue's line."""
+    rows = drawing.subplots(1, 2, sharey=True)
+    edges = [1.001, 1.05, 1.2, 1.5, 2.0, 3.0]
+    mass = dataset["shuttle_mass_ratio"].values
+    for axes, damping in zip(rows, dataset["shuttle_damping_ratio"].values, strict=True):
+        grid = dataset["multiplier"].sel(shuttle_damping_ratio=damping).values
+        axes.grid(visible=False)
+        frequency = dataset["shuttle_frequency_ratio"].values
+        mesh = axes.pcolormesh(frequency, mass, grid, shading="nearest", rasterized=True, **banded(edges))
+        axes.plot(dataset["tongue_theory"], mass, color=VERMILION, linewidth=1.8, label="formula for one mode")
+        axes.set(xlabel="frequency over ω₁", title=f"damping {printed(100.0 * damping)} %", xlim=(frequency[0], None))
+        axes.set_ylim(mass[0] - 0.5 * (mass[1] - mass[0]), mass[-1])
+    rows[0].set_ylabel("mass ratio")
+    rows[0].legend(loc="lower left", labelcolor="white")
+    colour_bar(rows[1], mesh, "largest growth per period", ticks=edges)
+
+
+def _frozen(dataset: xr.Dataset, drawing: Drawing) -> None:
+    """The frozen station's growth beside the real passage's, a panel per mass."""
+    masses, counts = dataset["held_mass_ratio"].values, dataset["held_mode_count"].values
+    rows = drawing.subplots(1, len(masses), sharey=True)
+    x = dataset["centrifugal_number"].values
+    for axes, mass in zip(np.atleast_1d(rows), masses, strict=True):
+        one = dataset.sel(held_mass_ratio=mass)
+        for count, colour in zip(counts, shades(len(counts)), strict=True):
+            held = one["frozen_growth"].sel(held_mode_count=count)
+            axes.plot(x, held, color=colour, lw=1.0, ls="--", label=f"frozen, {counted(int(count), 'mode')}")
+        axes.plot(x, one["passage_growth"].isel(held_mode_count=-1), color=BLUE, label=f"passage, {counts[-1]} modes")
+        axes.set(ylim=(0.8, 20.0), xlabel="speed ratio · √(mass ratio)", title=f"mass ratio {printed(mass)}")
+        logarithmic(axes.yaxis)
+        if "frozen_limit" in dataset:
+            limit = float(dataset["frozen_limit"])
+            axes.axvline(limit, color=VERMILION, linewidth=1.0, label=f"frozen, all modes: {number(limit, 4)}")
+    np.atleast_1d(rows)[0].set_ylabel("growth in the time of one passage")
+    legend_beside(np.atleast_1d(rows)[-1])
+
+
+DRAWN: Mapping[str, Drawn] = {
+    "schemes": Drawn(
+        "Up to which step is a scheme stable?",
+        "A vibration without damping, marched 50 steps by every scheme: above 1 it grows from step to step although "
+        "nothing drives it. Dots are closed forms. The step counts in units of the fastest vibration that the model "
+        "keeps, ω its frequency and h the step.",
+        4.6,
+        _schemes,
+    ),
+    "lagged-inertia": Drawn(
+        "How heavy may a mass be whose inertia lags a step?",
+        "Frozen: the mass is held at midspan and its inertia force is taken from the step before, as in a coupling of "
+        "two programs. Left: from which mass on that grows. Right: how fast, at the middle one of the steps.",
+        3.2,
+        _lagged,
+    ),
+    "alias": Drawn(
+        "How many steps keep the march from resonating with itself?",
+        "Growth of the fastest-growing vibration from passage to passage, largest over mass ratios 0.25 to 1; one "
+        "curve per number of modes and speed ratio. The truth is what curves come to at the right. The line is the "
+        "rule that the program keeps to, with a margin of 1.5.",
+        4.2,
+        _alias,
+    ),
+    "shuttle": Drawn(
+        "When does a swinging mass shake its body?",
+        "Largest growth per period of a mass that swings over the whole body, s = L/2 + L/2 sin(Ωt), 3 modes. Dark is "
+        "stable.",
+        3.2,
+        _shuttle,
+    ),
+    "frozen": Drawn(
+        "A frozen station is not a passage",
+        "Frozen (dashed): the mass is held at midspan, but the terms of its speed act; beyond a speed the stiffness "
+        "that they leave is negative and it diverges. Passage: the mass really crosses at that speed.",
+        3.2,
+        _frozen,
+    ),
+    "separation": SEPARATION,
+    "overshoot": OVERSHOOT,
+    "rigid-tie": RIGID_TIE,
+}

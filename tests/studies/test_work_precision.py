@@ -1,0 +1,374 @@
+"""Work and precision: errors from a second source, fitted orders, fronts and sentences recomputed by plain loops."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from itertools import product
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import engine
+import studies
+from engine.kernels.layout import LANES
+from engine.lanes import LaneValues
+from engine.march import march
+from engine.ode import ModalEquations
+from engine.tables import SceneTables
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from studies import advice, answers, figures, ladders, trade
+from studies import precision as measured
+from studies.measuring import Work
+from tests.naive import ode
+from tests.naive.newmark import Newmark
+from tests.naive.newmark import march as naive_march
+from tests.naive.scene import Load, Phase, Scene, State
+from tests.studies import precision, scenes
+
+GRAVITY = 9.80665
+LIGHT = (50.0, 15.0)
+
+
+def plain_scene(mass: float, speed: float, modes: int = 2) -> tuple[Scene, np.ndarray]:
+    """The small study's scene by closed forms, and the mode shapes at midspan (N,)."""
+    length, area = 10.0, 0.01 * 7850
+    k = np.arange(1, modes + 1) * np.pi / length
+    omega = k**2 * np.sqrt(210e9 * 8e-6 / area)
+    size = np.sqrt(2.0 / (area * length))
+
+    def shape(s: float, derivative: int) -> np.ndarray:
+        waves = (np.sin, np.cos, lambda x: -np.sin(x))[derivative]
+        return size * k**derivative * waves(k * s)
+
+    phase = Phase(0.0, length / speed, lambda t: speed * t, lambda t: speed, lambda t: 0.0)
+    load = Load((phase,), weight=mass * GRAVITY, mass=mass, convective_mass=mass)
+    return Scene(phi=shape, omega=omega, zeta=np.full(modes, 0.03), loads=(load,)), shape(5.0, 0)
+
+
+def histories(mass: float, speed: float, steps: int, exact: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Midspan deflection of the kept modes and contact force at the stations, by the naive twin."""
+    scene, row = plain_scene(mass, speed)
+    times = np.linspace(0.0, 10.0 / speed, steps + 1)
+    rest = State(np.zeros(2), np.zeros(2))
+    found = ode.solve(scene, times, rest, 1e-2) if exact else naive_march(scene, times, rest, Newmark())
+    return found.q @ row, found.contact_force[:, 0]
+
+
+def test_the_reference_solves_the_equations_of_the_naive_twin() -> None:
+    study = engine.load(precision.TEXT).with_values({"solver.static_correction": False})
+    model = measured.scene_model(study, {})
+    equations = ModalEquations(model)
+    tables = SceneTables(model, 40, "whole")
+    counts = np.arange(41)
+    found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11).states(counts / 40))
+    deflection, force = histories(*LIGHT, 40, exact=True)
+    np.testing.assert_allclose(found[:, 0], deflection, atol=1e-9 * np.abs(deflection).max())
+    counted = np.arange(41) / 40 <= 0.98
+    np.testing.assert_array_equal(np.isfinite(found[:, -1]), counted)
+    np.testing.assert_allclose(found[counted, -1], force[counted], rtol=1e-7)
+
+
+@pytest.mark.parametrize("start", ["rest", "equilibrium"])
+def test_the_reference_agrees_with_a_fine_march_of_a_shuttle(start: str) -> None:
+    ends = [{"at": 0.5, "stiffness": 4e5}, {"at": 9.5, "stiffness": 3e5}]
+    swing = {"kind": "sinusoidal", "centre": 5.0, "amplitude": 3.0, "frequency": 0.4, "cycles": 2}
+    changes = {"body.bed.supports": ends, "carriage.table.motion": swing, "initial": start}
+    study = engine.load(precision.TEXT).with_values(changes)
+    model = measured.scene_model(study, {})
+    equations = ModalEquations(model)
+    tables = SceneTables(measured.with_scheme(model, "fox-goodwin"), 20_000, "whole")
+    counts = np.arange(0, 40_001, 500)
+    marched = march(tables, LaneValues(study, {}, LANES), counts, 1, sampled=3).history[:, :, 0]
+    found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11).states(counts / 20_000))
+    for column, scale in zip(range(3), (*measured.static_scale(model)[0], equations.weight), strict=True):
+        known = np.isfinite(marched[:, column])
+        assert known.sum() > 70
+        np.testing.assert_allclose(found[known, column], marched[known, column], atol=1e-6 * scale)
+
+
+def test_errors_are_those_of_the_naive_twin() -> None:
+    """Average acceleration with 80 steps, deflection without static correction and contact force."""
+    study = engine.load(precision.TEXT.replace(precision.TEXT[precision.TEXT.index("[sensor.moment]") :], ""))
+    study = study.with_values({"solver.static_correction": False})
+    ladder = ladders.Ladder(("average-acceleration",), (80,), (2,), 6)
+    found = ladders.steps(study, {}, ladder, Work(1))["error"].values[0, 0]
+    (marched, force), (exact, true_force) = (histories(*LIGHT, 80, exact=flag) for flag in (False, True))
+    static = 50.0 * GRAVITY * 10.0**3 / (48 * 210e9 * 8e-6)  # of the whole beam: the scale of every number of modes
+    assert found[0] == pytest.approx(np.abs(marched - exact).max() / static, rel=1e-3)
+    counted = np.arange(81) / 80 <= 0.98
+    assert found[2] == pytest.approx(np.abs(force - true_force)[counted].max() / (50.0 * GRAVITY), rel=1e-3)
+    scene, row = plain_scene(*LIGHT)
+    around = (np.argmax(np.abs(exact)) + np.linspace(-1.0, 1.0, 201)) / 80 * 10.0 / 15.0
+    fine = ode.solve(scene, [0.0, *around], State(np.zeros(2), np.zeros(2)), 1e-2).q @ row
+    assert found[1] == pytest.approx(abs(np.abs(marched).max() - np.abs(fine).max()) / static, rel=1e-2)
+
+
+# ---- the archive ----
+
+
+def test_orders_of_the_small_study() -> None:
+    order = precision.small().fitted_order.sel(quantity="history", scene="light")
+    for scheme, expected in (("average-acceleration", 2), ("richardson", 4), ("lagged-convective", 1)):
+        assert float(order.sel(scheme=scheme)) == pytest.approx(expected, abs=0.3), scheme
+    error = precision.small().error.sel(quantity="history", scene="light", step_count=[160, 320, 640])
+    assert (error.sel(scheme="fox-goodwin") < 0.5 * error.sel(scheme="average-acceleration")).all()
+
+
+def test_what_blows_up_is_diverged_and_has_no_numbers() -> None:
+    """Lagged inertia where m phi.phi > 1: 1500 kg on a beam of 785 kg. A few steps of another only begin to grow."""
+    dataset = precision.small()
+    gone = dataset.status == int(Status.DIVERGED)
+    assert float(dataset.error.sel(scene="heavy and slow", scheme="fox-goodwin", step_count=8, quantity="history")) > 10
+    assert gone.sel(scene="heavy and slow", scheme="lagged-inertia", step_count=[160, 320, 640]).all()
+    assert not gone.sel(scheme="average-acceleration").any()
+    assert np.isnan(dataset.error.where(gone, drop=True)).all()
+    assert np.isfinite(dataset.error.where(~gone)).any("quantity").equals(~gone)
+    assert (dataset.seconds_per_variant.where(~gone).notnull() == ~gone).all()
+
+
+def test_modes_and_static_correction_bring_the_error_down() -> None:
+    total = precision.small().total_error.sel(scene="light", scheme="average-acceleration", step_count=640)
+    history = total.sel(quantity="history")
+    assert history.sel(mode_count=2, correction=1) < 0.5 * history.sel(mode_count=1, correction=1)
+    assert history.sel(mode_count=1, correction=1) < 0.7 * history.sel(mode_count=1, correction=0)
+    compared = precision.small().total_error.sel(scheme=["lagged-inertia", "lagged-convective"])
+    assert compared.isnull().all()
+
+
+def test_the_total_error_is_that_against_a_reference_of_more_modes_and_steps() -> None:
+    """A plain run of the engine with 6 modes and many steps as the second source."""
+    bare = engine.load(precision.TEXT.partition("[question]")[0].replace("work-precision", "trajectory"))
+    runs = [
+        engine.run(
+            bare.with_values(
+                {"body.bed.modes": modes, "solver.steps": steps, "output.histories": {"every": steps // 80}}
+            )
+        )
+        for modes, steps in ((2, 640), (6, 20_480))
+    ]
+    for name, scale in (("midspan", None), ("moment", None)):
+        assert scale is None and name in runs[0]
+    weight, bending = 50.0 * GRAVITY, 210e9 * 8e-6
+    scales = {"midspan": weight * 10.0**3 / (48 * bending), "moment": weight * 10.0 / 4}
+    apart = max(float(abs(runs[0][name] - runs[1][name]).max()) / scale for name, scale in scales.items())
+    point = {"scene": "light", "scheme": "average-acceleration", "step_count": 640, "mode_count": 2, "correction": 1}
+    assert float(precision.small().total_error.sel(point | {"quantity": "history"})) == pytest.approx(apart, rel=0.05)
+
+
+def test_jax_marches_the_same_where_it_is_installed() -> None:
+    pytest.importorskip("jax")
+    study = engine.load(precision.TEXT)
+    ladder = ladders.Ladder(("average-acceleration",), (80,), (2,), 6)
+    by_jax, own = ladders.by_jax(study, {}, ladder, Work(1)), ladders.steps(study, {}, ladder, Work(1))
+    assert float(by_jax["error"][0]) == pytest.approx(float(own["error"][0, 0, 0]), rel=1e-6)
+
+
+def test_without_jax_the_archive_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    from studies import jax_march
+
+    monkeypatch.setattr(jax_march, "find_spec", lambda name: None)
+    study = engine.load(precision.TEXT)
+    kind = studies.kind_named("work-precision")
+    assert not any(piece.name.startswith("jax") for piece in kind.pieces(study))
+    if "jax_error" not in precision.small():
+        assert "not installed" in precision.small().attrs["jax"]
+        assert "jax is not installed" in "\n".join(answers.findings(precision.small()))
+
+
+# ---- fits and fronts ----
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
+def test_fitted_order_of_clean_and_spoilt_errors(order: float) -> None:
+    steps = np.array([50 * 2**k for k in range(9)])
+    clean = 5e-3 * (50 / steps) ** order
+    assert trade.fitted_order(steps, clean, 1e-15) == pytest.approx(order, abs=1e-9)
+    spoilt = clean + 1e-13  # rounding
+    spoilt[:2] = [0.03, 0.025]  # not resolved yet
+    assert trade.fitted_order(steps, spoilt, 3e-12) == pytest.approx(order, abs=0.1)
+    spoilt[:3] = np.nan  # diverged
+    assert trade.fitted_order(steps, spoilt, 3e-12) == pytest.approx(order, abs=0.1)
+
+
+def test_no_order_is_invented() -> None:
+    steps = np.array([50, 100, 200, 400, 800])
+    for errors in (
+        np.full(5, np.nan),
+        np.full(5, 1e-3),
+        np.array([1e-2, 1e-5, 5e-3, 1e-6, 3e-3]),
+        np.array([0.3, 0.2, 0.1, 1e-3, 2.5e-4]),
+        np.array([1e-6, 2e-6, 4e-6, 8e-6, 2e-5]),
+    ):
+        assert np.isnan(trade.fitted_order(steps, errors, 1e-9)), errors
+
+
+def test_the_front_is_what_no_other_point_beats() -> None:
+    random = np.random.default_rng(1)
+    errors, seconds = random.uniform(size=60), random.uniform(size=60)
+    errors[:5] = np.inf
+    beaten = {
+        i
+        for i, j in product(range(60), range(60))
+        if (errors[j] <= errors[i] and seconds[j] < seconds[i]) or (errors[j] < errors[i] and seconds[j] <= seconds[i])
+    }
+    assert set(trade.front(errors, seconds)) == set(range(60)) - beaten - set(range(5))
+
+
+def test_the_front_of_the_archive() -> None:
+    dataset = precision.small()
+    for scene, quantity in product(dataset.scene.values, dataset.quantity.values):
+        marked = dataset.on_front.sel(scene=scene, quantity=quantity)
+        points = trade.choices(dataset, scene, quantity)
+        assert 0 < int(marked.sum()) <= len(points)
+        best = np.inf
+        for point in points:
+            place = {"mode_count": point.modes, "correction": int(point.corrected), "scheme": point.scheme}
+            on_it = bool(marked.sel(place | {"step_count": point.steps}))
+            assert on_it == (point.error < best)
+            best = min(best, point.error)
+
+
+# ---- sentences ----
+
+
+def plain_choice(dataset: xr.Dataset, scene: str, quantity: str, tolerance: float) -> tuple[float, str] | None:
+    """The cheapest point whose error, and that of all finer ones, is at most the tolerance: seconds and what it is."""
+    best = None
+    for modes, c, scheme in product(dataset.mode_count.values, (1, 0), dataset.scheme.values):
+        for n, steps in enumerate(dataset.step_count.values):
+            good = True
+            for finer in dataset.step_count.values[n:]:
+                error = dataset.total_error.sel(scene=scene, mode_count=modes, correction=c, scheme=scheme)
+                if not float(error.sel(step_count=finer, quantity=quantity)) <= tolerance:
+                    good = False
+            at = {"scene": scene, "mode_count": modes, "scheme": scheme, "step_count": steps}
+            cost = float(dataset.total_seconds_per_variant.sel(at))
+            if good and (best is None or cost < best[0]):
+                best = cost, f"{advice.scheme_words(str(scheme))} with {steps:,} steps"
+    return best
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 3e-2, 1e-3, 1e-4, 1e-6])
+def test_the_sentence_follows_from_the_points(tolerance: float) -> None:
+    dataset = precision.small()
+    reached = []
+    for scene, quantity in product(map(str, dataset.scene.values), ("history", "extremes")):
+        said = advice.advice(dataset, scene, quantity, [tolerance])
+        expected = plain_choice(dataset, scene, quantity, tolerance)
+        known = float(dataset.total_reference_error.sel(scene=scene, quantity=quantity))
+        if known > tolerance:
+            assert "cannot be judged" in said and "for " not in said.partition(":")[2].partition("(")[0]
+        elif expected is None:
+            assert "is not reached (the best found" in said
+        else:
+            seconds, words = expected
+            assert f"take {words}" in said and f": {advice.short_time(seconds)} per variant" in said
+        reached.append(expected is not None)
+    assert any(reached) or tolerance < 1e-2
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_the_sentence_of_the_steps_alone_follows_from_the_points(tolerance: float) -> None:
+    dataset = precision.small()
+    for scene in map(str, dataset.scene.values):
+        best = None
+        for scheme in ("average-acceleration", "fox-goodwin", "richardson"):
+            error = dataset.error.sel(scene=scene, scheme=scheme, quantity="history").values
+            for n, steps in enumerate(dataset.step_count.values):
+                cost = float(dataset.seconds_per_variant.sel(scene=scene, scheme=scheme, step_count=steps))
+                if all(e <= tolerance for e in error[n:]) and (best is None or cost < best[0]):
+                    best = cost, f"{advice.scheme_words(scheme)} with {steps:,} steps"
+        said = advice.steps_alone(dataset, scene, "history", [tolerance])
+        assert "2 modes" in said
+        assert (f"take {best[1]}" in said and advice.short_time(best[0]) in said) if best else "is not reached" in said
+
+
+def test_a_lucky_point_is_not_taken() -> None:
+    dataset = precision.small().copy(deep=True)
+    place = {"scene": "light", "mode_count": 1, "correction": 0, "scheme": "fox-goodwin", "step_count": 40}
+    dataset.total_error.loc[place | {"quantity": "history"}] = 1e-9
+    assert advice.advice(dataset, "light", "history", [0.5]) == advice.advice(
+        precision.small(), "light", "history", [0.5]
+    )
+    points = [point for point in trade.choices(dataset, "light", "history") if point.modes == 1 and not point.corrected]
+    assert min(point.error for point in points if point.scheme == "fox-goodwin") > 1e-3
+
+
+def test_findings_say_what_diverged_and_what_orders_are() -> None:
+    text = "\n".join(answers.findings(precision.small()))
+    gone = int((precision.small().status == int(Status.DIVERGED)).sum())
+    assert f"{gone} points of {precision.small().status.size} diverged, which is an answer too" in text
+    assert "a quarter of the error" in text and "a sixteenth of the error" in text and "nan" not in text
+    assert re.search(r"SciPy's DOP853 and Radau need [\d.e]+ to [\d.e]+ times as long", text)
+
+
+def test_figures_are_drawn_with_what_there_is() -> None:
+    nothing = precision.small().copy(deep=True)
+    for name in ("error", "seconds_per_variant", "fitted_order", "total_error", "total_seconds_per_variant"):
+        nothing[name].values[:, 1:] = np.nan
+    for dataset in (precision.small(), nothing):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = answers.figures(dataset)
+            assert not any(re.search(r"\bnan\b", figures.svg(figure)) for figure in found[:2])
+        assert len({figure.name for figure in found}) == len(found) == 6
+        for scene in dataset.scene.values:
+            assert any(axes.get_title(loc="left") == scene for axes in found[0].drawing.axes)
+
+
+# ---- what is refused ----
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('schemes = ["average"]', r"question.schemes.0: unknown name.*one of average-acceleration"),
+        ('schemes = ["rk4", "rk4"]', r"question.schemes: a name stands twice"),
+        ('schemes = ["rk4"]', r"question.schemes: .*at least one scheme of the march"),
+        ("step_counts = [51]", r"question.step_counts.0: a Richardson pair halves.*an even number.*51"),
+        ("step_counts = [100, 50]", r"question.step_counts: a list in ascending order"),
+        ("step_counts = []", r"question.step_counts: a list of at least 1"),
+        ("mode_counts = [0]", r"question.mode_counts.0: must be >= 1"),
+        ("mode_counts = [65]", r"question.mode_counts.0: must be <= 64"),
+        ("reference_modes = 3", r"question.reference_modes: must be >= 4"),
+        ("mode_counts = [1, 8]\nreference_modes = 8", r"question.reference_modes: .*more than 8"),
+        ("wanted = [2.0]", r"question.wanted.0: must be < 1"),
+        ("mode_count = [1]", r'question.mode_count: unknown key.*did you mean "mode_counts"'),
+        ("[question.scenes.a]\n'carriage.table.mas' = 3", r'question.scenes.a: .*table.mas: unknown key.*"mass"'),
+        ("[question.scenes.a]\n'body.bed.modes' = 'few'", r"question.scenes.a: .*body.bed.modes"),
+        ("[question.scenes.'!']", r"question.scenes.!: not a usable name"),
+        ("[question.scenes.'a b']\n[question.scenes.a-b]", r"question.scenes.a b: not a usable name"),
+        (
+            "[question.scenes.a]\n'carriage.table.motion' = {kind='cruise', start=0, end=10, speed=1, after=2}",
+            r"question.scenes.a: .*one smooth motion",
+        ),
+        (
+            "[question.scenes.a]\n'carriage.table' = {on='bed', kind='force', force=1, "
+            "motion={kind='cruise', start=0, end=10, speed=1}}",
+            r"question.scenes.a: .*a mass with all of its terms",
+        ),
+        ("[question.scenes.a]\n'sensor.midspan.quantity' = 'velocity'", r"question.scenes.a: .*displacement"),
+        ("[question.scenes.a]\n'body.bed.own_weight' = true", r"question.scenes.a: .*own weight"),
+    ],
+)
+def test_bad_questions_are_refused(lines: str, words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        studies.run(engine.load(precision.with_question(lines)))
+
+
+def test_a_study_without_options_has_one_scene_and_everything() -> None:
+    study = engine.load(precision.with_question(""))
+    kind = studies.kind_named("work-precision")
+    names = [piece.name for piece in kind.pieces(study)]
+    assert names == ["steps-the-scene", "solvers-the-scene", "modes-the-scene"]
+
+
+def test_nothing_measured_is_refused() -> None:
+    text = precision.TEXT
+    start, end = text.index("[sensor.midspan]"), text.index("[question]")
+    with pytest.raises(BadInput, match="nothing is measured"):
+        studies.run(engine.load(text[:start] + text[end:]))
+    assert "work-precision" not in scenes.MOTIONS
