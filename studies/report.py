@@ -22,8 +22,8 @@ from results_schema.errors import BadInput
 from results_schema.status import Status, label
 from results_schema.variables import Variable, expand
 from studies.figures import Figure, png, svg
-from studies.results import Results
-from studies.study import kind_named, sensor_units
+from studies.results import Results, sensor_units
+from studies.study import kind_named
 from studies.summary import noun, ranges
 from studies.words import counted, number, quantity, unit_text
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.status import Status, label
+from results_schema.variables import sensor_unit
 from studies.words import axis_title, quantity
 
 if TYPE_CHECKING:
@@ -127,8 +128,6 @@ class Results:
     @cached_property
     def sensors(self) -> dict[str, str]:
         """Name and unit of every sensor."""
-        from studies.study import sensor_units
-
         return sensor_units(self.study)
 
     @property
@@ -241,6 +240,11 @@ class Results:
             return np.asarray(stored.sel(history=flat).values, dtype=np.float64)
         places = {dim: i for dim, i in zip(self.dims, index, strict=True) if dim in stored.dims}
         return np.asarray(stored.isel(places).values, dtype=np.float64)
+
+
+def sensor_units(study: Study) -> dict[str, str]:
+    """Name and unit of every sensor."""
+    return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
 
 
 def statuses(counts: Mapping[Status, int]) -> str:

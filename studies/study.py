@@ -106,6 +106,7 @@ def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     Raises ArchiveError where the two differ.
     """
     from results_schema.variables import expand
+    from studies.results import sensor_units
 
     kind = kind_named(study.kind)
     assert not isinstance(kind, MeasuringKind)
@@ -129,6 +130,7 @@ def gathered(pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
 def _compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """With units of sensors and the study's attributes, and as declared."""
     from results_schema.validate import validate
+    from studies.results import sensor_units
 
     if "sensor" in dataset.dims:
         units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
@@ -147,10 +149,3 @@ def study_attributes(study: Study) -> Mapping[str, str]:
         "study": study.source.text,
         "study_sha256": study.source.sha256,
     }
-
-
-def sensor_units(study: Study) -> dict[str, str]:
-    """Name and unit of every sensor."""
-    from results_schema.variables import sensor_unit
-
-    return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
