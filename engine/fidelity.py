@@ -22,9 +22,9 @@ STEPS_PER_PERIOD = 200
 LEAST_STEPS = 200
 ALIAS_MARGIN = 1.5
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit
-# Right above the rule's steps a conditionally stable scheme under a mass still grows in narrow bands, 10 to 7000 times
-# per passage; from here on at most 1.12 times. Average acceleration, which has no limit, grows by 1.23 at most there.
-CONDITIONAL_MARGIN = 1.1
+# Fixed steps must be so many times the rule's. Right above the rule average acceleration still grows by up to 1.23 per
+# passage in narrow bands, conditionally stable schemes by 10 to 7000; from here on by 1.12 or less (rarely 1.18).
+LEAST_MARGIN = 1.1
 MOST_STEPS = 100_000_000  # over one passage or cycle
 _STAIR = 4  # step counts are LEAST_STEPS times 1, 2, 3, or 4 to 7 times a power of two: few tables, little waste
 
@@ -77,7 +77,7 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     """
     found = np.zeros_like(time_scale)
     for carriage in model.carriages:
-        if carriage.inertia == "mass":
+        if carriage.inertia != "force":
             body = model.bodies[carriage.body].modal
             wave = float(body.wave_number.max()) * carriage.rider.top_speed
             found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega.max()) * time_scale))
@@ -147,9 +147,8 @@ def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
 
 
 def _least_steps(model: SceneModel, time_scale: Array) -> Array:
-    """(V,) the fewest steps that the alias rule allows, with the margin that a conditionally stable scheme needs."""
-    margin = CONDITIONAL_MARGIN if math.isfinite(model.scheme.stability_limit) else 1.0
-    return margin * alias_steps(model, time_scale)
+    """(V,) the fewest steps that are accepted because of the alias rule."""
+    return LEAST_MARGIN * alias_steps(model, time_scale)
 
 
 def _enough(model: SceneModel, time_scale: Array) -> str:
@@ -157,6 +156,19 @@ def _enough(model: SceneModel, time_scale: Array) -> str:
     inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
     enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, _least_steps(model, time_scale))))
     return f"steps = {math.ceil(enough)} or more"
+
+
+def check_even_steps(model: SceneModel, steps: Counts) -> None:
+    """Refuse a number of steps that a Richardson pair cannot halve. Raises BadInput."""
+    odd = steps[steps % model.scheme.stride != 0]
+    if odd.size:
+        raise BadInput(
+            "a Richardson pair halves the number of steps",
+            where=model.study.source.where("solver.steps"),
+            expected="an even number",
+            received=str(int(odd[0])),
+            remedy=f"steps = {int(odd[0]) + 1}",
+        )
 
 
 def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:

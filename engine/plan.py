@@ -13,7 +13,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.fidelity import Needs, check_fixed_steps, check_most_steps, needed_steps, round_up
+from engine.fidelity import Needs, check_even_steps, check_fixed_steps, check_most_steps, needed_steps, round_up
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.lanes import LANE_KEYS, LaneValues
@@ -300,8 +300,8 @@ def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tu
     """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
     time_scale = values.time_scale(scene.carriages[0].name)
     if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
-        wanted = values.of("solver.steps").astype(np.int64)
-        steps = -(-wanted // scene.scheme.stride) * scene.scheme.stride
+        steps = values.of("solver.steps").astype(np.int64)
+        check_even_steps(scene, steps)
         check_most_steps(scene, steps)
         check_steps(scene, time_scale, steps)
         return steps, lambda part: "as the study says"

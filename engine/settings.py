@@ -13,11 +13,11 @@ from engine.kernels.schemes import SCHEMES, Scheme
 from engine.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
 from engine.units import Dimensionless, fault
 
-#: Parameters that a scheme takes from the study file; the others take none.
-PARAMETERS: Mapping[str, tuple[str, ...]] = {
-    "newmark": ("beta", "gamma"),
-    "hht-alpha": ("alpha",),
-    "generalized-alpha": ("rho_inf",),
+#: Parameters that a scheme takes from the study file, with what to write; the others take none.
+PARAMETERS: Mapping[str, Mapping[str, str]] = {
+    "newmark": {"beta": "0.3025, say, from 0 to 1", "gamma": "0.6, say, from 0.5 to 1.5"},
+    "hht-alpha": {"alpha": "-0.05, say, from -1/3 to 0"},
+    "generalized-alpha": {"rho_inf": "0.8, say, from 0 to 1"},
 }
 FIDELITIES = ("auto", "force", "mass", "mass-without-convective")
 MAX_STEPS = 100_000_000
@@ -49,19 +49,19 @@ class Solver(Spec):
     @property
     def integration(self) -> Scheme:
         """The scheme with its parameters."""
-        return SCHEMES[self.scheme]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, ())})
+        return SCHEMES[self.scheme]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, {})})
 
     @model_validator(mode="after")
     def _fitting_keys(self) -> Solver:
-        wanted = PARAMETERS.get(self.scheme, ())
-        if any(getattr(self, name) is None for name in wanted):
-            needed = " and ".join(wanted)
-            raise fault(f'the scheme "{self.scheme}" needs {needed}', expected=needed)
-        for scheme, names in PARAMETERS.items():
-            given = [name for name in names if getattr(self, name) is not None]
+        for scheme, parameters in PARAMETERS.items():
+            given = [name for name in parameters if getattr(self, name) is not None]
             if scheme != self.scheme and given:
                 expected, received = f'scheme = "{scheme}"', f'scheme = "{self.scheme}"'
                 raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
+        wanted = PARAMETERS.get(self.scheme, {})
+        if any(getattr(self, name) is None for name in wanted):
+            named, shown = " and ".join(wanted), "; ".join(f"{name} = {text}" for name, text in wanted.items())
+            raise fault(f'the scheme "{self.scheme}" needs {named}', expected=shown)
         if self.audit not in ("auto", 0):
             raise fault("the audit is not built yet", expected='audit = "auto" or 0', received=str(self.audit))
         return self

@@ -15,6 +15,10 @@ import numpy as np
 
 from engine.kernels.layout import Alpha, FloatArray, Newmark
 
+# A scheme that takes 2.5 % a step or more out of a vibration with omega h = 5 keeps the highest mode from resonating
+# with the march under a moving mass: measured, HHT-alpha -0.02, generalized-alpha 0.8 and gamma 0.52 do (growth at most
+# 1.02 with 0.3 to 1.1 times the rule's steps), -0.01, 0.85 and 0.51 do not (1.17 to 1.33).
+_JUDGED_AT, _DAMPED = 5.0, 0.975
 _FAR = 1e100  # omega h beyond which nothing changes, and whose square is a number
 
 
@@ -38,7 +42,10 @@ class Scheme(Protocol):
     def stability_limit(self) -> float: ...
     @property
     def is_damped(self) -> bool:
-        """Whether it takes energy out of the highest frequencies."""
+        """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
+
+    def amplification(self, x: float) -> FloatArray:
+        """Matrix of one step of an undamped oscillator of omega h = x, on its state in step units."""
 
     def phase(self, x: FloatArray) -> FloatArray:
         """Angle (0 to pi) by which an undamped oscillator of omega h = x turns in one step of the scheme."""
@@ -73,8 +80,14 @@ class NewmarkScheme:
 
     @property
     def is_damped(self) -> bool:
-        """gamma > 1/2."""
-        return self.gamma > 0.5
+        """See `Scheme`."""
+        return _radius(self.amplification(_JUDGED_AT)) <= _DAMPED
+
+    def amplification(self, x: float) -> FloatArray:
+        """On (u, h u'): the accelerations -x^2 u at both ends put into Newmark's formulas."""
+        new = np.array([[1.0 + self.beta * x**2, 0.0], [self.gamma * x**2, 1.0]])
+        old = np.array([[1.0 - (0.5 - self.beta) * x**2, 1.0], [-(1.0 - self.gamma) * x**2, 1.0]])
+        return np.asarray(np.linalg.solve(new, old))
 
     def phase(self, x: FloatArray) -> FloatArray:
         """Its cosine is half the trace of the amplification matrix over the root of its determinant."""
@@ -141,12 +154,27 @@ class AlphaScheme:
 
     @property
     def is_damped(self) -> bool:
-        """Every member but the one that is average acceleration."""
-        return self.f > self.m
+        """See `Scheme`."""
+        return _radius(self.amplification(_JUDGED_AT)) <= _DAMPED
+
+    def amplification(self, x: float) -> FloatArray:
+        """On the predictors u*, v* and the memory e; the true acceleration is -x^2 u*/(1 + beta x^2)."""
+        c = self.coefficients
+        true = np.array([-(x**2) / (1.0 + c.beta * x**2), 0.0, 0.0])
+        u, v, e = np.eye(3)
+        u_now, v_now = u + c.beta * true, v + c.gamma * true
+        v_next = v_now + c.velocity_x * true + c.velocity_e * e
+        u_next = u_now + v_now + c.displacement_x * true + c.displacement_e * e
+        return np.stack([u_next, v_next, c.next_x * true + c.next_e * e])
 
     def phase(self, x: FloatArray) -> FloatArray:
         """Of average acceleration, to which its phase is close where it damps little: 2 atan(x/2)."""
         return np.asarray(2.0 * np.arctan(0.5 * x))
+
+
+def _radius(matrix: FloatArray) -> float:
+    """Spectral radius."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def hht_alpha(alpha: float) -> AlphaScheme:

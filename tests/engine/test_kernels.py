@@ -43,7 +43,7 @@ def small(name: str) -> Study:
     if name == "turning":
         return study(beam(modes=2), mass(0.3, shuttle(0.2, 0.8, 1.0, 0.0, 2)), **given, solver={"steps": 16})
     riding = {"car": mass(0.3, short), "next": force(2.0, cruise(1.0, 0.0, 1.1), delay=0.2)}
-    return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 26})
+    return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 30})
 
 
 NAMES = ("one", "quiet", "turning", "many")

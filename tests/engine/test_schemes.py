@@ -10,8 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, generalized_alpha, hht_alpha
+from engine.lanes import LaneValues
+from engine.model import build_model
 from engine.plan import make_plan
 from engine.scene import Study
+from engine.tables import SceneTables
+from engine.transition import spectral_radius, transitions
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study
 
@@ -99,7 +103,39 @@ def test_alpha_schemes_have_no_limit(scheme: AlphaScheme) -> None:
     largest = max(radius(kernel_matrix(scheme, x)) for x in np.geomspace(1e-3, 1e6, 60))
     assert largest < 1.0 + 1e-7
     assert scheme.stability_limit == math.inf
-    assert scheme.is_damped == (radius(kernel_matrix(scheme, 100.0)) < 0.999)
+
+
+@pytest.mark.parametrize("name", ["average-acceleration", *CONDITIONAL, "newmark"])
+def test_amplification_of_newmarks_family(name: str) -> None:
+    scheme = SCHEMES[name]({"beta": 0.3025, "gamma": 0.6})
+    assert isinstance(scheme, NewmarkScheme)
+    for x in X:
+        found = np.poly(scheme.amplification(float(x)))
+        np.testing.assert_allclose(found, np.poly(newmark_matrix(scheme.beta, scheme.gamma, x)), rtol=1e-12)
+
+
+DAMPED = [({"alpha": -0.05}, True), ({"alpha": -0.02}, True), ({"alpha": -0.01}, False), ({"alpha": -1e-6}, False)]
+DAMPED += [({"rho_inf": 0.0}, True), ({"rho_inf": 0.8}, True), ({"rho_inf": 0.85}, False), ({"rho_inf": 1.0}, False)]
+DAMPED += [({"beta": 0.2601, "gamma": 0.52}, True), ({"beta": 0.25001, "gamma": 0.50001}, False)]
+
+
+@pytest.mark.parametrize(("given", "damped"), DAMPED, ids=repr)
+def test_only_schemes_that_damp_enough_do_without_the_alias_rule(given: dict[str, float], damped: bool) -> None:
+    """Growth per passage with too few steps, by the march itself, on scenes where the others resonate."""
+    name = "hht-alpha" if "alpha" in given else "generalized-alpha" if "rho_inf" in given else "newmark"
+    assert SCHEMES[name](given).is_damped == damped
+    worst = 0.0
+    for modes, speed in ((5, 0.3), (12, 0.3)):
+        solver = {"scheme": name, **given}
+        scene = build_model(
+            study(beam(modes=modes), mass(1.0, cruise(0.0, 1.0, speed * math.pi)), solver=solver), {}, {}
+        )
+        rule = least_steps(SCHEMES["average-acceleration"]({}), modes, speed * math.pi)
+        values = LaneValues(scene.study, {"carriage.car.mass": np.repeat([0.25, 0.5, 0.75, 1.0], 4)}, 16)
+        for steps in {round(rule * part) for part in np.linspace(0.3, 1.0, 50)}:
+            growth = spectral_radius(transitions(SceneTables(scene, steps, "whole"), values))
+            worst = max(worst, float(growth.max()))
+    assert (worst < 1.05) == damped
 
 
 def passing(steps: int, scheme: str, car: Any = None, **parameters: float) -> Study:
@@ -107,28 +143,43 @@ def passing(steps: int, scheme: str, car: Any = None, **parameters: float) -> St
     return study(beam(modes=12), car or mass(0.5, cruise(0.0, 1.0, 0.3)), solver=solver)
 
 
-def least_steps(scheme: Scheme) -> float:
-    """The alias rule of the 12th mode, k v h + phase = pi, by scanning."""
-    steps = np.geomspace(10.0, 1e5, 400_001)
-    h = 1.0 / (0.3 * steps)
-    turned = 12 * math.pi * 0.3 * h + scheme.phase((12 * math.pi) ** 2 * h)
+def least_steps(scheme: Scheme, modes: int = 12, speed: float = 0.3) -> float:
+    """The alias rule of the highest mode, k v h + phase = pi, by scanning."""
+    steps = np.geomspace(3.0, 1e5, 400_001)
+    h = 1.0 / (speed * steps)
+    turned = modes * math.pi * speed * h + scheme.phase((modes * math.pi) ** 2 * h)
     return float(steps[np.argmax(turned < math.pi)])
 
 
 @pytest.mark.parametrize("name", ["average-acceleration", "richardson", *CONDITIONAL])
 def test_too_few_steps_for_the_alias_rule_are_refused(name: str) -> None:
-    least = SCHEMES[name]({}).stride * least_steps(SCHEMES[name]({})) * (1.1 if name in CONDITIONAL else 1.0)
-    assert make_plan(passing(math.ceil(1.001 * least), name)).buckets
+    stride = SCHEMES[name]({}).stride
+    least = least_steps(SCHEMES[name]({})) * 1.1  # of the pair's coarser march
+    assert make_plan(passing(stride * math.ceil(1.002 * least), name)).buckets
     with pytest.raises(BadInput) as caught:
-        make_plan(passing(math.floor(0.999 * least), name))
+        make_plan(passing(stride * math.floor(0.998 * least), name))
     assert "solver.steps" in str(caught.value) and "steps = " in caught.value.remedy
     suggested = int(caught.value.remedy.split()[2])
     assert make_plan(passing(suggested, name)).buckets
-    assert suggested < 1.2 * least
+    assert suggested < 1.2 * stride * least
 
 
 def test_the_alias_rule_is_for_masses_and_schemes_without_damping() -> None:
+    with pytest.raises(BadInput, match="alias rule"):
+        make_plan(passing(math.floor(least_steps(SCHEMES["average-acceleration"]({}))), "hht-alpha", alpha=-0.001))
     few = math.floor(0.5 * least_steps(SCHEMES["average-acceleration"]({})))
     assert make_plan(passing(few, "hht-alpha", alpha=-0.05)).buckets
     assert make_plan(passing(few, "generalized-alpha", rho_inf=0.8)).buckets
     assert make_plan(passing(few, "average-acceleration", force(1.0, cruise(0.0, 1.0, 0.3)))).buckets
+
+
+def test_a_pair_wants_an_even_number_of_steps() -> None:
+    with pytest.raises(BadInput) as caught:
+        make_plan(passing(8001, "richardson"))
+    assert (caught.value.where, caught.value.received, caught.value.remedy) == ("solver.steps", "8001", "steps = 8002")
+
+
+def test_the_alias_rule_is_for_masses_without_convective_terms_too() -> None:
+    solver = {"steps": 30, "fidelity": "mass-without-convective"}
+    with pytest.raises(BadInput, match="alias rule"):
+        make_plan(study(beam(modes=12), mass(0.5, cruise(0.0, 1.0, 0.3)), solver=solver))
