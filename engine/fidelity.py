@@ -155,7 +155,8 @@ def _enough(model: SceneModel, time_scale: Array) -> str:
     """A number of steps that is refused for no variant."""
     inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
     enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, _least_steps(model, time_scale))))
-    return f"steps = {math.ceil(enough)} or more"
+    stride = model.scheme.stride
+    return f"steps = {stride * math.ceil(enough / stride)} or more"
 
 
 def check_even_steps(model: SceneModel, steps: Counts) -> None:

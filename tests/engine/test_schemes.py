@@ -183,3 +183,14 @@ def test_the_alias_rule_is_for_masses_without_convective_terms_too() -> None:
     solver = {"steps": 30, "fidelity": "mass-without-convective"}
     with pytest.raises(BadInput, match="alias rule"):
         make_plan(study(beam(modes=12), mass(0.5, cruise(0.0, 1.0, 0.3)), solver=solver))
+
+
+@pytest.mark.parametrize(("scheme", "wanted"), [("hht-alpha", "alpha"), ("generalized-alpha", "rho_inf")])
+def test_a_scheme_says_which_parameter_it_needs(scheme: str, wanted: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        passing(400, scheme)
+    assert f"needs {wanted}" in caught.value.what
+    assert caught.value.expected.startswith(f"{wanted} = ") and "say, from" in caught.value.expected
+    other = {"hht-alpha": {"rho_inf": 0.5}, "generalized-alpha": {"alpha": -0.1}}[scheme]
+    with pytest.raises(BadInput, match="not for this scheme"):
+        passing(400, scheme, **other)
