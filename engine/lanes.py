@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 #: Keys of numbers that a lane may have to itself.
 LANE_KEYS = re.compile(
-    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping)|carriage\.\w+\.(mass|force|delay|headway)"
+    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)|carriage\.\w+\.(mass|force|delay|headway)"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding

@@ -13,8 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies import Beam
-from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.build import build_body
 from engine.bodies.modal import ModalBody
 from engine.kernels.schemes import Scheme
 from engine.scene import Study
@@ -23,7 +22,6 @@ from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
-AUTO_MODES = 12
 
 Inertia = Literal["force", "mass", "mass-without-convective"]
 
@@ -55,11 +53,18 @@ class CarriageTie:
 
 @dataclass(frozen=True, eq=False)
 class DamperTie:
-    """A damper to ground at a place of a body (m): force -c w'; c in N s/m stands at the dotted key."""
+    """A damper at a place of a body's track (m) or a point of it (by name): force -c w', c at the dotted key, N s/m."""
 
     body: int
-    at: float
+    at: float | str
     key: str
+
+    def row(self, modal: ModalBody) -> Array:
+        """(N,) what every mode of its body moves it by."""
+        if isinstance(self.at, str):
+            assert modal.points is not None
+            return modal.points.row(self.at)
+        return np.asarray(modal.shape([self.at])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +136,7 @@ def build_model(
     parts: list[BodyPart] = []
     first = 0
     for name in used:
-        part = _body_part(name, study.body[name], first)
+        part = _body_part(study, name, first)
         parts.append(part)
         first = part.modes.stop
     carriages = []
@@ -147,6 +152,7 @@ def build_model(
     ]
     model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers))
     _check_rigid_modes(model)
+    _check_weights(model)
     return model
 
 
@@ -170,23 +176,32 @@ def _inertia(fidelity: str, inertial: bool) -> Inertia:
     return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
 
 
-def _body_part(name: str, body: object, first: int) -> BodyPart:
+def _body_part(study: Study, name: str, first: int) -> BodyPart:
     """A body of the study in modal coordinates, its modes counted from ``first``."""
-    assert isinstance(body, Beam)
-    modes = AUTO_MODES if body.modes == "auto" else int(body.modes)
-    springs = tuple(Spring(s.at, s.stiffness, s.rotational, s.damping) for s in body.springs)
-    properties = BeamProperties(
-        length=body.length,
-        area=body.area,
-        second_moment=body.second_moment,
-        youngs_modulus=body.youngs_modulus,
-        density=body.density,
-        ends=body.ends,
-        supports=springs,
-    )
-    fibre = np.nan if body.fibre_distance is None else body.fibre_distance
-    modal = uniform_beam(properties, modes)
-    return BodyPart(name, modal, slice(first, first + modes), body.second_moment, fibre, body.own_weight)
+    body = study.body[name]
+    try:
+        built = build_body(body)
+    except BadInput as error:
+        where = study.source.where(f"body.{name}.{error.where}")
+        raise BadInput(
+            error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
+        ) from None
+    modes = slice(first, first + built.modal.omega.size)
+    return BodyPart(name, built.modal, modes, built.second_moment, built.fibre_distance, body.own_weight)
+
+
+def _check_weights(model: SceneModel) -> None:
+    """The weight of a mass acts along w: its track must stand so, or there must be no gravity."""
+    for carriage in model.carriages:
+        share = model.bodies[carriage.body].modal.gravity_share
+        if model.study.carriage[carriage.name].inertial and abs(share - 1.0) > 1e-9 and model.study.gravity != 0.0:
+            raise BadInput(
+                "the weight of this mass does not act in the direction of its track",
+                where=model.study.source.where(f"carriage.{carriage.name}.kind"),
+                expected="a track whose loads act along gravity",
+                received=f"{share:.3g} of gravity along it",
+                remedy='kind = "force", or gravity = 0',
+            )
 
 
 def _check_rigid_modes(model: SceneModel) -> None:

@@ -93,10 +93,11 @@ class Plan:
 
     @cached_property
     def key(self) -> str:
-        """What finished parts belong to: the study's text and the kernels."""
+        """What finished parts belong to: the study's text, the files of its bodies, and the kernels."""
         from engine.kernels.jit import kernel_hash
 
-        return f"{self.study.source.sha256}-{kernel_hash()}"
+        files = [body.content for body in self.study.body.values() if body.content]
+        return "-".join([self.study.source.sha256, *files, kernel_hash()])
 
     @cached_property
     def seconds(self) -> float:

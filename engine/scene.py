@@ -153,7 +153,8 @@ def value_in(scene: Scene, path: str) -> Any:
     for key in path.split("."):
         try:
             if isinstance(found, Spec):
-                found = {name: getattr(found, name) for name in type(found).model_fields}[key]
+                known = (*type(found).model_fields, *type(found).derived)
+                found = {name: getattr(found, name) for name in known}[key]
             else:
                 found = found[int(key) if isinstance(found, tuple) else key]
         except (KeyError, IndexError, ValueError, TypeError):
@@ -254,8 +255,8 @@ def _check_references(study: Study) -> None:
         if sensor.body not in (None, body):
             where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
             raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
-        if sensor.quantity == "stress" and getattr(study.body[body], "fibre_distance", None) is None:
-            where = study.source.where(f"body.{body}.fibre_distance")
+        if sensor.quantity == "stress" and (missing := study.body[body].lacks_for_stress):
+            where = study.source.where(f"body.{body}.{missing}")
             raise BadInput("a stress sensor needs this key", where=where, expected="a length (m), > 0")
 
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal import ModalBody
+from engine.bodies.modal import ModalBody, Sections
 from engine.kernels.layout import Watch
-from engine.model import BodyPart, CarriageTie, SceneModel
+from engine.model import BodyPart, CarriageTie, DamperTie, SceneModel
 from engine.timeline import Rider
 from engine.track import Way
 
@@ -25,6 +25,7 @@ Flags = NDArray[np.bool_]
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
+OF_SECTIONS = ("bending_moment", "shear_force", "stress")
 RATE_ORDER = {"velocity": 1, "acceleration": 2}
 
 
@@ -59,8 +60,7 @@ class Sensor:
         """Its sums over the modes."""
         part = model.bodies[self.body]
         if self.quantity in DERIVATIVE:
-            rows = _factor(part, self.quantity) * self.shape(model, along, DERIVATIVE[self.quantity])
-            return [Channel("q", 0, _spread(model, part, rows))]
+            return [Channel("q", 0, _spread(model, part, self._rows(model, along)))]
         order, shape = RATE_ORDER[self.quantity], self.shape(model, along, 0)
         if self.under is None:
             return [Channel("qva"[order], order, _spread(model, part, shape))]
@@ -83,8 +83,8 @@ class Sensor:
                 found[:, r] = self._full(model, along, way.s) - self._kept(model, along, way.shape(self._modal(model)))
         for r, damper in enumerate(model.dampers, start=len(model.carriages)):
             if damper.body == self.body:
-                at = np.array([damper.at])
-                found[:, r] = self._full(model, along, at) - self._kept(model, along, self._modal(model).shape(at))
+                kept = self._kept(model, along, damper.row(self._modal(model))[None, :])
+                found[:, r] = self._full_of(model, along, damper) - kept
         return found
 
     def unit_static(self, model: SceneModel, along: tuple[Way, ...], rider: int) -> Array:
@@ -97,19 +97,42 @@ class Sensor:
     def _modal(self, model: SceneModel) -> ModalBody:
         return model.bodies[self.body].modal
 
+    def _sections(self, model: SceneModel) -> Sections | None:
+        """What reads section forces where the body is not one uniform beam."""
+        return self._modal(model).sections if self.quantity in OF_SECTIONS else None
+
+    def _rows(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(1 or stations, modes of its body) what it reads of every mode."""
+        sections = self._sections(model)
+        if sections is not None:
+            return sections.rows(self.quantity, self.places(along))
+        shape = self.shape(model, along, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(model.bodies[self.body], self.quantity) * shape)
+
     def _full(self, model: SceneModel, along: tuple[Way, ...], s: Array) -> Array:
         """Static reading per unit force at s."""
-        part = model.bodies[self.body]
+        part, sections = model.bodies[self.body], self._sections(model)
+        if sections is not None:
+            return sections.influence_at(self.quantity, self.places(along), s)
         line = part.modal.influence_at(self.places(along), s, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(part, self.quantity) * line)
+
+    def _full_of(self, model: SceneModel, along: tuple[Way, ...], damper: DamperTie) -> Array:
+        """Static reading per unit force of a damper."""
+        part, x = model.bodies[self.body], self.places(along)
+        if not isinstance(damper.at, str):
+            return self._full(model, along, np.array([damper.at]))
+        assert part.modal.points is not None
+        if self._sections(model) is not None:
+            return part.modal.points.section_influence(self.quantity, damper.at, x)
+        line = part.modal.points.influence(damper.at, x, DERIVATIVE[self.quantity])
         return np.asarray(_factor(part, self.quantity) * line)
 
     def _kept(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
-        part = model.bodies[self.body]
-        omega = part.modal.omega
+        omega = self._modal(model).omega
         flexible = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0.0)
-        rows = self.shape(model, along, DERIVATIVE[self.quantity])
-        return np.asarray(_factor(part, self.quantity) * np.sum(rows * loaded * flexible, axis=1))
+        return np.asarray(np.sum(self._rows(model, along) * loaded * flexible, axis=1))
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""
@@ -117,6 +140,9 @@ class Sensor:
         x = self.places(along)
         if not model.bodies[self.body].own_weight:
             return np.zeros(stations)
+        sections = self._sections(model)
+        if sections is not None:
+            return np.broadcast_to(sections.own_weight(self.quantity, x), stations)
         if self.quantity in DERIVATIVE:
             factor = _factor(model.bodies[self.body], self.quantity)
             return np.broadcast_to(factor * model.sag(self.body, x, DERIVATIVE[self.quantity]), stations)

@@ -65,7 +65,7 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | A
             _tabulate_carriage(model, carriage, way, rows[:, :, r], drive[:, r])
     for r, damper in enumerate(model.dampers, start=len(model.carriages)):
         part = model.bodies[damper.body]
-        shape = part.modal.shape([damper.at])[0]
+        shape = damper.row(part.modal)
         rows[:, part.modes, r, FORCE] = shape
         rows[:, part.modes, r, RATE] = shape
     inertial = np.array([carriage.inertia != "force" for carriage in model.carriages] + [False] * len(model.dampers))

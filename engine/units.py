@@ -159,12 +159,14 @@ FREQUENCY = Unit("frequency", "Hz", (0, 0, -1), angle=1, per_turn=True)
 STIFFNESS = Unit("stiffness", "N m-1", (0, 1, -2))
 ROTATIONAL_STIFFNESS = Unit("rotational stiffness", "N m rad-1", (2, 1, -2), angle=-1)
 DAMPING = Unit("damping coefficient", "N s m-1", (0, 1, -1))
+ROTATIONAL_DAMPING = Unit("rotational damping coefficient", "N m s rad-1", (2, 1, -1), angle=-1)
+INERTIA = Unit("moment of inertia", "kg m2", (2, 1, 0))
 TIME = Unit("time", "s", (0, 0, 1))
 RATE = Unit("rate", "s-1", (0, 0, -1))
 DIMENSIONLESS = Unit("plain number", "", (0, 0, 0))
 KNOWN = (
     LENGTH, AREA, SECOND_MOMENT, PRESSURE, DENSITY, MASS, FORCE, SPEED, ACCELERATION, FREQUENCY, STIFFNESS,
-    ROTATIONAL_STIFFNESS, DAMPING, TIME, DIMENSIONLESS,
+    ROTATIONAL_STIFFNESS, DAMPING, ROTATIONAL_DAMPING, INERTIA, TIME, DIMENSIONLESS,
 )  # fmt: skip
 
 Length = Annotated[float, LENGTH]
@@ -180,6 +182,8 @@ Frequency = Annotated[float, FREQUENCY]
 Stiffness = Annotated[float, STIFFNESS]
 RotationalStiffness = Annotated[float, ROTATIONAL_STIFFNESS]
 Damping = Annotated[float, DAMPING]
+RotationalDamping = Annotated[float, ROTATIONAL_DAMPING]
+Inertia = Annotated[float, INERTIA]
 Time = Annotated[float, TIME]
 Rate = Annotated[float, RATE]
 Dimensionless = Annotated[float, DIMENSIONLESS]

@@ -28,15 +28,22 @@ def checked(path: Path) -> Iterator[Any]:
 
     Raises BadInput (no such file, or it points at other files) and ArchiveError (damaged, foreign, newer).
     """
+    with opened(path) as dataset:
+        _check_schema(path, dataset)
+        check_sizes(path, dataset)
+        _check_contents(path, dataset)
+        yield dataset
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """An open netCDF4.Dataset of any netCDF-4 file that points at no others. Raises BadInput and ArchiveError."""
     import netCDF4
 
     _check_signature(path)
     with files.NETCDF_LOCK:
         refuse_pointers(path)
         with _as_archive_error(path), netCDF4.Dataset(path, "r") as dataset:
-            _check_schema(path, dataset)
-            _check_sizes(path, dataset)
-            _check_contents(path, dataset)
             yield dataset
 
 
@@ -111,7 +118,8 @@ def _check_schema(path: Path, dataset: Any) -> None:
         )
 
 
-def _check_sizes(path: Path, dataset: Any) -> None:
+def check_sizes(path: Path, dataset: Any) -> None:
+    """Refuse a file that claims more data than it can hold, or none, or of foreign types. Raises ArchiveError."""
     claimed = 0
     for group, place in groups_of(dataset):
         if place.vltypes or place.cmptypes or place.enumtypes:

@@ -174,10 +174,8 @@ def _coordinate(results: Results, name: str) -> Array | None:
 def _support_damping(results: Results) -> Array:
     """Sum of the dampers (N s/m) under the first carriage's body, for every variant."""
     name = results.carriage.on
-    supports = getattr(results.study.body[name], "supports", ())
-    count = 0 if isinstance(supports, str) else len(supports)
-    dampers = (results.everywhere(results.parameter(f"body.{name}.supports.{i}.damping")) for i in range(count))
-    return sum(dampers, np.zeros(results.shape))
+    keys = [f"body.{name}.{key}" for key, _, _ in results.study.body[name].dampers()]
+    return sum((results.everywhere(results.parameter(key)) for key in keys), np.zeros(results.shape))
 
 
 def _is_swept(results: Results, key: str) -> bool:

@@ -19,10 +19,12 @@ PACKAGES = ("results_schema", "engine", "studies")
 STAGES = {
     "formulas": "kernels kernels.layout kernels.schemes",
     "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
-    "bodies bodies.beam",
+    "bodies bodies.body bodies.beam bodies.frame bodies.frame_geometry bodies.frame_rules bodies.reduced",
     "numbers only": "kernels.jit kernels.record kernels.pairs kernels.stepping kernels.start kernels.march "
     "kernels.comparison_steps kernels.comparison",
-    "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics",
+    "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics bodies.flexibility "
+    "bodies.craig_bampton bodies.frame_elements bodies.frame_assembly bodies.frame_track bodies.frame_shapes "
+    "bodies.frame_statics bodies.frame_sections bodies.frame_points bodies.frame_body bodies.reduced_body bodies.build",
     "scenes as arrays": "timeline model track signals lanes fidelity tables resolution",
     "all work of a study": "reduction plan histories remarks",
     "the run": "march richardson ode transition comparison outcome dataset execution",

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from engine.bodies.beam import Beam, Body
+from engine.bodies.beam import Beam
+from engine.bodies.body import Body
+from engine.bodies.frame import Frame
+from engine.bodies.reduced import Reduced
 from engine.spec import KindOf, Spec
 
-BODIES: Mapping[str, type[Spec]] = {"beam": Beam}
-AnyBody = Annotated[Body, KindOf("body", BODIES, planned=("frame", "nastran", "ansys"))]
+BODIES: Mapping[str, type[Spec]] = {"beam": Beam, "frame": Frame, "reduced": Reduced}
+AnyBody = Annotated[Body, KindOf("body", BODIES, planned=("nastran", "ansys"))]
 
-__all__ = ["BODIES", "AnyBody", "Beam", "Body"]
+__all__ = ["BODIES", "AnyBody", "Beam", "Body", "Frame", "Reduced"]

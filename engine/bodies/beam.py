@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from itertools import product
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
+from engine.bodies.body import MAX_MODES, Body, Rayleigh
 from engine.checks import Check, on_body
-from engine.spec import LIST, NUMBER, TABLE, WORD, Auto, Spec, by_amount_form, by_form, one_of
+from engine.spec import LIST, WORD, Spec, by_form, one_of
 from engine.units import (
     Area,
     Damping,
     Density,
-    Dimensionless,
     Length,
     Pressure,
-    Rate,
     RotationalStiffness,
     SecondMoment,
     Stiffness,
-    Time,
     fault,
 )
 
-MAX_MODES = 64
+__all__ = ["MAX_MODES", "Beam", "Body", "Rayleigh", "Spring"]
+
 END_WORDS = ("pinned", "clamped", "free")
 
 
@@ -38,17 +36,6 @@ class Spring(Spec):
     damping: Damping = Field(default=0.0, ge=0)
 
 
-class Rayleigh(Spec):
-    """Damping a M + b K, a in 1/s and b in s: mode k has the ratio a/(2 omega_k) + b omega_k/2."""
-
-    rayleigh: Annotated[tuple[Annotated[Rate, Field(ge=0)], Annotated[Time, Field(ge=0)]], Strict(False)]
-
-
-Ratio = Annotated[Dimensionless, Field(ge=0, lt=1)]
-Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
-DampingRatio = Annotated[
-    Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
-]
 _ENDS = tuple("-".join(ends) for ends in product(END_WORDS, repeat=2))
 _MEANT = {
     "simply-supported": "pinned-pinned",
@@ -59,27 +46,6 @@ _MEANT = {
 Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
 Springs = Annotated[tuple[Spring, ...], Strict(False), Field(min_length=1, max_length=100)]
 Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
-Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
-
-
-class Body(Spec):
-    """Base of all bodies: a track of some length along which loads ride.
-
-    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. modes: how many are kept. own_weight:
-    gravity acts on the body too, and deflections count from the unstressed state.
-    """
-
-    damping_ratio: DampingRatio = 0.0
-    modes: Modes = "auto"
-    own_weight: bool = False
-
-    @abstractmethod
-    def checks(self, here: str) -> list[Check]:
-        """Conditions between the numbers of this body at the dotted key `here`."""
-
-    def dampers(self) -> list[tuple[str, float, float]]:
-        """Discrete dampers to ground: key within the body, place (m), coefficient (N s/m)."""
-        return []
 
 
 class Beam(Body):
@@ -128,7 +94,11 @@ class Beam(Body):
         """Springs to ground; none where the ends are named."""
         return () if isinstance(self.supports, str) else self.supports
 
-    def dampers(self) -> list[tuple[str, float, float]]:
+    @property
+    def lacks_for_stress(self) -> str:
+        return "fibre_distance" if self.fibre_distance is None else ""
+
+    def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
 
     @model_validator(mode="after")

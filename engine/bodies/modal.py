@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,6 +32,42 @@ class Statics(Protocol):
         """d^j/dx^j of the deflection at `x` (X,) under the body's own weight, per unit gravity."""
 
 
+class Sections(Protocol):
+    """Section forces, stress and strain along the track; quantities as those of sensors."""
+
+    def rows(self, quantity: str, s: ArrayLike) -> Array:
+        """A quantity of every mode at the stations `s` (S,), as (S, N)."""
+
+    def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """The quantity at `x` per unit force at `s`, for pairs that are broadcast against each other."""
+
+    def own_weight(self, quantity: str, x: ArrayLike) -> Array:
+        """The quantity at `x` (X,) under the body's own weight, per unit gravity."""
+
+
+class Points(Protocol):
+    """Points of a body off its track, by name: where shoes, sensors and dampers stand."""
+
+    @property
+    def numbers(self) -> Mapping[str, int]:
+        """The points' names."""
+
+    def row(self, name: str) -> Array:
+        """(N,) what every mode moves a point by, kg^(-1/2)."""
+
+    def influence(self, name: str, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) of the track per unit force at a point; and the other way round."""
+
+    def section_influence(self, quantity: str, name: str, x: ArrayLike) -> Array:
+        """A section force, stress or strain at `x` (X,) of the track per unit force at a point."""
+
+    def between(self, name: str, other: str) -> float:
+        """Motion of a point per unit force at another one, m/N."""
+
+    def own_weight(self, name: str) -> float:
+        """Motion of a point under the body's own weight, per unit gravity."""
+
+
 @dataclass(frozen=True, eq=False)
 class ModalBody:
     """A body in modal coordinates with unit modal mass; SI units, w positive along gravity.
@@ -41,9 +78,13 @@ class ModalBody:
     participation       (N,) integral of phi_k over the body's mass, kg^(1/2): the modal force of its own
                         weight is gravity times this
     wave_number         (N,) 1/m, of each mode (N pi/L for a pinned beam), for the alias rule of moving loads
-    bending_stiffness   E I, N m^2: moment = -E I w'' (positive when it sags), shear = dM/ds = -E I w'''
+    bending_stiffness   E I, N m^2: moment = -E I w'' (positive when it sags), shear = dM/ds = -E I w'''; NaN where
+                        it varies along the track
     dampers             (at, coefficient) pairs, m and N s/m: discrete dampers, which become ties to ground
     shapes, statics     where the functions of place come from
+    gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
+    points              places off the track; None: there are none
+    sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     """
 
     length: float
@@ -55,6 +96,9 @@ class ModalBody:
     dampers: tuple[tuple[float, float], ...]
     shapes: Shapes
     statics: Statics
+    gravity_share: float = 1.0
+    sections: Sections | None = None
+    points: Points | None = None
 
     @property
     def rigid_modes(self) -> int:

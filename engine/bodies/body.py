@@ -1,0 +1,59 @@
+"""What all bodies share, as the user describes them: damping, number of modes, own weight."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Annotated
+
+from pydantic import Field, Strict, Tag
+
+from engine.checks import Check
+from engine.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form
+from engine.units import Dimensionless, Rate, Time
+
+MAX_MODES = 64
+AUTO_MODES = 12
+
+
+class Rayleigh(Spec):
+    """Damping a M + b K, a in 1/s and b in s: mode k has the ratio a/(2 omega_k) + b omega_k/2."""
+
+    rayleigh: Annotated[tuple[Annotated[Rate, Field(ge=0)], Annotated[Time, Field(ge=0)]], Strict(False)]
+
+
+Ratio = Annotated[Dimensionless, Field(ge=0, lt=1)]
+Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
+DampingRatio = Annotated[
+    Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
+]
+Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
+
+
+class Body(Spec):
+    """Base of all bodies: a track of some length along which loads ride.
+
+    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. modes: how many are kept. own_weight:
+    gravity acts on the body too, and deflections count from the unstressed state.
+    """
+
+    damping_ratio: DampingRatio = 0.0
+    modes: Modes = "auto"
+    own_weight: bool = False
+
+    @abstractmethod
+    def checks(self, here: str) -> list[Check]:
+        """Conditions between the numbers of this body at the dotted key `here`."""
+
+    @property
+    def lacks_for_stress(self) -> str:
+        """The key within the body that a stress sensor needs and that is not given, or ""."""
+        return ""
+
+    @property
+    def content(self) -> str:
+        """What tells apart the contents of a file that the body names; "" where it names none."""
+        return ""
+
+    def dampers(self) -> list[tuple[str, float | str, float]]:
+        """Discrete dampers: key within the body, place on the track (m) or a point's name, coefficient (N s/m)."""
+        return []

@@ -1,0 +1,59 @@
+"""From what users write to modal bodies, one function per kind; a new kind is one new entry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from engine.bodies.beam import Beam
+from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.body import AUTO_MODES, Body
+from engine.bodies.frame import Frame
+from engine.bodies.frame_body import frame_body
+from engine.bodies.modal import ModalBody
+from engine.bodies.reduced import Reduced
+from engine.bodies.reduced_body import load_body
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A modal body, with the second moment (m4) and fibre distance (m) of a uniform beam; NaN where there is none."""
+
+    modal: ModalBody
+    second_moment: float = np.nan
+    fibre_distance: float = np.nan
+
+
+def build_body(body: Body) -> Built:
+    """A body of a study in modal coordinates. Raises BadInput, with the key within the body as its place."""
+    return BUILDERS[type(body)](body)
+
+
+def _beam(body: Beam) -> Built:
+    springs = tuple(Spring(s.at, s.stiffness, s.rotational, s.damping) for s in body.springs)
+    properties = BeamProperties(
+        length=body.length,
+        area=body.area,
+        second_moment=body.second_moment,
+        youngs_modulus=body.youngs_modulus,
+        density=body.density,
+        ends=body.ends,
+        supports=springs,
+    )
+    fibre = np.nan if body.fibre_distance is None else body.fibre_distance
+    modes = AUTO_MODES if body.modes == "auto" else int(body.modes)
+    return Built(uniform_beam(properties, modes), body.second_moment, fibre)
+
+
+def _frame(body: Frame) -> Built:
+    return Built(frame_body(body))
+
+
+def _reduced(body: Reduced) -> Built:
+    return Built(load_body(body.file, body.modes))
+
+
+BUILDERS: Mapping[type[Body], Callable[[Any], Built]] = {Beam: _beam, Frame: _frame, Reduced: _reduced}

@@ -1,0 +1,185 @@
+"""A frame as a modal body: its matrices, its modes (all of the model, or of its Craig-Bampton reduction), its track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from engine.bodies.body import AUTO_MODES, MAX_MODES
+from engine.bodies.craig_bampton import reduce_model
+from engine.bodies.flexibility import SAME_FREQUENCY, Flexibility, factorised
+from engine.bodies.frame import Frame
+from engine.bodies.frame_assembly import MASSES, Assembly, Counts, assemble, rigid_motions
+from engine.bodies.frame_geometry import unit
+from engine.bodies.frame_points import frame_points, point_loads
+from engine.bodies.frame_sections import TrackSections
+from engine.bodies.frame_shapes import TrackShapes, mode_forces, track_shapes
+from engine.bodies.frame_statics import track_statics
+from engine.bodies.frame_track import track_of
+from engine.bodies.modal import Array, ModalBody
+from engine.document import shortened
+from results_schema.errors import BadInput
+
+_UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A frame by what its modes depend on, so that the variants of a sweep share one reduction."""
+
+    text: str
+    frame: Frame = field(compare=False)
+
+
+def frame_body(frame: Frame) -> ModalBody:
+    """The frame in modal coordinates with its exact statics; the last few are remembered.
+
+    Raises BadInput, with the key within the body as its place, for a frame that cannot be reduced as it asks.
+    """
+    dampers = {name: {"damping", "rotational_damping"} for name in frame.spring}
+    text = frame.model_dump_json(exclude={"damping_ratio": True, "own_weight": True, "spring": dampers})
+    found = _frame_body(_Content(text, frame))
+    if isinstance(frame.damping_ratio, tuple) and len(frame.damping_ratio) < len(found.omega):
+        what = "fewer damping ratios than modes: modes of equal frequency are kept together"
+        expected, received = f"{len(found.omega)} ratios", str(len(frame.damping_ratio))
+        raise BadInput(what, where="damping_ratio", expected=expected, received=received)
+    return found
+
+
+@lru_cache(maxsize=8)
+def _frame_body(content: _Content) -> ModalBody:
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is refused below
+            found = _reduced(content.frame)
+            probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
+    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
+        raise _unsolvable(str(error)) from error
+    if not all(np.isfinite(part).all() for part in (found.omega, found.participation, probe, found.wave_number)):
+        raise _unsolvable("a result that is not finite")
+    return found
+
+
+def _unsolvable(reason: str) -> BadInput:
+    """The refusal of a frame whose numbers floats cannot hold together."""
+    what = "the stiffnesses, masses or lengths of this frame differ too much to be solved"
+    return BadInput(what, where="section", expected="numbers of one scale", received=shortened(reason))
+
+
+def _reduced(frame: Frame) -> ModalBody:
+    assembly = assemble(frame)
+    flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
+    track, points = track_of(frame, assembly.mesh)
+    omega, shapes = frame_modes(frame, assembly, flexibility)
+    moved = points.of(assembly.whole(shapes))
+    masses = MASSES[frame.mass_matrix](track.beams)
+    turn = _settled(omega, track_shapes(track, moved, mode_forces(track, moved, omega, masses)), shapes)
+    moved, shapes = moved @ turn, shapes @ turn
+    kept = _kept(frame, omega)
+    omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
+    gravity = unit(frame.gravity)
+    spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
+    statics = track_statics(track, points, assembly, flexibility, gravity, spread)
+    forces = mode_forces(track, moved, omega, masses)
+    sections = TrackSections(statics, forces)
+    loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
+    bending = track.bending
+    return ModalBody(
+        length=statics.length,
+        mass=assembly.total_mass,
+        omega=omega,
+        participation=_frozen(shapes.T @ pull),
+        wave_number=_frozen(track.wave_number(omega)),
+        bending_stiffness=float(bending[0]) if np.ptp(bending) <= 1e-9 * bending[0] else np.nan,
+        dampers=(),
+        shapes=track_shapes(track, moved, forces),
+        statics=statics,
+        gravity_share=float(track.direction @ gravity),
+        sections=sections,
+        points=frame_points(loads, assembly, flexibility, sections, points, shapes, pull) if loads[0] else None,
+    )
+
+
+def frame_modes(frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:
+    """omega (k,) and shapes (n, k) of the lowest modes that the frame asks for; groups of equal frequencies whole."""
+    count = AUTO_MODES if frame.modes == "auto" else int(frame.modes)
+    if not frame.interface:
+        return flexibility.modes(count)
+    interface = interface_freedoms(frame, assembly)
+    held = np.ones(6 * len(assembly.mesh.points), dtype=np.bool_)
+    held[np.delete(assembly.free, interface)] = False
+    loose = rigid_motions(assembly.mesh, held, assembly.springs)[~held]
+    reduction = reduce_model(assembly.stiffness, assembly.mass, interface, loose, frame.fixed_interface_modes)
+    omega, shapes = reduction.modes(flexibility.rigid)
+    if frame.modes == "auto":
+        count = min(len(omega), MAX_MODES)
+    ends = np.append(_groups(omega)[1:], len(omega))
+    count = int(ends[ends >= min(count, len(omega))][0])
+    return omega[:count], shapes[:, :count]
+
+
+def interface_freedoms(frame: Frame, assembly: Assembly) -> Counts:
+    """Places of the interface's degrees of freedom among the free ones."""
+    nodes = [list(frame.node).index(name) for name in frame.interface]
+    wanted = (6 * np.array(nodes)[:, None] + np.arange(6)).reshape(-1)
+    return np.flatnonzero(np.isin(assembly.free, wanted))
+
+
+def _groups(omega: Array) -> Counts:
+    """First modes of the groups of equal frequencies."""
+    apart = np.diff(omega) > SAME_FREQUENCY * omega[1:]
+    return np.concatenate([[0], np.flatnonzero(apart) + 1])
+
+
+def _settled(omega: Array, along: TrackShapes, shapes: Array) -> Array:
+    """(k, k) turn within groups of equal frequencies, and signs, so that modes do not depend on the solver's whim.
+
+    Within a group the first mode moves the track most, the next what is left, by the mean square along it. Then the
+    first place of the track where a mode reaches half of its largest value is positive.
+    """
+    count = len(omega)
+    turn = np.eye(count)
+    fine = along.rows(np.linspace(0.0, along.places[-1], 16 * count + 1), 0)
+    for first, end in pairwise([*_groups(omega), count]):
+        part = fine[:, first:end]
+        if end - first > 1:
+            _, vectors = np.linalg.eigh(part.T @ part)
+            turn[first:end, first:end] = vectors[:, ::-1]
+    fine, whole = fine @ turn, shapes @ turn
+    size = np.abs(fine).max(axis=0)
+    for mode in range(count):
+        felt = size[mode] > _UNFELT * np.abs(whole[:, mode]).max()
+        line = fine[:, mode] if felt else whole[:, mode]
+        start = line[np.argmax(np.abs(line) >= 0.5 * np.abs(line).max())]
+        turn[:, mode] *= -1.0 if start < 0.0 else 1.0
+    return turn
+
+
+def _kept(frame: Frame, omega: Array) -> Counts:
+    """The modes that stay: not those left out (nor their equals), nor rigid-body modes if these are dropped."""
+    out = np.zeros(len(omega), dtype=np.bool_)
+    for index, number in enumerate(frame.leave_out):
+        if number > len(omega):
+            expected = f"numbers of modes, 1 to {len(omega)}"
+            raise BadInput(
+                "there is no such mode to leave out",
+                where=f"leave_out.{index}",
+                expected=expected,
+                received=str(number),
+            )
+        out[number - 1] = True
+    for first, end in pairwise([*_groups(omega), len(omega)]):
+        out[first:end] |= out[first:end].any()
+    if frame.rigid_body_modes == "drop":
+        out |= omega == 0.0
+    kept = np.flatnonzero(~out)
+    if not len(kept):
+        raise BadInput("no mode is left", where="leave_out" if frame.leave_out else "modes", expected="at least one")
+    return kept
+
+
+def _frozen(values: Array) -> Array:
+    values.flags.writeable = False
+    return values

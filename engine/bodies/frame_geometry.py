@@ -1,0 +1,58 @@
+"""Lines and directions of frames: plain vectors in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+PARALLEL = 1e-6  # sine of the angle below which two directions are one
+SAME_PLACE = 1e-9  # distance over length below which two points are one
+
+
+@dataclass(frozen=True, eq=False)
+class TrackLine:
+    """Members in the order in which the track passes them.
+
+    members: (name, whether it runs from its second node to its first); tangent (3,); places (n + 1,): m, the members'
+    ends along the track; direction (3,): unit vector of the load.
+    """
+
+    members: tuple[tuple[str, bool], ...]
+    tangent: Array
+    places: Array
+    direction: Array
+
+    @property
+    def length(self) -> float:
+        """Of the track, m."""
+        return float(self.places[-1])
+
+
+def unit(vector: ArrayLike) -> Array:
+    """The vector scaled to length 1."""
+    found = np.asarray(vector, dtype=np.float64)
+    found = found / np.abs(found).max()
+    return np.asarray(found / np.linalg.norm(found))
+
+
+def local_axes(along: ArrayLike, up: ArrayLike) -> Array:
+    """(3, 3) rows x, y, z: x along the member, z the part of `up` square to it.
+
+    >>> local_axes([2.0, 0.0, 0.0], [1.0, 0.0, 3.0])
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
+    """
+    x = unit(along)
+    z = np.asarray(up, dtype=np.float64)
+    z = unit(z - (z @ x) * x)
+    return np.array([x, np.cross(z, x) + 0.0, z])
+
+
+def parallel(one: ArrayLike, other: ArrayLike) -> bool:
+    """Whether two directions are the same or opposite."""
+    return bool(np.linalg.norm(np.cross(unit(one), unit(other))) < PARALLEL)

@@ -1,0 +1,55 @@
+"""A reduced body out of a file, as the user describes it."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from engine.bodies.body import Body
+from engine.bodies.frame_rules import refuse
+from engine.checks import Check
+from engine.document import shortened
+from results_schema.errors import WanderlastError
+
+
+class Reduced(Body):
+    """A body that `save_body` wrote: `file` is its path, from the working folder. modes: the lowest so many of it."""
+
+    derived: ClassVar[tuple[str, ...]] = ("length",)
+
+    kind: Literal["reduced"]
+    file: str = Field(min_length=1, max_length=1000)
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """The numbers in the file. Raises BadInput and ArchiveError."""
+        from results_schema.bodies import read_numbers
+
+        return read_numbers(self.file)
+
+    @property
+    def length(self) -> float:
+        """Of the track, m."""
+        return self.numbers["length"]
+
+    @cached_property
+    def content(self) -> str:
+        """SHA-256 of the file."""
+        return hashlib.sha256(Path(self.file).read_bytes()).hexdigest()
+
+    @model_validator(mode="after")
+    def _readable(self) -> Reduced:
+        try:
+            if not self.length > 0.0:
+                refuse(("file",), "this body has no track", received=shortened(self.file))
+        except (WanderlastError, OSError) as error:
+            what = getattr(error, "what", str(error))
+            refuse(("file",), f"no reduced body can be read: {what}", received=shortened(self.file))
+        return self
+
+    def checks(self, here: str) -> list[Check]:
+        return []
