@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.status import Status
-from studies.trade import Choice, cheapest, choices, step_choices
+from studies.trade import Choice, cheapest, choices, is_out_of_reach, step_choices
 from studies.words import counted, listed, number
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ READING = (
     "that are kept. More steps and more modes err less and cost more. Errors are parts of the largest static value, "
     "those of the contact force parts of the weight."
 )
+USEFUL = 0.01  # error of a solver beyond which its time says nothing
 RESOLVED = 0.01  # error from which on a scheme shows its order
 QUANTITY_WORDS = {"history": "whole histories", "extremes": "largest values", "contact_force": "the contact force"}
 _PARTS = {1: "half", 2: "a quarter", 3: "an eighth", 4: "a sixteenth"}
@@ -61,19 +62,19 @@ def findings(dataset: xr.Dataset, wanted: Sequence[float]) -> list[str]:
     told = [advice(dataset, scene, quantity, wanted) for quantity in quantities for scene in scenes]
     told += [steps_alone(dataset, scene, "history", wanted) for scene in scenes]
     rest = [_orders(dataset), _gain(dataset), _failed(dataset), *_solvers(dataset), _jax(dataset), _references(dataset)]
-    return [_lead(dataset, wanted[0]), READING, *told, *(text for text in rest if text)]
+    return [_lead(dataset, max(wanted)), READING, *told, *(text for text in rest if text)]
 
 
 def advice(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[float]) -> str:
     """What to take for each accuracy in one scene and quantity, steps and modes together."""
-    known = float(dataset["total_reference_error"].sel(scene=scene, quantity=quantity))
+    known = _known(dataset, "total_reference_error", scene, quantity)
     said = _advised(choices(dataset, scene, quantity), known, wanted, _with_modes)
     return f"{_named(scene)}, {QUANTITY_WORDS[quantity]}: {said}."
 
 
 def steps_alone(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[float]) -> str:
     """What to take for each accuracy where the modes are given."""
-    known = float(dataset["reference_error"].sel(scene=scene, quantity=quantity))
+    known = _known(dataset, "reference_error", scene, quantity)
     points = step_choices(dataset, scene, quantity)
     modes = counted(int(dataset["modes_used"].sel(scene=scene).values.flat[0]), "mode")
     said = _advised(points, known, wanted, _taken)
@@ -85,22 +86,43 @@ def _named(scene: str) -> str:
 
 
 def _advised(points: Sequence[Choice], known: float, wanted: Sequence[float], words: Callable[[Choice], str]) -> str:
-    """known: error of the reference itself, below which nothing can be said."""
-    judged = [tolerance for tolerance in wanted if tolerance >= known]
-    found = {tolerance: cheapest(points, tolerance) for tolerance in judged}
+    """known: error of the reference itself, which every choice may have on top of its own."""
+    loosest_first = sorted(wanted, reverse=True)
+    found = {tolerance: cheapest(points, tolerance, known) for tolerance in loosest_first}
     said = [
         f"for {_plain(tolerance)} take {words(choice)}: {short_time(choice.seconds)} per variant"
-        if choice is not None
-        else f"{_plain(tolerance)} is not reached"
         for tolerance, choice in found.items()
+        if choice is not None
     ]
-    if len(judged) < len(wanted):
-        beyond = listed([_plain(tolerance) for tolerance in wanted if tolerance < known])
-        said.append(f"{beyond} cannot be judged, as the reference itself is good to {number(known, 2)}")
-    best = min(points, key=lambda point: point.error, default=None)
-    if best is not None and (len(judged) < len(wanted) or None in found.values()):
-        said[-1] += f" (the best found: {number(best.error, 2)}, {words(best)})"
+    open_to = [tolerance for tolerance, choice in found.items() if choice is None]
+    missed = [tolerance for tolerance in open_to if is_out_of_reach(points, tolerance, known)]
+    unknown = [tolerance for tolerance in open_to if tolerance not in missed]
+    if unknown:
+        said.append(f"{_tolerances(unknown)} cannot be judged, as {_good_to([known])}{_nearest(points, known, words)}")
+    if missed:
+        best = "" if unknown else _nearest(points, known, words)
+        said.append(f"{_tolerances(missed)} {'is' if len(missed) == 1 else 'are'} not reached{best}")
     return "; ".join(said)
+
+
+def _nearest(points: Sequence[Choice], known: float, words: Callable[[Choice], str]) -> str:
+    """The choice that errs least, in brackets; its error only where it is more than the reference's own."""
+    best = min(points, key=lambda point: point.error, default=None)
+    if best is None:
+        return ""
+    if best.error > known:
+        return f" (the best found: {number(best.error, 2)}, {words(best)})"
+    return f" (nearer to it than that is {words(best)})"
+
+
+def _good_to(known: Sequence[float]) -> str:
+    """How good references are."""
+    span = _span(known, lambda value: number(value, 2))
+    return f"the reference itself is good to {span} only"
+
+
+def _tolerances(values: Sequence[float]) -> str:
+    return listed([_plain(value) for value in values])
 
 
 def _plain(tolerance: float) -> str:
@@ -118,21 +140,49 @@ def _with_modes(choice: Choice) -> str:
 
 
 def _lead(dataset: xr.Dataset, tolerance: float) -> str:
-    """The cheapest way to the first accuracy over all scenes."""
-    scenes = [str(name) for name in dataset["scene"].values]
-    found = [cheapest(choices(dataset, scene, "history"), tolerance) for scene in scenes]
-    taken = [choice for choice in found if choice is not None]
+    """The cheapest way to an accuracy over all scenes, and in how many there is none."""
+    taken, missed, unknown = _judged(dataset, tolerance)
+    total = len(taken) + missed + len(unknown)
+    rest = [f"in {missed} of {counted(total, 'scene')} nothing does"] if missed else []
+    if unknown:
+        rest.append(f"in {len(unknown)} of {counted(total, 'scene')} it cannot be judged, as {_good_to(unknown)}")
+    if not taken and not unknown:
+        return f"No choice brings whole histories within {_plain(tolerance)} of the static value in any scene."
     if not taken:
-        return f"No choice brings whole histories within {_plain(tolerance)} in any scene."
+        return f"No choice surely brings whole histories within {_plain(tolerance)} of the static value: {_also(rest)}."
     counts = Counter(scheme_words(choice.scheme) for choice in taken)
     names = listed([f"{name} in {counted(count, 'scene')}" for name, count in counts.most_common()])
     span = _span([choice.seconds for choice in taken], short_time)
     steps, modes = (_span([getattr(choice, key) for choice in taken], number) for key in ("steps", "modes"))
-    missed = f" In {len(scenes) - len(taken)} of {counted(len(scenes), 'scene')} nothing does." * (None in found)
     return (
         f"Whole histories within {_plain(tolerance)} of the static value cost {span} per variant: {steps} steps and "
-        f"{modes} modes, cheapest by {names}.{missed}"
+        f"{modes} {'mode' if modes == '1' else 'modes'}, cheapest by {names}.{f' But {_also(rest)}.' if rest else ''}"
     )
+
+
+def _judged(dataset: xr.Dataset, tolerance: float) -> tuple[list[Choice], int, list[float]]:
+    """Over the scenes: cheapest choices for whole histories, how many scenes have none, and errors of the references
+    of those scenes where they are too large to tell."""
+    taken, missed, unknown = [], 0, []
+    for scene in map(str, dataset["scene"].values):
+        points, known = choices(dataset, scene, "history"), _known(dataset, "total_reference_error", scene, "history")
+        choice = cheapest(points, tolerance, known)
+        if choice is not None:
+            taken.append(choice)
+        elif is_out_of_reach(points, tolerance, known):
+            missed += 1
+        else:
+            unknown.append(known)
+    return taken, missed, unknown
+
+
+def _known(dataset: xr.Dataset, name: str, scene: str, quantity: str) -> float:
+    """Error of a reference of one scene and quantity."""
+    return float(dataset[name].sel(scene=scene, quantity=quantity))
+
+
+def _also(parts: Sequence[str]) -> str:
+    return " and ".join(parts)
 
 
 def _span(values: Sequence[float], words: Callable[[float], str]) -> str:
@@ -141,17 +191,22 @@ def _span(values: Sequence[float], words: Callable[[float], str]) -> str:
 
 
 def _orders(dataset: xr.Dataset) -> str:
-    """Which schemes have which measured order."""
+    """Which schemes have which measured order, and which have none."""
     orders = dataset["fitted_order"].sel(quantity="history")
     groups: dict[int, list[str]] = {}
+    none = []
     for scheme in dataset["scheme"].values:
         known = orders.sel(scheme=scheme).values
         known = known[np.isfinite(known)]
         if known.size:
             ends = dict.fromkeys(number(float(end)) for end in (known.min(), known.max()))
             shown = f"{scheme_words(str(scheme))} ({' to '.join(ends)})"
-            groups.setdefault(round(float(known.max())), []).append(shown)
+            groups.setdefault(round(float(np.median(known))), []).append(shown)
+        elif dataset["error"].sel(scheme=scheme, quantity="history").notnull().any():
+            none.append(scheme_words(str(scheme)))
     told = [f"order {order}{_meant(order)}: {listed(names)}" for order, names in sorted(groups.items(), reverse=True)]
+    if none:
+        told.append(f"not in their order with these steps in any scene: {listed(none)}")
     return f"How fast errors of histories fall with the steps, measured: {'; '.join(told)}." if told else ""
 
 
@@ -192,21 +247,27 @@ def _failed(dataset: xr.Dataset) -> str:
 
 
 def _solvers(dataset: xr.Dataset) -> list[str]:
-    """How much cheaper the march is than SciPy's solvers at the solver's own error, one variant against a batch."""
+    """How much cheaper the march is than SciPy's solvers at the solver's own error, where that is of use."""
     error, seconds = dataset["solver_error"].sel(quantity="history"), dataset["solver_seconds_per_variant"]
     own = dataset["error"].sel(quantity="history").where(dataset["comparison_only"] == 0)
     ratios = []
     for scene in dataset["scene"].values:
         for solver in dataset["solver"].values:
-            reached = own.sel(scene=scene) <= error.sel(scene=scene, solver=solver)
-            best = dataset["seconds_per_variant"].sel(scene=scene).where(reached).min()
+            wanted = float(error.sel(scene=scene, solver=solver))
+            if not wanted <= USEFUL:
+                continue
+            best = dataset["seconds_per_variant"].sel(scene=scene).where(own.sel(scene=scene) <= wanted).min()
             ratios.append(float(seconds.sel(scene=scene, solver=solver) / best))
     known = [ratio for ratio in ratios if np.isfinite(ratio)]
     if not known:
         return []
+    threads = str(dataset.attrs.get("threads", ""))
+    over = f"{threads} thread{'' if threads == '1' else 's'}" if threads else "all threads"
+    span = _span(known, lambda ratio: number(ratio, 2))
     return [
-        f"SciPy's DOP853 and Radau need {number(min(known), 2)} to {number(max(known), 2)} times as long per variant "
-        "as the march in a batch that is at least as exact on the same equations."
+        f"SciPy's DOP853 and Radau, one variant after another on one thread, need {span} times as long per variant as "
+        f"the march of a batch on {over} that is at least as exact on the same equations (errors up to "
+        f"{_plain(USEFUL)})."
     ]
 
 

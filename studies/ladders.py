@@ -50,6 +50,7 @@ def steps(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work)
             "seconds": (("scheme", "step_count"), seconds),
             "reference_error": ("quantity", apart),
             "modes": model.omega.size,
+            "threads": work.threads,
         }
     )
 

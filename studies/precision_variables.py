@@ -24,7 +24,8 @@ ORDER = Variable(
     "fitted_order",
     ("scene", "scheme", "quantity"),
     long_name="power with which the error falls with the steps",
-    meaning="slope of a line through the finest three or more errors whose slopes agree; NaN where there are none",
+    meaning="slope of a line through the finest three or more errors whose slopes agree with each other and with the "
+    "scheme's own order, or five or more on a straight line; NaN where there are none",
     lead="none",
     nan_allowed=True,
 )

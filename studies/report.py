@@ -111,7 +111,7 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
         facts=_facts(results, noun(source.root)),
         findings=[_finding(results, text) for text in kind.findings(results)],
         figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
-        statuses=[_status_row(status, count) for status, count in results.status_counts.items()],
+        statuses=_statuses(results, noun(source.root)),
         scene=_scene(results),
         sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
         results=_results(results),
@@ -172,10 +172,10 @@ def _facts(results: Results, noun: str) -> list[Row]:
     low, high = int(steps.min()), int(steps.max())
     modes = sorted({int(count) for count in dataset["modes_used"].values.ravel()})
     fine = results.status_counts.get(Status.OK, 0)
+    counts = [Row(f"{noun}s", f"{results.size:,}"), Row("status ok", f"{fine:,}")]
     return [
         Row("kind of study", results.study.kind),
-        Row(f"{noun}s", f"{results.size:,}"),
-        Row("status ok", f"{fine:,}"),
+        *(counts if _statuses(results, noun) else ()),
         Row("modes", " to ".join(str(count) for count in dict.fromkeys((modes[0], modes[-1])))),
         Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}"),
     ]
@@ -186,6 +186,13 @@ def _finding(results: Results, text: str) -> Finding:
     if colon and subject in (*results.sensors, *results.study.carriage):
         return Finding(subject, rest)
     return Finding("", text)
+
+
+def _statuses(results: Results, noun: str) -> list[Row]:
+    """How many have which status; nothing where a study that measures is one whole, and well."""
+    if noun == "point" and results.size == 1 and set(results.status_counts) == {Status.OK}:
+        return []
+    return [_status_row(status, count) for status, count in results.status_counts.items()]
 
 
 def _status_row(status: Status, count: int) -> Row:

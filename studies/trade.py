@@ -14,17 +14,33 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-SLOPES_ALIKE = 0.3
+FORMAL_ORDERS = {"richardson": 4, "rk4": 4, "lagged-inertia": 1, "lagged-convective": 1}  # of all others 2
+SLOPES_ALIKE = 0.3  # of three or more errors, where their slope is the scheme's own within NEAR
+NEAR = 0.35
+STRAIGHT, ENOUGH, LEAST = 0.15, 5, 0.85  # what else counts: so even, so many errors, and falling at least so fast
 
 
-def fitted_order(steps: Sequence[int] | Counts, errors: Array, floor: float, ceiling: float = 0.05) -> float:
+def formal_order(scheme: str, quantity: str) -> int:
+    """What theory says; largest values lie between two stations, which are of second order.
+
+    >>> formal_order("rk4", "history"), formal_order("rk4", "extremes"), formal_order("fox-goodwin", "history")
+    (4, 2, 2)
+    """
+    order = FORMAL_ORDERS.get(scheme, 2)
+    return min(order, 2) if quantity == "extremes" else order
+
+
+def fitted_order(
+    steps: Sequence[int] | Counts, errors: Array, floor: float, formal: float, ceiling: float = 0.05
+) -> float:
     """The power with which errors fall with the number of steps, where they do so evenly; NaN where nowhere.
 
-    Of the points between floor and ceiling the finest run of at least three neighbours counts whose slopes differ by
-    less than 0.3 from that of the line fitted through all of them, as long as it can be.
+    Of the points between floor and ceiling the finest run of neighbours counts that is as long as it can be: at least
+    three whose slopes differ by less than 0.3 from that of the line through all of them, which is near the formal
+    order; or at least five on a line as good as straight, whatever its slope, if it falls as an order 1 does.
 
     >>> n = np.array([50, 100, 200, 400, 800])
-    >>> round(fitted_order(n, 3.0 / n**2, 1e-9), 6), fitted_order(n, np.full(5, np.nan), 1e-9)
+    >>> round(fitted_order(n, 3.0 / n**2, 1e-9, 2), 6), fitted_order(n, 0.001 / n**0.5, 1e-9, 2)
     (2.0, nan)
     """
     with np.errstate(all="ignore"):
@@ -35,14 +51,21 @@ def fitted_order(steps: Sequence[int] | Counts, errors: Array, floor: float, cei
         for first in range(last - 2, -1, -1):
             if not usable[first : last + 1].all():
                 break
-            line = np.polyfit(x[first : last + 1], y[first : last + 1], 1)[0]
-            slopes = np.diff(y[first : last + 1]) / np.diff(x[first : last + 1])
-            if np.abs(slopes - line).max() > SLOPES_ALIKE or slopes.max() >= 0.0:
+            line, uneven = _line(x[first : last + 1], y[first : last + 1])
+            if uneven > SLOPES_ALIKE:
                 break
-            found = -float(line)
+            is_own = abs(-line - formal) <= NEAR
+            is_other = uneven <= STRAIGHT and last - first + 1 >= ENOUGH and -line >= LEAST
+            found = -line if is_own or is_other else found
         if np.isfinite(found):
             return found
     return float("nan")
+
+
+def _line(x: Array, y: Array) -> tuple[float, float]:
+    """Slope of the line through points, and how far slopes between neighbours are from it; infinite where one rises."""
+    line, slopes = float(np.polyfit(x, y, 1)[0]), np.diff(y) / np.diff(x)
+    return line, float(np.abs(slopes - line).max()) if slopes.max() < 0.0 else float("inf")
 
 
 def dependable(errors: Array) -> Array:
@@ -131,6 +154,13 @@ def _sorted(found: list[Choice]) -> list[Choice]:
     return sorted(found, key=lambda choice: (choice.seconds, choice.error, not choice.corrected))
 
 
-def cheapest(points: Sequence[Choice], tolerance: float) -> Choice | None:
-    """The point of least seconds whose error is at most the tolerance; None where there is none."""
-    return next((point for point in points if point.error <= tolerance), None)
+def cheapest(points: Sequence[Choice], tolerance: float, known: float) -> Choice | None:
+    """The point of least seconds whose error is at most the tolerance even with the reference's own error, known, on
+    top of it; None where there is none."""
+    return next((point for point in points if point.error + known <= tolerance), None)
+
+
+def is_out_of_reach(points: Sequence[Choice], tolerance: float, known: float) -> bool:
+    """Whether every point errs more than the tolerance even where the reference's own error, known, is all against
+    it."""
+    return all(point.error - known > tolerance for point in points)

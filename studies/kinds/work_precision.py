@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
 from studies.measuring import Piece, Work, described, question_of, usual
+from studies.precision_checks import slug_of
 from studies.precision_variables import (
     COMPARISON_ONLY,
     COORDINATES,
@@ -109,14 +109,17 @@ class WorkPrecision:
     def check(self, study: Study) -> None:
         """One mass on one smooth way in every scene, and sensors with a static value."""
         from engine.ode import check_smooth
+        from studies import precision_checks as checks
         from studies.precision import scene_model
 
         asked = question_of(study, Question)
         first_carriage(study)
         check_sensors(study)
-        _check_slugs(study, asked)
-        _check_ladder(study, asked)
+        checks.check_slugs(study, asked)
+        checks.check_ladder(study, asked)
+        checks.check_solver(study)
         for name, overrides in asked.scenes.items():
+            checks.check_overrides(study, name, overrides)
             try:
                 check_smooth(scene_model(study, overrides, asked.mode_counts[-1]), STATIC_QUANTITIES)
             except BadInput as error:
@@ -135,7 +138,7 @@ class WorkPrecision:
         for name, overrides in asked.scenes.items():
             for part, (words, seconds) in _parts().items():
                 job = partial(_compute, part, study, asked, overrides)
-                found.append(Piece(f"{part}-{_slug(name)}", f"{words}: {name}", job, seconds))
+                found.append(Piece(f"{part}-{slug_of(name)}", f"{words}: {name}", job, seconds))
         return found
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
@@ -174,22 +177,6 @@ def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, A
     return measured[part](study, overrides, ladder, work)
 
 
-def _slug(name: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
-
-
-def _check_slugs(study: Study, asked: Question) -> None:
-    """Names of scenes that differ as names of pieces too."""
-    slugs = [_slug(name) for name in asked.scenes]
-    for name, slug in zip(asked.scenes, slugs, strict=True):
-        if not slug or slugs.count(slug) > 1 or len(name) > 60:
-            raise BadInput(
-                "not a usable name of a scene",
-                where=study.source.where(f"question.scenes.{name}"),
-                expected="up to 60 characters whose letters and digits differ from those of other names",
-            )
-
-
 #: The parts of a scene's work, each a function of `studies.ladders`: words, expected seconds.
 _PARTS: Mapping[str, tuple[str, float]] = {
     "steps": ("every scheme over the steps", 6.0),
@@ -198,31 +185,14 @@ _PARTS: Mapping[str, tuple[str, float]] = {
 }
 
 
-def _check_ladder(study: Study, asked: Question) -> None:
-    """At least one scheme that a study could take, and a reference of more modes than are compared."""
-    from studies.precision import MARCHED
-
-    if not set(asked.schemes) & set(MARCHED):
-        where = study.source.where("question.schemes")
-        expected = f"at least one scheme of the march: {', '.join(MARCHED)}"
-        raise BadInput("these schemes are for comparison only", where=where, expected=expected)
-    if asked.mode_counts[-1] >= asked.reference_modes:
-        raise BadInput(
-            "the reference has no more modes than what is compared with it",
-            where=study.source.where("question.reference_modes"),
-            expected=f"more than {asked.mode_counts[-1]}",
-            received=str(asked.reference_modes),
-        )
-
-
 def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     import xarray as xr
 
     from studies.precision import COMPARED, MARCHED, QUANTITIES
-    from studies.trade import fitted_order, fronts
+    from studies.trade import fitted_order, formal_order, fronts
 
     steps, solvers, modes = (
-        [pieces[f"{part}-{_slug(name)}"] for name in asked.scenes] for part in ("steps", "solvers", "modes")
+        [pieces[f"{part}-{slug_of(name)}"] for name in asked.scenes] for part in ("steps", "solvers", "modes")
     )
     error = np.stack([piece["error"].values for piece in steps])
     floors = np.stack([piece["reference_error"].values for piece in steps])
@@ -231,10 +201,11 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     total[:, :, :, marched] = np.stack([piece["error"].values for piece in modes])
     seconds = np.full((len(modes), len(asked.mode_counts), *error.shape[1:3]), np.nan)
     seconds[:, :, marched] = np.stack([piece["seconds"].values for piece in modes])
-    order = [
-        [[fitted_order(asked.step_counts, e[:, q], FLOOR * f) for q, f in enumerate(floor)] for e in errors]
-        for errors, floor in zip(error, floors, strict=True)
-    ]
+    order = np.empty((*error.shape[:2], len(QUANTITIES)))
+    for place in np.ndindex(order.shape):
+        s, i, q = place
+        formal = formal_order(asked.schemes[i], QUANTITIES[q])
+        order[place] = fitted_order(asked.step_counts, error[s, i, :, q], float(FLOOR * floors[s, q]), formal)
     grid = ("scene", "scheme", "step_count")
     diverged = np.isnan(error).all(axis=-1)
     counts = np.array(asked.step_counts)
@@ -261,10 +232,14 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
         steps=np.broadcast_to(counts, diverged.shape).copy(),
     )
     found = {variable.name: described(variable, *values) for variable, values in data.items()}
-    by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{_slug(scene)}") in pieces]
+    by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{slug_of(scene)}") in pieces]
     for variable, name in ((JAX_ERROR, "error"), (JAX_SECONDS, "seconds")) if by_jax else ():
         found[variable.name] = described(variable, variable.dims, np.stack([piece[name].values for piece in by_jax]))
-    told = {"jax": "measured" if by_jax else "not installed, so there are no points of jax.vmap"}
+    threads = sorted({int(piece["threads"]) for piece in steps})
+    told = {
+        "jax": "measured" if by_jax else "not installed, so there are no points of jax.vmap",
+        "threads": " to ".join(str(count) for count in dict.fromkeys((threads[0], threads[-1]))),
+    }
     return xr.Dataset(shared | found, coords=_coordinates(asked, QUANTITIES), attrs=told)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from studies.maps.ground import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.maps.methods import hht
-from studies.words import number, percent
+from studies.words import counted, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +23,7 @@ FEW, MANY, SAFE = (0.3, 0.9), 1.1, 1.5  # times the rule's steps
 MASSES = (0.25, 0.5, 1.0)  # mass ratios: heavy enough to show it, and light enough for passages not to grow
 DAMPED = -0.05
 CURED = 1.05
+STEADY = 1.01  # growth with the most steps up to which nothing grows in truth
 BANDS = (
     (0.3, 0.9, 61),
     (0.92, 1.5, 30),
@@ -81,26 +82,60 @@ def passage_growth(scene: MapScene, mass: Array, speed: float, steps: Array) -> 
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:
-    """How much grows below the rule's steps beside what grows with many, and how little above."""
+    """How much grows below the rule's steps where nothing grows with many, and how little above."""
     multiple = dataset["step_multiple"]
-    most = dataset["growth"].isel(alias_scheme=0, step_multiple=-1, drop=True)
-    average, damped = (dataset["growth"].isel(alias_scheme=i, drop=True) / most for i in (0, 1))
+    growth = dataset["growth"].fillna(np.inf).clip(1.0)
+    truth = growth.isel(alias_scheme=0, step_multiple=-1, drop=True)
+    quiet = truth <= STEADY
+    many = f"{number(float(multiple.max()))} times the rule's steps"
+    if not quiet.any():
+        return [f"Too few steps: in all {quiet.size} scenes some vibration grows with {many} too, so nothing is told."]
+    average, damped = ((growth.isel(alias_scheme=i, drop=True) / truth).where(quiet) for i in (0, 1))
     few = (multiple >= FEW[0] - 1e-9) & (multiple <= FEW[1] + 1e-9)
-    worst = average.where(few).max("step_multiple")
-    above, far = (average.where(multiple >= least - 1e-9) for least in (MANY, SAFE))
-    beyond = float((above > MANY).sum() / above.count())
-    largest = number(float(above.max()))
-    share = f"but for {percent(beyond)} of the step counts (largest {largest})" if beyond else "always"
     cure = float(damped.where(few).max())
     return [
-        f"Too few steps: {FEW[0]:g} to {FEW[1]:g} times the steps of the alias rule let average acceleration blow up "
-        f"some vibration by {number(float(worst.min()))} to {number(float(worst.max()))} times per passage in each of "
-        f"{int(worst.count())} scenes, beside what it does in {number(float(multiple.max()))} times the rule's steps.",
-        f"From {MANY:g} times the rule's steps on that stays below {MANY:g} {share}, and from {SAFE:g} times on below "
-        f"{number(float(far.max()))}.",
+        _too_few(average.where(few).max("step_multiple"), many),
+        _enough(average.where(multiple >= MANY - 1e-9), average.where(multiple >= SAFE - 1e-9)),
         f"HHT-alpha with alpha = {DAMPED:g} {'nearly cures it' if cure < CURED else 'does not cure it all'}: with the "
-        f"same too few steps the largest is {number(cure, 4)} times.",
+        f"same too few steps the largest is {_times(cure, 4)}.",
     ]
+
+
+def _too_few(worst: xr.DataArray, many: str) -> str:
+    """worst: of every scene the largest growth with too few steps; NaN where the truth grows."""
+    scenes = int(worst.count())
+    all_of = counted(scenes, "scene")
+    grown = worst.where(worst > MANY)
+    left = f"; {worst.size - scenes} more are left out, as some vibration grows in them with {many} too"
+    left = left if scenes < worst.size else ""
+    few = f"Too few steps: {FEW[0]:g} to {FEW[1]:g} times the steps of the alias rule let average acceleration blow up"
+    beside = f"where nothing grows with {many}{left}."
+    count = int(grown.count())
+    if not count:
+        return f"{few} nothing by more than {_times(float(worst.max()))} per passage in {all_of} {beside}"
+    span = " to ".join(dict.fromkeys((number(float(grown.min())), _times(float(grown.max()))))) if count > 1 else ""
+    which = f"in each of {all_of}" if count == scenes else f"in {count} of {all_of}"
+    return f"{few} some vibration by {span or _times(float(grown.max()))} per passage {which} {beside}"
+
+
+def _enough(above: xr.DataArray, far: xr.DataArray) -> str:
+    """above: growth from MANY times the rule's steps on. far: from SAFE times on."""
+    beyond = float((above > MANY).sum() / above.count())
+    largest = f"but for {percent(beyond)} of the step counts (largest {_times(float(above.max()))})"
+    stays = f"that stays below {MANY:g} {largest if beyond else 'always'}"
+    return (
+        f"From {MANY:g} times the rule's steps on {stays}, and from {SAFE:g} times on it is at most "
+        f"{_times(float(far.max()))}."
+    )
+
+
+def _times(growth: float, digits: int = 3) -> str:
+    """A growth in words.
+
+    >>> _times(1.234567), _times(float("inf"))
+    ('1.23 times', 'beyond all numbers')
+    """
+    return f"{number(growth, digits)} times" if np.isfinite(growth) else "beyond all numbers"
 
 
 MAP = Map("alias", "growth per passage over steps, speed, mass and modes", 14.0, AXES, VARIABLES, compute, sentences)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studies.maps.ground import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
-from studies.words import counted, number
+from studies.words import counted, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +23,7 @@ STEPS = 2000  # per passage
 SLOWEST, FASTEST = 0.3, 1.2  # speed ratio times the root of the mass ratio
 COUNTS = (1, 3, 5, 9, 19)
 LIMIT = 2.0 / math.pi  # of a pinned beam with all modes
+SWINGS = 1e-9  # imaginary part of a multiplier beyond which it is none of a motion that creeps
 SAME = 1.01  # growth up to which a passage is called neutral: what is left of the alias is smaller
 
 AXES = (
@@ -34,34 +35,45 @@ _OVER = tuple(a.name for a in AXES)
 VARIABLES = (
     result("frozen_growth", _OVER, "growth during the time of one passage, frozen", "mass held at midspan, with the "
            "terms of its speed; a property of the frozen station, not of a passage", nan_allowed=True),
+    result("frozen_flutter", _OVER, "the same of what swings alone", "0 where nothing swings", nan_allowed=True),
     result("passage_growth", _OVER, "growth per passage", "the mass crosses", nan_allowed=True),
     result("frozen_divergence", ("held_mode_count",), "speed ratio times root of mass ratio where the frozen station "
-           "diverges", "by bisection on the march itself; NaN where it does not up to 1.2", nan_allowed=True),
+           "diverges", "begins to grow without swinging, by bisection on the march itself; NaN where it does not up to "
+           "1.2, or does from 0.3 on", nan_allowed=True),
     result("frozen_divergence_theory", ("held_mode_count",), "the same from the modes' sum",
            "m v^2 times the sum of phi phi'' / omega^2 is -1; NaN where that cannot be", nan_allowed=True),
     result("frozen_limit", (), "the same with all modes", "2/pi, pinned beams only"),
 )  # fmt: skip
 
 
+class Grown(NamedTuple):
+    """Growth per step (n,) of what swings, and of what does not."""
+
+    swinging: Array
+    straight: Array
+
+
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
     """Both growths over speed, and the frozen station's limit."""
     number_of = np.linspace(SLOWEST, FASTEST, asked.points(91))
     masses = np.array([0.25, 1.0])
-    frozen, passage, limit, theory = [], [], [], []
+    frozen, flutter, passage, limit, theory = [], [], [], [], []
     for modes in COUNTS:
         work.check()
         scene = ground.passage(modes)
         for mass in masses:
+            grown = frozen_growth(scene, float(mass), number_of)
             with np.errstate(over="ignore"):
-                frozen.append(frozen_growth(scene, float(mass), number_of) ** STEPS)
+                frozen.append(np.maximum(*grown) ** STEPS)
+                flutter.append(grown.swinging**STEPS)
             crossing = scene.values(np.full_like(number_of, mass), number_of / math.sqrt(mass))
             passage.append(scene.growth(STEPS, crossing))
-        grows = lambda at, s=scene: frozen_growth(s, 1.0, at) > 1.0 + GROWS  # noqa: E731
-        limit.append(threshold(grows, SLOWEST, FASTEST))
+        limit.append(divergence(scene))
         theory.append(_theory(scene))
     shape = (len(COUNTS), masses.size, number_of.size)
     values: dict[str, object] = {
         "frozen_growth": np.reshape(frozen, shape),
+        "frozen_flutter": np.reshape(flutter, shape),
         "passage_growth": np.reshape(passage, shape),
         "frozen_divergence": limit,
         "frozen_divergence_theory": theory,
@@ -72,11 +84,23 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
     return dataset_of((*AXES, *VARIABLES), along, values, (max(COUNTS), STEPS))
 
 
-def frozen_growth(scene: MapScene, mass: float, number_of: Array) -> Array:
-    """(n,) growth per step at midspan for speed ratios (n,) times the root of the mass ratio."""
+def frozen_growth(scene: MapScene, mass: float, number_of: Array) -> Grown:
+    """Growth at midspan for speed ratios (n,) times the root of the mass ratio."""
     speed = number_of / math.sqrt(mass) * scene.speed_unit
     advance = scene.model.leading_body.modal.length / STEPS
-    return scene.step_growth(scene.values(np.full_like(speed, mass)), advance / speed, advance=advance)
+    multipliers = scene.multipliers(scene.values(np.full_like(speed, mass), speed), advance / speed, advance=advance)
+    swings = np.abs(multipliers.imag) > SWINGS
+    size = np.abs(multipliers)
+    return Grown(np.where(swings, size, 0.0).max(axis=-1), np.where(swings, 0.0, size).max(axis=-1))
+
+
+def divergence(scene: MapScene) -> float:
+    """Where the frozen station begins to grow without swinging; NaN where it never does or does all along."""
+
+    def grows(number_of: Array) -> NDArray[np.bool_]:
+        return frozen_growth(scene, 1.0, number_of).straight > 1.0 + GROWS
+
+    return math.nan if grows(np.array([SLOWEST]))[0] else threshold(grows, SLOWEST, FASTEST)
 
 
 def _theory(scene: MapScene) -> float:
@@ -88,29 +112,65 @@ def _theory(scene: MapScene) -> float:
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:
-    """The frozen limit, and how often a real passage beyond it does not grow."""
-    limit, counts = dataset["frozen_divergence"].values, dataset["held_mode_count"].values
+    """The frozen limit, flutter where there is any, and how many real passages grow where the frozen station does."""
+    counts = dataset["held_mode_count"].values
     most = int(np.argmax(counts))
+    found = [_diverges(dataset, most)]
+    flutter = dataset["frozen_flutter"].isel(held_mode_count=most).fillna(np.inf)
+    swinging = flutter > SAME
+    if swinging.any():
+        share, slowest = (
+            float(swinging.mean()),
+            float(dataset["centrifugal_number"].where(swinging.any(_OVER[1])).min()),
+        )
+        found.append(
+            f"Frozen so, with {counts[most]} modes some vibration also swings ever more (flutter, no divergence): "
+            f"from {number(slowest)} on{_least(dataset, slowest)}, in {percent(share)} of the speeds and masses tried."
+        )
+    frozen = dataset["frozen_growth"].isel(held_mode_count=most).fillna(np.inf)
+    passage = dataset["passage_growth"].isel(held_mode_count=most).fillna(np.inf)
+    told = _passages(passage.values[frozen.values > SAME])
+    return [" ".join([*found, told] if told else found)]
+
+
+def _diverges(dataset: xr.Dataset, most: int) -> str:
+    """Where the frozen station diverges, with the fewest modes and with the most."""
+    limit, counts = dataset["frozen_divergence"].values, dataset["held_mode_count"].values
+    held = "a mass held at midspan with the terms of its speed"
     if not math.isfinite(limit[most]):
-        return [
-            f"Frozen: held at midspan with the terms of its speed the mass does not diverge with {counts[most]} modes."
-        ]
-    passage = dataset["passage_growth"].isel(held_mode_count=most)
-    beyond = passage.where(dataset["centrifugal_number"] > limit[most])
-    neutral = int((beyond <= SAME).sum())
-    return [
-        f"Frozen: a mass held at midspan with the terms of its speed diverges from speed ratio times root of mass "
-        f"ratio {_told(limit[0])} on with {counted(int(counts[0]), 'mode')} and {_told(limit[most])} with "
-        f"{counts[most]}. That is a property of the frozen station only: of "
-        f"{counted(int(beyond.count()), 'real passage')} above it, {neutral} do not grow at all."
-    ]
+        return (
+            f"Frozen: {held} has no speed at which it begins to diverge with {counts[most]} modes, {_tried(dataset)}."
+        )
+    first = f"{number(limit[0], 4)} on with {counted(int(counts[0]), 'mode')} and " * math.isfinite(limit[0])
+    return (
+        f"Frozen: {held} diverges from speed ratio times root of mass ratio {first}{number(limit[most], 4)}"
+        f"{'' if first else ' on'} with {counts[most]}{'' if first else ' modes'}."
+    )
 
 
-def _told(limit: float) -> str:
-    """A limit in words."""
-    if not math.isfinite(limit):
-        return f"above {number(FASTEST)}"
-    return number(limit, 4) if limit > SLOWEST * (1.0 + 1e-6) else f"{number(SLOWEST)} or less"
+def _tried(dataset: xr.Dataset) -> str:
+    return f"speed ratio times root of mass ratio {number(SLOWEST)} to {number(FASTEST)}"
+
+
+def _least(dataset: xr.Dataset, value: float) -> str:
+    """Whether a speed is the slowest that was tried."""
+    return ", the slowest tried" if value <= float(dataset["centrifugal_number"].min()) else ""
+
+
+def _passages(growth: Array) -> str:
+    """What real passages (n,) do at speeds and masses at which the frozen station grows."""
+    if not growth.size:
+        return ""
+    neutral = int((growth <= SAME).sum())
+    where = f"of {counted(growth.size, 'real passage')} where it grows"
+    if neutral:
+        return f"That is a property of the frozen station only: {where}, {neutral} do not grow at all."
+    low, high = (number(float(end), 2) if np.isfinite(end) else "beyond all numbers" for end in _ends(growth))
+    return f"Real passages grow there too: {where}, all do, {low} to {high} times per passage."
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
 
 
 MAP = Map("frozen", "the frozen station beside the real passage", 4.0, AXES, VARIABLES, compute, sentences)

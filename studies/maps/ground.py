@@ -168,6 +168,16 @@ class MapScene:
 
         return spectral_radius(step_matrices(self.frozen(**held), values, step, steps))
 
+    def multipliers(self, values: LaneValues, step: Array, **held: Any) -> NDArray[np.complex128]:
+        """(V, M) what one step (V,) in s multiplies the motions by, the mass held at midspan; held: as of `frozen`.
+        All infinite where the march overflows."""
+        from engine.transition import step_matrices
+
+        matrices = step_matrices(self.frozen(**held), values, step)
+        finite = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))[:, None]
+        found = np.linalg.eigvals(np.where(finite[..., None], matrices, 0.0)).astype(np.complex128)
+        return np.where(finite, found, np.inf)
+
     def frozen(self, advance: float = 0.0, scheme: ComparisonScheme | None = None) -> Frozen:
         """The mass held at midspan with the terms of a speed of ``advance`` m per step, by the scene's own scheme or by
         one that is offered for comparison."""

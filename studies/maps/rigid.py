@@ -30,6 +30,7 @@ TIED: tuple[Method, ...] = (
     generalized(0.8),
     generalized(0.0),
 )
+UNDAMPED = tuple(method.label for method in METHODS[:4])  # they damp no vibration, however fast
 LOST = 1e6  # weights: a force beyond means nothing any more
 CALM = 0.1  # of the weight: ringing below is none to speak of
 
@@ -92,15 +93,29 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     tied = [name for name in ringing if name != INERTIAL]
     lost = [name for name in tied if not np.isfinite(ringing[name])]
     wild = [f"{name} {number(ringing[name])} times the weight" for name in tied if ringing[name] > CALM]
-    calm = sorted((departure[name], name) for name in tied if ringing[name] <= CALM)
-    said = f"the contact force rings from step to step with {listed(wild)}" if wild else "no scheme rings"
-    if lost:
-        said += f", and {listed(lost)} blow{'s' if len(lost) == 1 else ''} up altogether"
-    told = [f"Rigid tie: tied by its place instead of its inertia, the mass is an ill-posed partner: {said}."]
+    calm = [name for _, name in sorted((departure[name], name) for name in tied if ringing[name] <= CALM)]
+    told = [f"Rigid tie: with the mass tied by its place instead of its inertia, {_rings(wild, lost)}."]
     if calm:
-        best = f"{calm[0][1]} follows the true force most closely, within {percent(calm[0][0])} of the weight"
-        told.append(f"Numerical damping calms it ({listed([name for _, name in calm])}); {best}.")
-    return told
+        away = f"by {percent(departure[calm[0]])} of the weight at most"
+        best = f"the tie by {calm[0]} departs least from the force of the mass as inertia, {away}."
+        told.append(f"{_calms(calm) if wild else ''}{best}")
+    return [told[0], *(f"{text[:1].upper()}{text[1:]}" for text in told[1:])]
+
+
+def _rings(wild: list[str], lost: list[str]) -> str:
+    """What the contact force does where it is not calm."""
+    gone = f"{listed(lost)} blow{'s' if len(lost) == 1 else ''} up altogether"
+    if wild:
+        return f"the contact force rings from step to step with {listed(wild)}" + (f", and {gone}" if lost else "")
+    here = f"the contact force of this passage rings by no more than {percent(CALM)} of the weight with"
+    return f"{here} any other scheme, but {gone}" if lost else f"{here} any scheme"
+
+
+def _calms(calm: list[str]) -> str:
+    """Which schemes do not ring: those that damp fast vibration, and others."""
+    damping, others = [n for n in calm if n not in UNDAMPED], [n for n in calm if n in UNDAMPED]
+    told = f"numerical damping calms it ({listed(damping)}); " if damping else ""
+    return told + (f"{listed(others)} {'does' if len(others) == 1 else 'do'} not ring either; " if others else "")
 
 
 MAP = Map("rigid-tie", "the contact force of a mass tied by its place", 2.0, AXES, VARIABLES, compute, sentences)

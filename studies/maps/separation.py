@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from studies.maps.ground import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
-from studies.words import listed, number, percent
+from studies.words import counted, listed, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,8 @@ VARIABLES = (
     result("smallest_contact_force", tuple(a.name for a in AXES), "smallest contact force over the weight",
            "over the weight, on 0-98 % of the span; NaN where the march overflows", nan_allowed=True),
     result("separation_onset", ("separation_mass_ratio",), "onset of separation",
-           "speed ratio from which on the contact opens; NaN where it holds", nan_allowed=True),
+           "lowest speed ratio at which the contact opens; it may hold again at higher ones; NaN where it always holds",
+           nan_allowed=True),
     result("separation_place", ("separation_mass_ratio",), "place of separation", "in lengths, at that speed",
            nan_allowed=True),
 )  # fmt: skip
@@ -92,9 +93,8 @@ def onset(scene: MapScene, mass: float, speed: Array, smallest: Array, work: Wor
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:
-    """The onset per mass."""
+    """The first opening per mass, and whether the contact holds again at faster speeds."""
     onset_of, mass = dataset["separation_onset"].values, dataset["separation_mass_ratio"].values
-    place = dataset["separation_place"].values
     known = np.isfinite(onset_of)
     top = number(float(dataset["separation_speed_ratio"].max()))
     if not known.any():
@@ -102,10 +102,13 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     slowest = float(dataset["separation_speed_ratio"].min())
     least = {i: " or less" if onset_of[i] <= slowest else "" for i in np.flatnonzero(known)}
     told = listed([f"{number(onset_of[i])}{less} for mass ratio {number(mass[i])}" for i, less in least.items()])
-    kept = f"; the other masses hold up to {top}" if not known.all() else ""
+    kept = f" The other masses hold up to speed ratio {top}." if not known.all() else ""
+    faster = dataset["separation_speed_ratio"] > dataset["separation_onset"]
+    again = int((faster & (dataset["smallest_contact_force"] >= 0.0)).sum())
+    holds = f" At {again} of {counted(int(faster.sum()), 'faster passage')} it holds." if again else ""
     return [
-        f"Separation: the mass would first lift off at speed ratio {told}{kept}, {_range(place)} of "
-        "the way. Beyond, the equations say no more."
+        f"Separation: the contact opens first at speed ratio {told}, {_range(dataset['separation_place'].values)} of "
+        f"the way; from there on the equations say no more of the passage.{holds}{kept}"
     ]
 
 

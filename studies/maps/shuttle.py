@@ -122,26 +122,41 @@ def one_mode(scene: MapScene, mass: Array) -> Array:
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:
-    """Where the main tongue lies, how wide it is, and what damping does."""
-    mass = dataset["shuttle_mass_ratio"].values
+    """Where the main tongue lies, how much of the map is unstable, and what damping does."""
+    over = ["shuttle_mass_ratio", "shuttle_frequency_ratio"]
+    growth = dataset["multiplier"].fillna(np.inf)
+    parts = [percent(float(part)) for part in (growth > UNSTABLE).mean(over).values]
+    largest = [float(value) for value in growth.max(over).values]
+    damping = percent(float(dataset["shuttle_damping_ratio"].values[-1]))
+    free = f"of the whole map of frequencies and masses {parts[0]} is unstable without damping"
+    if largest[0] <= UNSTABLE:
+        return [f"Swinging mass: nothing grows; {free}."]
+    less = f"and {parts[-1]} with {damping}" if parts[-1] != parts[0] else f"and about as much with {damping}"
+    return [
+        f"{_main(dataset)}; {free} {less}.",
+        f"In one period the vibration grows up to {_times(largest[0])} without damping and {_times(largest[-1])} with "
+        f"{damping}.",
+    ]
+
+
+def _main(dataset: xr.Dataset) -> str:
+    """The main band at some masses beside the formula."""
+    mass, theory = dataset["shuttle_mass_ratio"].values, dataset["tongue_theory"].values
     low, high = dataset["tongue_low"].values, dataset["tongue_high"].values
     places = sorted({int(np.argmin(np.abs(mass - wanted))) for wanted in TOLD if wanted <= mass.max() + 1e-9})
     shown = [i for i in places if math.isfinite(low[i])]
+    if not shown:
+        return UNSHAKEN
     told = listed([f"{number(low[i])} to {number(high[i])} for mass ratio {number(mass[i])}" for i in shown])
-    said = (
-        f"Swinging mass: one that swings over the whole body shakes it ever more at frequencies over omega_1 of {told}"
-    )
-    theory = dataset["tongue_theory"].values
     away = [percent(abs(0.5 * (low[i] + high[i]) / theory[i] - 1.0)) for i in shown]
-    said = f"{said}; the formula for one mode is {listed(away)} off the middle" if shown else UNSHAKEN
-    largest = dataset["multiplier"].max(["shuttle_mass_ratio", "shuttle_frequency_ratio"]).values
-    unstable = (dataset["multiplier"] > UNSTABLE).mean(["shuttle_mass_ratio", "shuttle_frequency_ratio"]).values
-    return [
-        f"{said}.",
-        f"In one period the vibration grows up to {number(float(largest[0]))} times without damping and "
-        f"{number(float(largest[-1]))} times with {percent(float(dataset['shuttle_damping_ratio'].values[-1]))}, which "
-        f"shrinks the unstable part of the map from {percent(float(unstable[0]))} to {percent(float(unstable[-1]))}.",
-    ]
+    return (
+        f"Swinging mass: one that swings over the whole body shakes it ever more, in a main band near the formula for "
+        f"one mode at frequencies over omega_1 of {told} (its middle is {listed(away)} off the formula)"
+    )
+
+
+def _times(growth: float) -> str:
+    return f"{number(growth)} times" if math.isfinite(growth) else "beyond all numbers"
 
 
 MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, AXES, VARIABLES, compute, sentences)

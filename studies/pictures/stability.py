@@ -131,13 +131,15 @@ def _frozen(dataset: xr.Dataset, drawing: Drawing) -> None:
     masses, counts = dataset["held_mass_ratio"].values, dataset["held_mode_count"].values
     rows = drawing.subplots(1, len(masses), sharey=True)
     x = dataset["centrifugal_number"].values
+    least = float(dataset["passage_growth"].isel(held_mode_count=-1).min())
+    low = min(0.8, max(0.1, 0.9 * least))
     for axes, mass in zip(np.atleast_1d(rows), masses, strict=True):
         one = dataset.sel(held_mass_ratio=mass)
         for count, colour in zip(counts, shades(len(counts)), strict=True):
             held = one["frozen_growth"].sel(held_mode_count=count)
             axes.plot(x, held, color=colour, lw=1.0, ls="--", label=f"frozen, {counted(int(count), 'mode')}")
         axes.plot(x, one["passage_growth"].isel(held_mode_count=-1), color=BLUE, label=f"passage, {counts[-1]} modes")
-        axes.set(ylim=(0.8, 20.0), xlabel="speed ratio · √(mass ratio)", title=f"mass ratio {printed(mass)}")
+        axes.set(ylim=(low, 20.0), xlabel="speed ratio · √(mass ratio)", title=f"mass ratio {printed(mass)}")
         logarithmic(axes.yaxis)
         if "frozen_limit" in dataset:
             limit = float(dataset["frozen_limit"])
@@ -179,8 +181,9 @@ DRAWN: Mapping[str, Drawn] = {
     ),
     "frozen": Drawn(
         "A frozen station is not a passage",
-        "Frozen (dashed): the mass is held at midspan, but the terms of its speed act; beyond a speed the stiffness "
-        "that they leave is negative and it diverges. Passage: the mass really crosses at that speed.",
+        "Frozen (dashed): the mass is held at midspan, but the terms of its speed act. Where the stiffness that they "
+        "leave is negative it diverges; on supports that are not alike it may also swing ever more (flutter), at any "
+        "speed. Passage: the mass really crosses at that speed.",
         3.2,
         _frozen,
     ),

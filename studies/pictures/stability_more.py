@@ -52,7 +52,7 @@ def _separation(dataset: xr.Dataset, drawing: Drawing) -> None:
         axes.plot(*solid, color=colour, label=printed(mass))
         if opens:
             axes.plot(opens, 0.0, "o", color=VERMILION, ms=5.0, zorder=3.0)
-    axes.plot([], [], "o", color=VERMILION, ms=5.0, label="contact opens")
+    axes.plot([], [], "o", color=VERMILION, ms=5.0, label="opens first")
     zero_line(axes)
     axes.set(
         ylim=(-2.0, 1.05), xlim=(0.0, None), xlabel="speed ratio v/(ω₁ L/π)", ylabel="smallest contact force / weight"
@@ -130,7 +130,7 @@ OVERSHOOT = Drawn(
     _overshoot,
 )
 RIGID_TIE = Drawn(
-    "Tied by its place, the mass rings",
+    "Does a mass ring that is tied by its place?",
     f"The contact force of one passage of {STEPS} steps: the mass as inertia, as the program marches it, and tied by "
     "its place, by average acceleration and by the scheme that follows best. Right: how strongly the force jumps up "
     "and down from step to step.",

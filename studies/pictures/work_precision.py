@@ -47,9 +47,9 @@ def pictures(dataset: xr.Dataset) -> list[Figure]:
         _panels(dataset, ("trade", "Accuracy of histories against time, steps and modes"), both, height, _draw_trade),
         _panels(dataset, ("cost", "Error of histories against time, equal modes"), cost, height, _draw_cost),
     ]
-    found.append(
-        draw("orders", "Measured orders", ORDERS, 0.9 + 0.24 * dataset.sizes["scheme"], partial(_orders, dataset))
-    )
+    if np.isfinite(dataset["fitted_order"].sel(quantity="history")).any():
+        low = 0.9 + 0.24 * dataset.sizes["scheme"]
+        found.append(draw("orders", "Measured orders", ORDERS, low, partial(_orders, dataset)))
     for quantity in map(str, dataset["quantity"].values):
         title = f"Error of {QUANTITY_WORDS[quantity]} against steps"
         drawn = partial(_draw_steps, quantity=quantity)
@@ -112,7 +112,8 @@ def _orders(dataset: xr.Dataset, drawing: Drawing) -> None:
     rows = np.arange(len(schemes))
     for scene, colour, marker in zip(scenes, cycle(DISTINCT), cycle("os^Dv<>")):
         order = dataset["fitted_order"].sel(scene=scene, quantity="history").values
-        axes.plot(order, rows, marker=marker, color=colour, linewidth=0.0, alpha=0.8, label=scene)
+        label = scene if np.isfinite(order).any() else "_none"
+        axes.plot(order, rows, marker=marker, color=colour, linewidth=0.0, alpha=0.8, label=label)
     only = dataset["comparison_only"].values
     names = [f"{scheme_words(name)}{' *' * bool(c)}" for name, c in zip(schemes, only, strict=True)]
     axes.set_yticks(rows, names)
@@ -141,7 +142,8 @@ def _draw_lines(axes: Axes, own: xr.Dataset, x: xr.DataArray, quantity: str) -> 
         along = np.broadcast_to(x.sel(scheme=scheme).values if "scheme" in x.dims else x.values, error.shape)
         shown = np.isfinite(error) & (error > 0.0)
         (line,) = axes.plot(along[shown], error[shown], zorder=2 if "dashes" in style else 3, **style)
-        handles[scheme_words(scheme)] = line
+        if shown.any():
+            handles[scheme_words(scheme)] = line
     axes.set(xscale="log", yscale="log")
     return handles
 

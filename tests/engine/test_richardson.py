@@ -196,7 +196,7 @@ def test_phase_error_is_what_average_acceleration_falls_behind() -> None:
 
 def test_unresolved_is_said_and_values_are_kept() -> None:
     sweep = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.4]}}
-    given = study(beam(modes=8), mass(0.05, cruise(0.0, 1.0, 1.0)), solver=PAIR | {"steps": 601}, sweep=sweep)
+    given = study(beam(modes=8), mass(0.05, cruise(0.0, 1.0, 1.0)), solver=PAIR | {"steps": 602}, sweep=sweep)
     ds = run(given)
     assert ds.status.values.tolist() == [Status.UNRESOLVED, Status.OK]
     assert np.isfinite(ds.midspan_max.values).all()

@@ -12,6 +12,7 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
+from studies import report
 from studies.kinds.stability import KIND
 from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
 from studies.maps.ground import Ground, threshold
@@ -130,13 +131,57 @@ def test_multipliers_of_a_body_without_mass_are_one() -> None:
 def test_the_frozen_station_diverges_where_theory_says(modes: int, wanted: float) -> None:
     scene = GROUND.passage(modes)
     for mass in (0.25, 1.0):
-        found = threshold(lambda x, m=mass: frozen.frozen_growth(scene, m, x) > 1.0 + 1e-6, 0.3, 1.2)
+        found = threshold(lambda x, m=mass: frozen.frozen_growth(scene, m, x).straight > 1.0 + 1e-6, 0.3, 1.2)
         assert found == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("supports", ["pinned-pinned", "clamped-pinned", "clamped-free"])
+def test_flutter_of_the_frozen_station_is_told_from_divergence(supports: str) -> None:
+    """Beside the roots of (I + m phi phi') s^2 + (C + 2 m v phi phi_x') s + K + m v^2 phi phi_xx'."""
+    scene = Ground(study(bed={"supports": supports, "damping_ratio": 0.01})).passage(3)
+    part, number_of = scene.model.leading_body.modal, np.array([0.3, 0.5, 0.8, 1.2])
+    phi, slope, bend = (part.shape([0.5], derivative)[0] for derivative in (0, 1, 2))
+    zero, one = np.zeros((3, 3)), np.eye(3)
+    for x, swinging, straight in zip(number_of, *frozen.frozen_growth(scene, 1.0, number_of), strict=True):
+        speed = x * scene.speed_unit
+        damping = np.diag(0.02 * part.omega) + 2.0 * speed * np.outer(phi, slope)
+        stiffness = np.diag(part.omega**2) + speed**2 * np.outer(phi, bend)
+        inverse = np.linalg.inv(one + np.outer(phi, phi))
+        roots = np.linalg.eigvals(np.block([[zero, one], [-inverse @ stiffness, -inverse @ damping]]))
+        swings, time = np.abs(roots.imag) > 1e-6, 1.0 / speed
+        assert swinging**frozen.STEPS == pytest.approx(math.exp(roots.real[swings].max() * time), rel=1e-2)
+        if (roots.real[~swings] > 1e-6).any():
+            assert straight**frozen.STEPS == pytest.approx(math.exp(roots.real[~swings].max() * time), rel=1e-2)
+        else:
+            assert straight <= 1.0
+        assert (straight > 1.0) == (np.linalg.det(stiffness) < 0.0)
+        assert (swinging**frozen.STEPS > 1.01) == (supports != "pinned-pinned")
+
+
+def test_a_limit_below_the_slowest_speed_is_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frozen, "SLOWEST", 0.8)  # the station of one mode diverges from 0.7071 on
+    assert math.isnan(frozen.divergence(GROUND.passage(1)))
+
+
+def test_a_girder_that_flutters_at_any_speed_diverges_where_theory_says() -> None:
+    asked = study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-pinned", "damping_ratio": 0.01})
+    dataset = studies.run(asked)
+    assert np.allclose(dataset["frozen_divergence"], dataset["frozen_divergence_theory"], rtol=3e-4)
+    (said,) = frozen.sentences(dataset)
+    assert "flutter" in said and "from 0.3 on, the slowest tried, in 100 %" in said
+    most = dataset.isel(held_mode_count=-1)
+    grown = most["passage_growth"].values[most["frozen_growth"].values > 1.01]
+    assert f"of {grown.size} real passages where it grows, {(grown <= 1.01).sum()} do not grow at all" in said
+    free = studies.run(study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-free"}))
+    assert free["frozen_divergence"].isnull().all()
+    (said,) = frozen.sentences(free)
+    assert "no speed at which it begins to diverge" in said and "flutter" in said
+    assert "flutter" not in frozen.sentences(studies.run(study({"maps": ["frozen"], "fineness": 0.1})))[0]
 
 
 def test_a_real_passage_beyond_the_frozen_limit_need_not_grow() -> None:
     scene, number = GROUND.passage(9), np.array([0.8])
-    assert frozen.frozen_growth(scene, 1.0, number)[0] ** frozen.STEPS > 3.0
+    assert frozen.frozen_growth(scene, 1.0, number).straight[0] ** frozen.STEPS > 3.0
     assert scene.growth(2000, scene.values(np.array([1.0]), number))[0] == pytest.approx(1.0, abs=1e-3)
 
 
@@ -209,6 +254,9 @@ def test_chosen_maps_alone_are_computed() -> None:
     dataset = studies.run(asked)
     assert "growth" not in dataset and "critical_step" not in dataset
     assert [figure.name for figure in KIND.figures(Results(dataset, asked))] == ["lagged-inertia", "overshoot"]
+    facts = [row.name for row in report._facts(Results(dataset, asked), "point")]
+    assert facts == ["kind of study", "modes", "steps"]  # one point has no table of statuses
+    assert report._statuses(Results(dataset, asked), "point") == []
 
 
 def test_closed_forms_of_pinned_beams_stay_away_from_other_bodies() -> None:

@@ -1,0 +1,175 @@
+"""What a study of work and precision says: from the points by plain loops, and from points made up for it."""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from results_schema.status import Status
+from studies import advice, answers, trade
+from studies.words import number
+from tests.studies import precision
+
+
+def plain_choice(dataset: xr.Dataset, scene: str, quantity: str, tolerance: float) -> tuple[float, str] | None:
+    """The cheapest point whose error, and that of all finer ones, is at most the tolerance, though the reference's own
+    error come on top: seconds and what it is."""
+    best = None
+    own = float(dataset.total_reference_error.sel(scene=scene, quantity=quantity))
+    for modes, c, scheme in product(dataset.mode_count.values, (1, 0), dataset.scheme.values):
+        for n, steps in enumerate(dataset.step_count.values):
+            good = True
+            for finer in dataset.step_count.values[n:]:
+                error = dataset.total_error.sel(scene=scene, mode_count=modes, correction=c, scheme=scheme)
+                if not float(error.sel(step_count=finer, quantity=quantity)) + own <= tolerance:
+                    good = False
+            at = {"scene": scene, "mode_count": modes, "scheme": scheme, "step_count": steps}
+            cost = float(dataset.total_seconds_per_variant.sel(at))
+            if good and (best is None or cost < best[0]):
+                best = cost, f"{advice.scheme_words(str(scheme))} with {steps:,} steps"
+    return best
+
+
+def least_error(dataset: xr.Dataset, scene: str, quantity: str) -> float:
+    """What the best point errs at least, though the reference's own error be all against it; of each row the finest
+    one that did not diverge is the worst of the finer ones."""
+    own = float(dataset.total_reference_error.sel(scene=scene, quantity=quantity))
+    finest = dataset.total_error.sel(scene=scene, quantity=quantity).isel(step_count=-1)
+    return float(finest.min()) - own
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 3e-2, 1e-3, 1e-4, 1e-6])
+def test_the_sentence_follows_from_the_points(tolerance: float) -> None:
+    dataset = precision.small()
+    reached = []
+    for scene, quantity in product(map(str, dataset.scene.values), ("history", "extremes")):
+        said = advice.advice(dataset, scene, quantity, [tolerance])
+        expected = plain_choice(dataset, scene, quantity, tolerance)
+        if expected is not None:
+            seconds, words = expected
+            assert f"take {words}" in said and f": {advice.short_time(seconds)} per variant" in said
+        elif least_error(dataset, scene, quantity) > tolerance:
+            assert "is not reached (the best found: " in said and "judged" not in said
+        else:
+            assert "cannot be judged" in said and "take " not in said
+        reached.append(expected is not None)
+    assert any(reached) or tolerance < 1e-2
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_the_sentence_of_the_steps_alone_follows_from_the_points(tolerance: float) -> None:
+    dataset = precision.small()
+    for scene in map(str, dataset.scene.values):
+        best, own = None, float(dataset.reference_error.sel(scene=scene, quantity="history"))
+        for scheme in ("average-acceleration", "fox-goodwin", "richardson"):
+            error = dataset.error.sel(scene=scene, scheme=scheme, quantity="history").values
+            for n, steps in enumerate(dataset.step_count.values):
+                cost = float(dataset.seconds_per_variant.sel(scene=scene, scheme=scheme, step_count=steps))
+                if all(e + own <= tolerance for e in error[n:]) and (best is None or cost < best[0]):
+                    best = cost, f"{advice.scheme_words(scheme)} with {steps:,} steps"
+        said = advice.steps_alone(dataset, scene, "history", [tolerance])
+        assert "2 modes" in said
+        assert (f"take {best[1]}" in said and advice.short_time(best[0]) in said) if best else "is not reached" in said
+
+
+def test_a_lucky_point_is_not_taken() -> None:
+    dataset = precision.small().copy(deep=True)
+    place = {"scene": "light", "mode_count": 1, "correction": 0, "scheme": "fox-goodwin", "step_count": 40}
+    dataset.total_error.loc[place | {"quantity": "history"}] = 1e-9
+    assert advice.advice(dataset, "light", "history", [0.5]) == advice.advice(
+        precision.small(), "light", "history", [0.5]
+    )
+    points = [point for point in trade.choices(dataset, "light", "history") if point.modes == 1 and not point.corrected]
+    assert min(point.error for point in points if point.scheme == "fox-goodwin") > 1e-3
+
+
+def test_findings_say_what_diverged_and_what_orders_are() -> None:
+    text = "\n".join(answers.findings(precision.small()))
+    gone = int((precision.small().status == int(Status.DIVERGED)).sum())
+    assert f"{gone} points of {precision.small().status.size} diverged, which is an answer too" in text
+    assert "a quarter of the error" in text and "a sixteenth of the error" in text and "nan" not in text
+    assert re.search(
+        r"one variant after another on one thread, need [\d.e]+ to [\d.e]+ times as long per variant as the march of a "
+        r"batch on 1 thread ",
+        text,
+    )
+
+
+def test_the_time_of_a_useless_solver_says_nothing() -> None:
+    dataset = precision.small().copy(deep=True)
+    own = dataset.error.sel(quantity="history").where(dataset.comparison_only == 0)
+    ratios = [
+        float(dataset.solver_seconds_per_variant.sel(scene=scene, solver=solver))
+        / float(dataset.seconds_per_variant.sel(scene=scene).where(own.sel(scene=scene) <= error).min())
+        for scene, solver in product(dataset.scene.values, dataset.solver.values)
+        if (error := float(dataset.solver_error.sel(scene=scene, solver=solver, quantity="history"))) <= 1e-2
+    ]
+    (said,) = advice._solvers(dataset)
+    assert f"need {number(np.nanmin(ratios), 2)} to {number(np.nanmax(ratios), 2)} times" in said
+    dataset.solver_error[:] = 0.02
+    assert advice._solvers(dataset) == []
+
+
+def lead(known: tuple[float, float], best: tuple[float, float], *wanted: float) -> str:
+    """The first sentence with other errors of the two references, and every point as good as said."""
+    dataset = precision.small().copy(deep=True)
+    dataset.total_reference_error.loc[{"quantity": "history"}] = np.array(known)
+    there = dataset.total_error.sel(quantity="history").notnull()
+    for scene, error in zip(dataset.scene.values, best, strict=True):
+        values = dataset.total_error.sel(scene=scene, quantity="history")
+        dataset.total_error.loc[{"scene": scene, "quantity": "history"}] = xr.where(
+            there.sel(scene=scene), error, values
+        )
+    return advice.findings(dataset, wanted)[0]
+
+
+def test_the_lead_judges_as_the_advice_does() -> None:
+    assert "within 1e-3 of the static value cost" in lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-3)
+    assert lead((1e-5, 1e-5), (2e-3, 2e-3), 1e-3).startswith("No choice brings whole histories within 1e-3")
+    unknown = lead((1.6e-3, 1.5e-3), (9e-4, 9e-4), 1e-3)
+    assert "cost" not in unknown and "in 2 of 2 scenes it cannot be judged" in unknown
+    assert "good to 0.0015 to 0.0016 only" in unknown
+    mixed = lead((1.6e-3, 1.5e-3), (9e-4, 3.2e-3), 1e-3)
+    assert "in 1 of 2 scenes nothing does" in mixed and "in 1 of 2 scenes it cannot be judged" in mixed
+    some = lead((1e-5, 2e-3), (9e-4, 9e-4), 1e-3)
+    assert "static value cost" in some and some.endswith(
+        "But in 1 of 2 scenes it cannot be judged, as the reference itself is good to 0.002 only."
+    )
+    assert "in 1 of 2 scenes it cannot" in lead((1e-5, 2e-4), (9e-4, 9e-4), 1e-3)  # 9e-4 + 2e-4 > 1e-3
+
+
+def test_the_lead_takes_the_loosest_accuracy_whatever_the_order() -> None:
+    assert lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-6, 1e-2) == lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-2, 1e-6)
+    assert "within 0.01" in lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-6, 1e-2)
+
+
+def point(error: float) -> trade.Choice:
+    return trade.Choice(3, True, "fox-goodwin", 100, error, 1e-6)
+
+
+def test_the_best_found_stands_where_it_belongs() -> None:
+    def said(error: float, known: float, *wanted: float) -> str:
+        return advice._advised([point(error)], known, wanted, lambda choice: "P")
+
+    assert said(2e-4, 1e-6, 1e-5, 1e-3) == (
+        "for 1e-3 take P: 1 µs per variant; 1e-5 is not reached (the best found: 0.0002, P)"
+    )
+    assert said(9e-4, 1.6e-3, 1e-3, 1e-6) == (
+        "1e-3 and 1e-6 cannot be judged, as the reference itself is good to 0.0016 only (nearer to it than that is P)"
+    )
+    assert said(1.3e-3, 1.2e-3, 1e-3, 1e-6) == (
+        "1e-3 cannot be judged, as the reference itself is good to 0.0012 only (the best found: 0.0013, P); "
+        "1e-6 is not reached"
+    )
+
+
+def test_schemes_without_an_order_are_told_as_such() -> None:
+    dataset = precision.small().copy(deep=True)
+    dataset.fitted_order.loc[{"scheme": ["average-acceleration"]}] = np.nan
+    said = advice._orders(dataset)
+    told, _, none = said.partition("not in their order with these steps in any scene: ")
+    assert "average acceleration" in none and "average acceleration" not in told and "Fox-Goodwin" in told
