@@ -1,16 +1,16 @@
-"""What rides on a body: a force or a mass, with its motion and its start."""
+"""What rides on a body: a force, a mass or a mass on a spring, with its motion and its start."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from engine.motions import AnyMotion
 from engine.spec import KindOf, Spec
-from engine.units import Force, Length, Mass, Time, fault
+from engine.units import Damping, Force, Length, Mass, Stiffness, Time, fault
 
 
 class Carriage(Spec):
@@ -18,7 +18,10 @@ class Carriage(Spec):
 
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
     headway: instead of a delay, the metres of its own way by which it trails a carriage that sets off at time 0.
+    masses: keys that hold parts of its mass in kg.
     """
+
+    masses: ClassVar[tuple[str, ...]] = ()
 
     on: str
     motion: AnyMotion
@@ -26,9 +29,9 @@ class Carriage(Spec):
     headway: Length | None = Field(default=None, ge=0)
 
     @property
-    @abstractmethod
     def moving_mass(self) -> float:
-        """kg whose inertia acts at the contact."""
+        """kg of the whole carriage."""
+        return float(sum(getattr(self, key) for key in self.masses))
 
     @abstractmethod
     def weight(self, gravity: float) -> float:
@@ -63,10 +66,6 @@ class ForceCarriage(Carriage):
     kind: Literal["force"]
     force: Force
 
-    @property
-    def moving_mass(self) -> float:
-        return 0.0
-
     def weight(self, gravity: float) -> float:
         return self.force
 
@@ -74,16 +73,30 @@ class ForceCarriage(Carriage):
 class MassCarriage(Carriage):
     """A rigid mass in kg that stays in contact; its weight acts."""
 
+    masses: ClassVar[tuple[str, ...]] = ("mass",)
+
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
 
-    @property
-    def moving_mass(self) -> float:
-        return self.mass
+    def weight(self, gravity: float) -> float:
+        return self.moving_mass * gravity
+
+
+class OscillatorCarriage(Carriage):
+    """A sprung mass (kg) on a spring (N/m) and a damper (N s/m) over a wheel (kg) that stays in contact; the weights of
+    both masses act."""
+
+    masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
+
+    kind: Literal["oscillator"]
+    mass: Mass = Field(gt=0)
+    wheel_mass: Mass = Field(default=0.0, ge=0)
+    stiffness: Stiffness = Field(gt=0)
+    damping: Damping = Field(default=0.0, ge=0)
 
     def weight(self, gravity: float) -> float:
-        return self.mass * gravity
+        return self.moving_mass * gravity
 
 
-CARRIAGES: Mapping[str, type[Spec]] = {"force": ForceCarriage, "mass": MassCarriage}
-AnyCarriage = Annotated[Carriage, KindOf("carriage", CARRIAGES, planned=("oscillator", "body"))]
+CARRIAGES: Mapping[str, type[Spec]] = {"force": ForceCarriage, "mass": MassCarriage, "oscillator": OscillatorCarriage}
+AnyCarriage = Annotated[Carriage, KindOf("carriage", CARRIAGES, planned=("body",))]

@@ -222,12 +222,12 @@ def _moving_track(model: SceneModel, segment: Segment, offsets: tuple[float, ...
 
 def check_comparison(scheme: ComparisonScheme, model: SceneModel) -> None:
     """Refuse a scene that a comparison scheme cannot march. Raises BadInput."""
-    if len(model.carriages) != 1 or model.dampers:
+    if model.ties != 1:
         raise BadInput(
             f"{scheme.name} is for comparison only",
             where=model.study.source.where("carriage"),
-            expected="one carriage and no dampers",
-            received=f"{len(model.carriages)} carriages and {len(model.dampers)} dampers",
+            expected="one carriage, no dampers and no springs",
+            received=f"{len(model.carriages)} carriages, {len(model.dampers)} dampers, {len(model.springs)} springs",
         )
     carriage = model.carriages[0]
     if isinstance(scheme.rule, RigidTie) and (carriage.inertia != "mass" or model.bodies[carriage.body].own_weight):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.schemes import Scheme
+from engine.lanes import LaneValues
 from engine.model import SceneModel
 from results_schema.errors import BadInput
 
@@ -114,8 +115,8 @@ def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Count
         _check_alias(model, time_scale, steps)
 
 
-def allow_any_steps(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
-    """In place of `check_fixed_steps` where accuracy is not the question."""
+def allow_any_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
+    """In place of `resonance.check_steps` where accuracy is not the question."""
 
 
 def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:

@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 
 #: Keys of numbers that a lane may have to itself.
 LANE_KEYS = re.compile(
-    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)|carriage\.\w+\.(mass|force|delay|headway)"
+    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)|carriage\.\w+\.(mass|wheel_mass"
+    r"|stiffness|damping|force|delay|headway)"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
@@ -68,14 +69,14 @@ class LaneValues:
         }
 
     def moving_mass(self, carriage: str) -> Array:
-        """(V,) kg."""
-        inertial = self.study.carriage[carriage].inertial
-        return self.of(f"carriage.{carriage}.mass") if inertial else np.zeros(self.size)
+        """(V,) kg of a whole carriage."""
+        keys = self.study.carriage[carriage].masses
+        return sum((self.of(f"carriage.{carriage}.{key}") for key in keys), np.zeros(self.size))
 
     def weight(self, carriage: str) -> Array:
         """(V,) N along gravity."""
         if self.study.carriage[carriage].inertial:
-            return self.of(f"carriage.{carriage}.mass") * self.of("gravity")
+            return self.moving_mass(carriage) * self.of("gravity")
         return self.of(f"carriage.{carriage}.force")
 
     def damping_rates(self, body: str, omega: Array) -> Array:
@@ -116,16 +117,19 @@ def from_blocks(blocks: Array, size: int) -> Array:
 class LaneTable:
     """Numbers of whole blocks of variants of one scene, in SI units.
 
-    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mass, weight (blocks, ties, LANES): of the carriages, zero
-    for dampers and, mass, for carriages whose inertia does not act;  damper (blocks, ties, LANES): N s/m, zero for
-    carriages;  time_scale, gravity (blocks, LANES).
+    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mobility (blocks, N, LANES): 1, and 1/m (1/kg) of sprung
+    masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches
+    the body and has inertia;  damper, spring (blocks, ties, LANES): N s/m and N/m, zero for carriages;
+    time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
     rates: Array
+    mobility: Array
     mass: Array
     weight: Array
     damper: Array
+    spring: Array
     time_scale: Array
     gravity: Array
 
@@ -135,7 +139,9 @@ class LaneTable:
         return Lanes(
             stiffness=(self.omega[:, None] * h) ** 2,
             damping=self.rates * h,
+            mobility=self.mobility,
             gain=self.mass + self.damper * h,
+            stiff=self.spring * h**2,
             load=self.weight * h**2,
             gravity=self.gravity,
             step=step,
@@ -146,15 +152,30 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     """The lanes of some variants, whose number must be a multiple of LANES."""
     rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
     none = np.zeros(values.size)
-    masses = [none if c.inertia == "force" else values.moving_mass(c.name) for c in model.carriages]
     weights = [values.weight(c.name) for c in model.carriages]
-    no_dampers, no_carriages = [none] * len(model.dampers), [none] * len(model.carriages)
+    masses = [_contact_mass(model, values, number) for number in range(len(model.carriages))]
+    sprung = [f"carriage.{model.carriages[spring.carriage].name}" for spring in model.springs]
+    carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
+    coefficients = [values.of(key) for key in (*(d.key for d in model.dampers), *(f"{one}.damping" for one in sprung))]
+    ones = np.ones((model.body_modes, values.size))
     return LaneTable(
         omega=model.omega,
-        rates=to_blocks(np.concatenate(rates)),
-        mass=to_blocks(np.stack(masses + no_dampers)),
-        weight=to_blocks(np.stack(weights + no_dampers)),
-        damper=to_blocks(np.stack(no_carriages + [values.of(damper.key) for damper in model.dampers])),
+        rates=to_blocks(np.concatenate([*rates, np.zeros((len(springs), values.size))])),
+        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.of(f"{one}.mass")[None] for one in sprung)])),
+        mass=to_blocks(np.stack(masses + dampers + springs)),
+        weight=to_blocks(np.stack(weights + dampers + springs)),
+        damper=to_blocks(np.stack(carriages + coefficients)),
+        spring=to_blocks(np.stack(carriages + dampers + [values.of(f"{one}.stiffness") for one in sprung])),
         time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
         gravity=to_blocks(values.of("gravity")),
     )
+
+
+def _contact_mass(model: SceneModel, values: LaneValues, number: int) -> Array:
+    """(V,) kg of a carriage whose inertia acts where it touches its body."""
+    carriage = model.carriages[number]
+    if carriage.inertia == "force":
+        return np.zeros(values.size)
+    if model.spring_of(number) is None:
+        return values.moving_mass(carriage.name)
+    return values.of(f"carriage.{carriage.name}.wheel_mass")

@@ -83,14 +83,23 @@ class March:
         watch, record = self._observed(segment)
         stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
         if segment.strikes:
-            active = np.array([*segment.active, *([False] * len(model.dampers))])
+            active = np.zeros(model.ties, dtype=np.bool_)
+            active[: len(model.carriages)] = segment.active
             mass = np.where(active[:, None], self.lanes.mass, 0.0)
+            self._board(segment)
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
         if segment.fresh:
             settle(table.ties, stepped, self.state)
         if unseen:
             watch_start(table.ties, stepped, self.state, watch, record, segment.first)
         self._steps(segment, table.ties, stepped, watch, record)
+
+    def _board(self, segment: Segment) -> None:
+        """Sprung masses that arrive were at rest on level ground, whatever they did where they did not matter."""
+        arriving = {blow.rider for blow in segment.strikes if blow.kind == "arrival"}
+        for spring in self.tables.model.springs:
+            if spring.carriage in arriving:
+                self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0
 
     def _observed(self, segment: Segment) -> tuple[Watch, Record]:
         """What is observed along a segment, and where it is kept."""
@@ -165,7 +174,19 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
             place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length)
             soft = part.modal.shape(place.reshape(1))[0] / part.modal.omega**2
             q[:, part.modes] += soft[:, None] * lanes.weight[:, r, None]
+        _carry_sprung(model, lanes, q)
     return State(q, np.zeros(shape), np.zeros(shape), np.zeros(shape))
+
+
+def _carry_sprung(model: SceneModel, lanes: LaneTable, q: Array) -> None:
+    """Put the sprung masses where their bodies carry them: each spring has just the weight."""
+    for spring in model.springs:
+        carriage = model.carriages[spring.carriage]
+        if carriage.rider.touches(0.0, 1e-9):
+            part = model.bodies[carriage.body]
+            place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length).reshape(1)
+            lift = part.modal.shape(place)[0][:, None] * q[:, part.modes]
+            q[:, spring.mode] = lift.sum(axis=1) + model.sag(carriage.body, place, 0)[0] * lanes.gravity
 
 
 def _blank_marks(blocks: int, signals: int) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
 from engine.bodies.modal import ModalBody
+from engine.carriages import OscillatorCarriage
 from engine.kernels.schemes import Scheme
 from engine.scene import Study
 from engine.timeline import Rider
@@ -43,12 +44,26 @@ class BodyPart:
 
 @dataclass(frozen=True, eq=False)
 class CarriageTie:
-    """A carriage as the march sees it: its body's number, its way, and which of its inertia terms act."""
+    """A carriage as the march sees it: its body's number, its way, and which inertia terms act at its contact."""
 
     name: str
     body: int
     rider: Rider
     inertia: Inertia
+
+
+@dataclass(frozen=True, eq=False)
+class SpringTie:
+    """The spring and damper under a carriage's sprung mass.
+
+    carriage: its number. mode: of the mass, whose coordinate is its displacement (m) from where the spring carries it
+    on a level track; so the tie's force is what the spring has beyond the weight, which stays with the contact.
+    damped: whether there is a damper.
+    """
+
+    carriage: int
+    mode: int
+    damped: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +84,29 @@ class DamperTie:
 
 @dataclass(frozen=True, eq=False)
 class SceneModel:
-    """Bodies, carriages and dampers of one scene; modes of all bodies stand in one row."""
+    """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
+    them."""
 
     study: Study
     bodies: tuple[BodyPart, ...]
     carriages: tuple[CarriageTie, ...]
     dampers: tuple[DamperTie, ...]
+    springs: tuple[SpringTie, ...] = ()
 
     @property
     def ties(self) -> int:
-        """Number of ties: carriages first, then dampers."""
-        return len(self.carriages) + len(self.dampers)
+        """Number of ties: carriages first, then dampers, then springs."""
+        return len(self.carriages) + len(self.dampers) + len(self.springs)
+
+    @property
+    def body_modes(self) -> int:
+        """Number of modes of all bodies."""
+        return sum(part.modal.omega.size for part in self.bodies)
 
     @cached_property
     def omega(self) -> Array:
-        """(N,) natural frequencies of all bodies, rad/s."""
-        return np.concatenate([part.modal.omega for part in self.bodies])
+        """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass."""
+        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(len(self.springs))])
 
     @cached_property
     def scheme(self) -> Scheme:
@@ -107,9 +129,20 @@ class SceneModel:
         """The ways of all carriages."""
         return tuple(carriage.rider for carriage in self.carriages)
 
+    def spring_of(self, carriage: int) -> int | None:
+        """Number of the spring tie of a carriage, counted among all ties; None where it has none."""
+        first = len(self.carriages) + len(self.dampers)
+        return next((r for r, spring in enumerate(self.springs, start=first) if spring.carriage == carriage), None)
+
+    def reacts(self, carriage: int) -> bool:
+        """Whether the contact force of a carriage depends on how its body moves."""
+        return self.carriages[carriage].inertia != "force" or self.spring_of(carriage) is not None
+
     @property
     def fidelity(self) -> Fidelity:
         """The model that this scene marches: the fullest of its carriages'."""
+        if self.springs:
+            return Fidelity.TIED
         kinds = {carriage.inertia for carriage in self.carriages}
         if "mass" in kinds:
             return Fidelity.MASS
@@ -143,14 +176,15 @@ def build_model(
     for name, carriage in study.carriage.items():
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
-        carriages.append(CarriageTie(name, body, rider, _inertia(study.solver.fidelity, carriage.inertial)))
+        carriages.append(CarriageTie(name, body, rider, _inertia(study, name, swept)))
     dampers = [
         DamperTie(number, at, f"body.{name}.{key}")
         for number, name in enumerate(used)
         for key, at, coefficient in study.body[name].dampers()
         if coefficient > 0.0 or f"body.{name}.{key}" in swept
     ]
-    model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers))
+    springs = _springs(study, first, swept)
+    model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers), springs)
     _check_rigid_modes(model)
     _check_weights(model)
     return model
@@ -169,11 +203,30 @@ def _in_use(study: Study, body: str) -> bool:
     return ridden or any(study.body_of(sensor) == body for sensor in study.sensor)
 
 
-def _inertia(fidelity: str, inertial: bool) -> Inertia:
-    """The terms of a carriage that act at a fidelity; "auto" is the carriage's own kind in full."""
-    if fidelity == "force" or not inertial:
+def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
+    """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
+    fidelity, carriage = study.solver.fidelity, study.carriage[name]
+    if fidelity == "force" or not carriage.inertial:
         return "force"
+    if _sprung(study, name):
+        wheel = f"carriage.{name}.wheel_mass"
+        return "mass" if study.value(wheel) > 0.0 or wheel in swept else "force"
     return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
+
+
+def _sprung(study: Study, name: str) -> bool:
+    """Whether a carriage's spring acts; below the full fidelity it is locked."""
+    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity == "auto"
+
+
+def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
+    """The springs of all sprung masses, whose modes are counted from ``first``."""
+    found: list[SpringTie] = []
+    for number, name in enumerate(study.carriage):
+        if _sprung(study, name):
+            key = f"carriage.{name}.damping"
+            found.append(SpringTie(number, first + len(found), study.value(key) > 0.0 or key in swept))
+    return tuple(found)
 
 
 def _body_part(study: Study, name: str, first: int) -> BodyPart:

@@ -191,7 +191,7 @@ class ModalEquations:
 def check_smooth(model: SceneModel, static: Sequence[str]) -> None:
     """Refuse scenes that these equations do not describe. static: quantities that sensors may read. Raises BadInput."""
     study = model.study
-    if len(model.carriages) != 1 or model.dampers or model.carriages[0].inertia != "mass":
+    if model.ties != 1 or model.carriages[0].inertia != "mass":
         _refuse(model, "carriage", "exactly one carriage, a mass with all of its terms, and no dampers")
     if any(part.own_weight for part in model.bodies) or len(model.bodies) != 1:
         _refuse(model, "body", "one body, whose own weight does not act")

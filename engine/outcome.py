@@ -66,7 +66,7 @@ def run_chunk(
         "status": status,
         "diverged_step": diverged_step,
         "fidelity_used": np.full(variants.size, int(tables.model.fidelity), dtype=np.int8),
-        "modes_used": np.full(variants.size, tables.model.omega.size, dtype=np.int32),
+        "modes_used": np.full(variants.size, tables.model.body_modes, dtype=np.int32),
         "steps_used": np.full(variants.size, tables.steps, dtype=np.int32),
     }
     return flat, _histories(plan, bucket, variants, halted)
@@ -113,7 +113,7 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
 def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
     """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
     marks = marched.marks[len(tables.sensors) + carriage]
-    if tables.model.carriages[carriage].inertia == "force":
+    if not tables.model.reacts(carriage):
         return np.full(marks.shape[-1], -1.0)
     early, late = marched.guard[carriage][BELOW_AT], marks[BELOW_AT]
     return np.asarray(np.where(early >= 0.0, early, late))
@@ -125,9 +125,9 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     diverged = np.isfinite(first) | ~marched.finite
     sensors = len(marched.marks) - len(marched.guard)
-    inertial = [c for c, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
+    reacting = [c for c in range(len(model.carriages)) if model.reacts(c)]
     below = np.concatenate(
-        [marched.marks[[sensors + c for c in inertial], BELOW_AT], marched.guard[inertial, BELOW_AT]]
+        [marched.marks[[sensors + c for c in reacting], BELOW_AT], marched.guard[reacting, BELOW_AT]]
     )
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))

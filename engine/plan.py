@@ -13,13 +13,14 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.fidelity import Needs, check_even_steps, check_fixed_steps, check_most_steps, needed_steps, round_up
+from engine.fidelity import Needs, check_even_steps, check_most_steps, needed_steps, round_up
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.lanes import LANE_KEYS, LaneValues
 from engine.model import SceneModel, build_model, check_moves
 from engine.reduction import Reduction
 from engine.resolution import steps_to_resolve
+from engine.resonance import check_steps, spring_steps
 from engine.scene import Study
 from engine.sweep import Cases, expand
 from engine.tables import SceneTables
@@ -28,7 +29,7 @@ from results_schema.errors import BadInput
 from results_schema.variables import declarations
 
 Counts = NDArray[np.int64]
-CheckSteps = Callable[[SceneModel, NDArray[np.float64], Counts], None]
+CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
 PAIR = 2.5  # times the work of one march: a Richardson pair, 1.5 of it by its steps; for expected times only
@@ -187,7 +188,7 @@ def _even(size: int, most: int) -> int:
     return LANES * max(1, -(-size // (parts * LANES)))
 
 
-def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: CheckSteps = check_fixed_steps) -> Plan:
+def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: CheckSteps = check_steps) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed.
 
     check_steps: refuses fixed steps that cannot be right.
@@ -304,13 +305,14 @@ def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tu
         steps = values.of("solver.steps").astype(np.int64)
         check_even_steps(scene, steps)
         check_most_steps(scene, steps)
-        check_steps(scene, time_scale, steps)
+        check_steps(scene, values, steps)
         return steps, lambda part: "as the study says"
     distinct, inverse = np.unique(time_scale, return_inverse=True)
-    needs = needed_steps(scene, distinct)
+    needs, own = needed_steps(scene, distinct), spring_steps(scene, values)
     if scene.scheme.stride > 1:
-        per_rule = {name: needed[inverse] for name, needed in needs.per_rule.items()}
-        needs = Needs(per_rule | {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)})
+        own |= {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)}
+    if own:
+        needs = Needs({name: needed[inverse] for name, needed in needs.per_rule.items()} | own)
         inverse = np.arange(values.size)
     check_most_steps(scene, needs.total)
     return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
@@ -350,7 +352,7 @@ def explain(plan: Plan) -> list[Mapping[str, object]]:
         {
             "variants": int(bucket.variants.size),
             "fidelity": bucket.scene.fidelity.name.lower().replace("_", "-"),
-            "modes": int(bucket.scene.omega.size),
+            "modes": bucket.scene.body_modes,
             "steps": bucket.steps,
             "reason": bucket.reason,
             "seconds": bucket.seconds_per_variant * bucket.variants.size,

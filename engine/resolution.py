@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from engine.lanes import LaneValues
 from engine.model import SceneModel
+from engine.resonance import bounce_omega
 from engine.tables import SceneTables
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def _worst(model: SceneModel, values: LaneValues, gathered: Array, square: Array
         memory = np.divide(2.0, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
         behind = part.modal.omega[:, None] ** 3 / 12.0 * np.minimum(gathered, memory * square)
         worst = np.maximum(worst, behind.max(axis=0))
-    return worst
+    return np.maximum(worst, bounce_omega(model, values) ** 3 / 12.0 * gathered)
 
 
 def _free_seconds(model: SceneModel) -> float:

@@ -103,7 +103,7 @@ class Study(Scene):
     def body_of(self, sensor: str) -> str:
         """Name of the body that a sensor reads."""
         place = self.sensor[sensor]
-        return self.carriage[place.under].on if place.under is not None else str(place.body)
+        return self.carriage[place.rides].on if place.rides is not None else str(place.body)
 
     def value(self, path: str) -> Any:
         """The value at a dotted key, SI, defaults included. KeyError where there is none.
@@ -247,8 +247,12 @@ def _check_references(study: Study) -> None:
         _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
     for name, sensor in study.sensor.items():
         here = f"sensor.{name}"
-        if sensor.under is not None:
-            _must_exist(study, f"{here}.under", sensor.under, "carriage")
+        if sensor.rides is not None:
+            _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
+        if sensor.carriage is not None and not hasattr(study.carriage[sensor.carriage], "stiffness"):
+            where = study.source.where(f"{here}.carriage")
+            remedy = f'under = "{sensor.carriage}" reads the body where the carriage touches it'
+            raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
         if sensor.body is not None:
             _must_exist(study, f"{here}.body", sensor.body, "body")
         body = study.body_of(name)

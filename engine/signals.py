@@ -80,7 +80,8 @@ class Sensor:
             return found
         for r, (carriage, way) in enumerate(zip(model.carriages, along, strict=True)):
             if way.active and carriage.body == self.body:
-                found[:, r] = self._full(model, along, way.s) - self._kept(model, along, way.shape(self._modal(model)))
+                missing = self._full(model, along, way.s) - self._kept(model, along, way.shape(self._modal(model)))
+                found[:, contact_ties(model, r)] = np.broadcast_to(missing, found.shape[:1])[:, None]
         for r, damper in enumerate(model.dampers, start=len(model.carriages)):
             if damper.body == self.body:
                 kept = self._kept(model, along, damper.row(self._modal(model))[None, :])
@@ -154,6 +155,10 @@ class Sensor:
             return way.ds * slope
         return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
 
+    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations,): its static reading by the body's own weight per unit gravity."""
+        return self.offset(model, along) if self.offset_order == 0 else np.zeros(along[0].s.size)
+
     @property
     def offset_order(self) -> int:
         """The power of 1/h that makes the offset SI."""
@@ -162,6 +167,32 @@ class Sensor:
     def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, self.under is None or along[self.under].active)
+
+
+@dataclass(frozen=True, eq=False)
+class SprungSensor(Sensor):
+    """The motion of a carriage's sprung mass, whose coordinate stands at ``mode``; its static reading is the deflection
+    under its carriage by the kept modes, which its spring touches."""
+
+    mode: int
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        row = np.zeros((1, model.omega.size))
+        row[0, self.mode] = 1.0
+        return [Channel("qva"[self.offset_order], self.offset_order, row)]
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((along[0].s.size, model.ties))
+
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...], rider: int) -> Array:
+        return self._kept(model, along, along[rider].shape(self._modal(model)))
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        x = self.places(along)
+        return model.sag(self.body, x, 0) if self.offset_order == 0 else np.zeros(x.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +206,7 @@ class ContactForce:
 
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         found = np.zeros((along[0].s.size, model.ties))
-        found[:, self.carriage] = 1.0
+        found[:, contact_ties(model, self.carriage)] = 1.0
         return found
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
@@ -197,6 +228,12 @@ class ContactForce:
 Signal = Sensor | ContactForce
 
 
+def contact_ties(model: SceneModel, carriage: int) -> list[int]:
+    """The ties whose forces add up to the contact force of a carriage."""
+    spring = model.spring_of(carriage)
+    return [carriage] if spring is None else [carriage, spring]
+
+
 def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, float]:
     """Places between which a contact force counts: a pinned or clamped end is left out where the way leads to it."""
     length = rider.length
@@ -214,9 +251,13 @@ def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) 
     names = [carriage.name for carriage in model.carriages]
     sensors: list[Signal] = []
     for name, spec in model.study.sensor.items():
-        under = None if spec.under is None else names.index(spec.under)
-        at = 0.0 if spec.at is None else spec.at
-        sensors.append(Sensor(name, spec.quantity, bodies.index(model.study.body_of(name)), at, under))
+        under = None if spec.rides is None else names.index(spec.rides)
+        at, body = 0.0 if spec.at is None else spec.at, bodies.index(model.study.body_of(name))
+        sprung = [spring.mode for spring in model.springs if spec.carriage is not None and spring.carriage == under]
+        if sprung:
+            sensors.append(SprungSensor(name, spec.quantity, body, at, under, sprung[0]))
+        else:
+            sensors.append(Sensor(name, spec.quantity, body, at, under))
     for carriage in accelerated:
         name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
         sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))

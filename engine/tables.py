@@ -186,7 +186,7 @@ class SceneTables:
         shape = (counts.size, len(self.sensors), len(along))
         force, slope, gravity = np.zeros(shape), np.zeros(shape), np.zeros(shape[:2])
         for j, sensor in enumerate(self.sensors):
-            gravity[:, j] = sensor.offset(self.model, along) if sensor.offset_order == 0 else 0.0
+            gravity[:, j] = sensor.sagging(self.model, along)
             for r in range(len(along)):
                 if along[r].active:
                     force[:, j, r] = np.where(here[r], self._unit(sensor, along, r), 0.0)

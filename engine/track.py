@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from engine.bodies.modal import ModalBody
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Alpha, Blow, Newmark, Ties
-from engine.model import CarriageTie, SceneModel
+from engine.model import CarriageTie, SceneModel, SpringTie
 from engine.timeline import Segment
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | A
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment."""
     stations = along[0].s.size
     rows = np.zeros((stations, model.omega.size, model.ties, 4))
-    drive = np.zeros((stations, model.ties))
+    drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
     for r, (carriage, way) in enumerate(zip(model.carriages, along, strict=True)):
         if way.active:
             _tabulate_carriage(model, carriage, way, rows[:, :, r], drive[:, r])
@@ -68,12 +68,19 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | A
         shape = damper.row(part.modal)
         rows[:, part.modes, r, FORCE] = shape
         rows[:, part.modes, r, RATE] = shape
-    inertial = np.array([carriage.inertia != "force" for carriage in model.carriages] + [False] * len(model.dampers))
+    first = len(model.carriages) + len(model.dampers)
+    for r, spring in enumerate(model.springs, start=first):
+        if along[spring.carriage].active:
+            _tabulate_spring(model, spring, along[spring.carriage], rows[:, :, r], (drive[:, r], level[:, r]))
+    inertial, springs = np.zeros(model.ties, dtype=np.bool_), np.arange(model.ties) >= first
+    inertial[: len(model.carriages)] = [carriage.inertia != "force" for carriage in model.carriages]
     rows[..., CLOSED] = np.where(inertial, rows[..., FORCE], 0.0)
     rows[1:, ..., CLOSED] += scheme.gamma * rows[1:, ..., RATE] + scheme.beta * rows[1:, ..., CURVE]
-    reacts = inertial.copy()
-    reacts[len(model.carriages) :] = True
-    return Ties(np.ascontiguousarray(rows), drive, np.flatnonzero(reacts), np.flatnonzero(~reacts))
+    moves = inertial.copy()
+    moves[len(model.carriages) :] = [*(True for _ in model.dampers), *(spring.damped for spring in model.springs)]
+    given = np.flatnonzero(~(moves | springs))
+    reacting = np.flatnonzero(moves | springs)
+    return Ties(np.ascontiguousarray(rows), drive, level, reacting, given, moves, springs)
 
 
 def _tabulate_carriage(model: SceneModel, carriage: CarriageTie, way: Way, rows: Array, drive: Array) -> None:
@@ -87,6 +94,20 @@ def _tabulate_carriage(model: SceneModel, carriage: CarriageTie, way: Way, rows:
     rows[:, part.modes, RATE] = 2.0 * ds * slope
     rows[:, part.modes, CURVE] = ds**2 * bend + dds * slope
     drive[:] = way.ds**2 * model.sag(carriage.body, way.s, 2) + way.dds * model.sag(carriage.body, way.s, 1)
+
+
+def _tabulate_spring(model: SceneModel, spring: SpringTie, way: Way, rows: Array, own: tuple[Array, Array]) -> None:
+    """p = (phi, -1);  A = p;  B = s' phi' (mechanics section 4): the body's deflection and its material rate less those
+    of the mass. own: rate and gap of the body's own sag, which this fills."""
+    carriage = model.carriages[spring.carriage]
+    part, (drive, level) = model.bodies[carriage.body], own
+    rows[:, part.modes, FORCE] = way.shape(part.modal)
+    rows[:, spring.mode, FORCE] = -1.0
+    level[:] = model.sag(carriage.body, way.s, 0)
+    if spring.damped:
+        rows[..., RATE] = rows[..., FORCE]
+        rows[:, part.modes, CURVE] = way.ds[:, None] * way.shape(part.modal, 1)
+        drive[:] = way.ds * model.sag(carriage.body, way.s, 1)
 
 
 def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: Array) -> Blow:

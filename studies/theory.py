@@ -67,8 +67,8 @@ def lag(results: Results, sensor: str) -> Any:
 
 
 def lag_factor(results: Results, sensor: str) -> int:
-    """2 for a sensor at a fixed place, 1 under a carriage."""
-    return 2 if results.study.sensor[sensor].under is None else 1
+    """2 for a sensor at a fixed place, 1 under or on a carriage."""
+    return 2 if results.study.sensor[sensor].rides is None else 1
 
 
 def lag_formula(results: Results, sensor: str) -> str:
@@ -134,6 +134,8 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     swept = {path for axis in results.axes for path in axis.paths}
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
     if mass is None or swept & fixed or not isinstance(motion, Sinusoidal):
+        return None
+    if results.carriage.masses != ("mass",):  # a spring keeps part of the mass from following
         return None
     if not isinstance(body, Beam) or body.supports != "pinned-pinned":
         return None

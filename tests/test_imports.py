@@ -20,12 +20,12 @@ STAGES = {
     "formulas": "kernels kernels.layout kernels.schemes",
     "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
     "bodies bodies.body bodies.beam bodies.frame bodies.frame_geometry bodies.frame_rules bodies.reduced",
-    "numbers only": "kernels.jit kernels.record kernels.pairs kernels.stepping kernels.start kernels.march "
-    "kernels.comparison_steps kernels.comparison",
+    "numbers only": "kernels.jit kernels.record kernels.pairs kernels.stepping kernels.ties kernels.start "
+    "kernels.march kernels.comparison_steps kernels.comparison",
     "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics bodies.flexibility "
     "bodies.craig_bampton bodies.frame_elements bodies.frame_assembly bodies.frame_track bodies.frame_shapes "
     "bodies.frame_statics bodies.frame_sections bodies.frame_points bodies.frame_body bodies.reduced_body bodies.build",
-    "scenes as arrays": "timeline model track signals lanes fidelity tables resolution",
+    "scenes as arrays": "timeline model track signals lanes fidelity tables resonance resolution",
     "all work of a study": "reduction plan histories remarks",
     "the run": "march richardson ode transition comparison outcome dataset execution",
 }

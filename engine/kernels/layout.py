@@ -25,29 +25,38 @@ class Ties(NamedTuple):
 
     rows:  (stations, modes, ties, 4): p, w, A, B of mechanics section 2; the tie's force enters the modes through
            p, and its kinematics read  P.q'' + A.q' + B.q  in step units, of which w = P + gamma A + beta B is the
-           implicit part.
+           implicit part. A spring reads the gap  p.q.
     drive: (stations, ties): the same kinematics of the track's own unevenness (per unit gravity where it is the
            body's sag).
+    level: (stations, ties): likewise its gap.
     reacting, given: numbers of the ties whose force depends on the motion, and of those that are dead loads.
+    moves, springs (ties): whether a tie's force depends on its kinematics, and whether on its gap.
     """
 
     rows: FloatArray
     drive: FloatArray
+    level: FloatArray
     reacting: IntArray
     given: IntArray
+    moves: BoolArray
+    springs: BoolArray
 
 
 class Lanes(NamedTuple):
     """What differs from variant to variant.
 
     stiffness (blocks, modes, LANES): (omega h)^2;  damping (blocks, modes, LANES): 2 zeta omega h;
-    gain (blocks, ties, LANES): m (kg), or c h for a damper;  load (blocks, ties, LANES): the tie's dead load times
-    h^2;  gravity, step (blocks, LANES): m/s^2, and h in s.
+    mobility (blocks, modes, LANES): acceleration per unit modal force, 1 for a mode of unit modal mass, 1/m for a
+    coordinate that is the place of a mass m;
+    gain (blocks, ties, LANES): m (kg), or c h for a damper;  stiff (blocks, ties, LANES): k h^2 of a spring;
+    load (blocks, ties, LANES): the tie's dead load times h^2;  gravity, step (blocks, LANES): m/s^2, and h in s.
     """
 
     stiffness: FloatArray
     damping: FloatArray
+    mobility: FloatArray
     gain: FloatArray
+    stiff: FloatArray
     load: FloatArray
     gravity: FloatArray
     step: FloatArray

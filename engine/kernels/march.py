@@ -7,7 +7,12 @@ F = load - gain (G + drive):
 
     F = (load + gain (w.c* - A.v* - B.u* - drive)) / (1 + gain w.(D p))        one tie; r ties: an r x r system
 
-The pass over the modes corrects step n, observes it, predicts step n + 1 and gathers the sums of its tie equation.
+A spring reads its gap  p.u = beta p.(D p) F - p.(beta c* - u*)  in the same way (section 4):
+
+    F = load - gain (G + drive) - stiff (p.u + level)
+
+``mobility`` multiplies D where it meets a force. The pass over the modes corrects step n, observes it, predicts step
+n + 1 and gathers the sums of its tie equation.
 """
 
 import numpy as np
@@ -42,6 +47,7 @@ from engine.kernels.record import (
     observe,
 )
 from engine.kernels.stepping import advance, corrected, fields_of, first_predictors, remember
+from engine.kernels.ties import Sums, gather_ties, push_four, push_on_mode, set_ties, solve_ties
 
 
 @piece
@@ -60,9 +66,10 @@ def load_block(work, b, lanes, state, scheme, block):
             c = lanes.damping[block, k, j]
             s = lanes.stiffness[block, k, j]
             d = 1.0 / (1.0 + gamma * c + beta * s)
+            m = lanes.mobility[block, k, j]
             q, v, a = state.q[block, k, j], state.v[block, k, j] * h, state.a[block, k, j] * h * h
             u, v, e = first_predictors(scheme, q, v, a, state.memory[block, k, j] * h * h)
-            work[k, D, j] = d
+            work[k, D, j] = m * d
             work[k, CD, j] = c * d
             work[k, KD, j] = s * d
             work[k, U, j] = u
@@ -172,113 +179,57 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
         copy_marks(record.marks[block], marks)
 
 
-@piece
-def gather_ties(sums, factor, work, ties, n, k):
-    """Add mode k to the sums of every reacting tie's equation at station n."""
-    rows = ties.rows
-    for i in range(sums.shape[0]):
-        r = ties.reacting[i]
-        w, rate, curve = rows[n, k, r, CLOSED], rows[n, k, r, RATE], rows[n, k, r, CURVE]
-        for j in range(LANES):
-            sums[i, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
-        for s in range(factor.shape[1]):
-            wp = w * rows[n, k, s, FORCE]
-            for j in range(LANES):
-                factor[i, s, j] += wp * work[k, D, j]
-
-
-@piece
-def close_ties(b, sums, factor, ties, lanes, block, n):
-    """Solve (I + gain w.(D p)) F = load + gain (sum - drive) of one block and clear the sums.
-
-    Dead loads go to the right-hand side. Gauss without pivoting: the matrix is the identity plus a product that is
-    positive wherever the march is stable.
-    """
-    count = sums.shape[0]
-    for s in range(ties.given.shape[0]):
-        for j in range(LANES):
-            b[TIE + ties.given[s], j] = lanes.load[block, ties.given[s], j]
-    for i in range(count):
-        r = ties.reacting[i]
-        drive = ties.drive[n, r]
-        for j in range(LANES):
-            gain = lanes.gain[block, r, j]
-            b[TIE + r, j] = lanes.load[block, r, j] + gain * (sums[i, j] - drive * b[GRAVITY, j])
-            sums[i, j] = 0.0
-        for s in range(factor.shape[1]):
-            one = 1.0 if r == s else 0.0
-            for j in range(LANES):
-                factor[i, s, j] = one + lanes.gain[block, r, j] * factor[i, s, j]
-        for s in range(ties.given.shape[0]):
-            for j in range(LANES):
-                b[TIE + r, j] -= factor[i, ties.given[s], j] * b[TIE + ties.given[s], j]
-    for i in range(count):
-        r = ties.reacting[i]
-        for m in range(i + 1, count):
-            for j in range(LANES):
-                ratio = factor[m, r, j] / factor[i, r, j]
-                factor[m, r, j] = ratio
-                b[TIE + ties.reacting[m], j] -= ratio * b[TIE + r, j]
-            for t in range(i + 1, count):
-                for j in range(LANES):
-                    factor[m, ties.reacting[t], j] -= factor[m, r, j] * factor[i, ties.reacting[t], j]
-    for i in range(count - 1, -1, -1):
-        r = ties.reacting[i]
-        for m in range(i + 1, count):
-            for j in range(LANES):
-                b[TIE + r, j] -= factor[i, ties.reacting[m], j] * b[TIE + ties.reacting[m], j]
-        for j in range(LANES):
-            b[TIE + r, j] /= factor[i, r, j]
-    factor[:] = 0.0
-
-
-@piece
-def push_on_mode(b, rows, n, k):
-    """b[PUSH] = sum over the ties of p F of mode k at station n."""
-    for j in range(LANES):
-        b[PUSH, j] = 0.0
-    for r in range(rows.shape[2]):
-        p = rows[n, k, r, FORCE]
-        for j in range(LANES):
-            b[PUSH, j] += p * b[TIE + r, j]
-
-
 @kernel
 def march_many(ties, lanes, state, watch, record, scheme, count):
     """March one segment with any number of ties; otherwise as ``march_one``."""
     rows = ties.rows
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
+    reacting = ties.reacting.shape[0]
+    still = watch.on_q.shape[1] == watch.signal.shape[0]  # only displacements are observed
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
-    b = np.zeros((TIE + many, LANES))
+    b = np.zeros((TIE + many + 4, LANES))  # ties are pushed in fours
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
-    sums = np.zeros((ties.reacting.shape[0], LANES))
-    factor = np.zeros((ties.reacting.shape[0], many, LANES))
+    pairs = 2 * ((many + 1) // 2)
+    sums = Sums(
+        np.zeros((reacting, LANES)),
+        np.zeros((reacting, LANES)),
+        np.zeros((reacting, pairs, LANES)),
+        np.zeros((reacting, pairs, LANES)),
+    )
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
-        sums[:] = 0.0
-        factor[:] = 0.0
-        for k in range(modes):
-            gather_ties(sums, factor, work, ties, 1, k)
-        for n in range(1, stations):
-            close_ties(b, sums, factor, ties, lanes, block, n)
-            if n == stations - 1:
+        for n in range(stations):
+            if n > 0:
+                set_ties(b, sums, ties, lanes, scheme.beta, block, n)
+                solve_ties(b, sums.factor, ties, lanes, block)
+                if n == stations - 1:
+                    for k in range(modes):
+                        push_on_mode(b, rows, n, k, 0)
+                        store_mode(work, b, state, scheme, block, k)
                 for k in range(modes):
-                    push_on_mode(b, rows, n, k)
-                    store_mode(work, b, state, scheme, block, k)
-            m = min(n + 1, stations - 1)
-            for k in range(modes):
-                push_on_mode(b, rows, n, k)
-                for j in range(LANES):
-                    a = work[k, D, j] * b[PUSH, j] - work[k, C, j]
-                    q, v, _, _, _ = advance(scheme, work, k, j, a)
-                    now[k, Q_NOW, j] = q
-                    now[k, V_NOW, j] = v
-                    now[k, A_NOW, j] = a
-                gather_ties(sums, factor, work, ties, m, k)
-            observe(marks, now, b, watch, n, 0)
-            keep(marks, history, watch, record.sample[n], n, float(count + n))
+                    p0, p1, p2, p3 = push_four(rows, n, k, 0)
+                    if many > 4 or n == stations - 1:
+                        push_on_mode(b, rows, n, k, 4)
+                    if still:
+                        for j in range(LANES):
+                            push = (p0 * b[TIE, j] + p1 * b[TIE + 1, j]) + (p2 * b[TIE + 2, j] + p3 * b[TIE + 3, j])
+                            a = work[k, D, j] * (push + b[PUSH, j]) - work[k, C, j]
+                            q, _, _, _, _ = advance(scheme, work, k, j, a)
+                            now[k, Q_NOW, j] = q
+                    else:
+                        for j in range(LANES):
+                            push = (p0 * b[TIE, j] + p1 * b[TIE + 1, j]) + (p2 * b[TIE + 2, j] + p3 * b[TIE + 3, j])
+                            a = work[k, D, j] * (push + b[PUSH, j]) - work[k, C, j]
+                            q, v, _, _, _ = advance(scheme, work, k, j, a)
+                            now[k, Q_NOW, j] = q
+                            now[k, V_NOW, j] = v
+                            now[k, A_NOW, j] = a
+                observe(marks, now, b, watch, n, 0)
+                keep(marks, history, watch, record.sample[n], n, float(count + n))
+            if n < stations - 1:
+                gather_ties(sums, work, ties, scheme.beta, n + 1)
         copy_marks(record.marks[block], marks)

@@ -56,7 +56,8 @@ def tie_row(rows, k, r):
 def settle(ties, lanes, state):
     """Accelerations that satisfy the equations of motion at station 0, for the given displacements and velocities.
 
-    The row w of station 0 holds P alone. F = load - gain (P.a + A.v + B.u + drive), a = p F - c v - k u.
+    The row w of station 0 holds P alone. F = load - gain (P.a + A.v + B.u + drive) - stiff (p.u + level),
+    a = mobility p F - c v - k u.
     """
     rows = ties.rows
     modes, many, reacting = rows.shape[1], rows.shape[2], ties.reacting.shape[0]
@@ -72,18 +73,21 @@ def settle(ties, lanes, state):
                 r = ties.reacting[i]
                 gain = lanes.gain[block, r, j]
                 total = -ties.drive[0, r] * lanes.gravity[block, j]
+                gap = ties.level[0, r] * lanes.gravity[block, j]
                 for t in range(reacting):
                     matrix[i, t] = 1.0 if i == t else 0.0
                 for k in range(modes):
                     inertial, rate, curve = tie_row(rows, k, r)
                     u, v = state.q[block, k, j], state.v[block, k, j] * h
                     elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
+                    mobile = lanes.mobility[block, k, j]
                     for s in ties.given:
-                        elastic -= rows[0, k, s, FORCE] * force[s]
+                        elastic -= mobile * rows[0, k, s, FORCE] * force[s]
                     total += inertial * elastic - rate * v - curve * u
+                    gap += rows[0, k, r, FORCE] * u
                     for t in range(reacting):
-                        matrix[i, t] += gain * inertial * rows[0, k, ties.reacting[t], FORCE]
-                unknown[i] = lanes.load[block, r, j] + gain * total
+                        matrix[i, t] += gain * inertial * mobile * rows[0, k, ties.reacting[t], FORCE]
+                unknown[i] = lanes.load[block, r, j] + gain * total - lanes.stiff[block, r, j] * gap
             solve_in_place(matrix, unknown)
             for i in range(reacting):
                 force[ties.reacting[i]] = unknown[i]
@@ -91,7 +95,7 @@ def settle(ties, lanes, state):
                 u, v = state.q[block, k, j], state.v[block, k, j] * h
                 a = -lanes.damping[block, k, j] * v - lanes.stiffness[block, k, j] * u
                 for r in range(many):
-                    a += rows[0, k, r, FORCE] * force[r]
+                    a += lanes.mobility[block, k, j] * rows[0, k, r, FORCE] * force[r]
                 state.a[block, k, j] = a / (h * h)
                 state.memory[block, k, j] = 0.0
 
@@ -147,10 +151,13 @@ def watch_start(ties, lanes, state, watch, record, count):
                 now[k, A_NOW, j] = state.a[block, k, j] * h * h
             for r in range(many):
                 motion = ties.drive[0, r] * lanes.gravity[block, j]
+                gap = ties.level[0, r] * lanes.gravity[block, j]
                 for k in range(modes):
                     inertial, rate, curve = tie_row(rows, k, r)
+                    gap += rows[0, k, r, FORCE] * now[k, Q_NOW, j]
                     motion += inertial * now[k, A_NOW, j] + rate * now[k, V_NOW, j] + curve * now[k, Q_NOW, j]
-                b[TIE + r, j] = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
+                force = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
+                b[TIE + r, j] = force - lanes.stiff[block, r, j] * gap
         observe(marks, now, b, watch, 0, 0)
         keep(marks, record.history[block], watch, record.sample[0], 0, float(count))
         for i in range(marks.shape[0]):

@@ -106,6 +106,9 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     if not carriage.inertial:
         where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
         raise BadInput("a force has no inertia that could fail", where=where, expected=expected)
+    if carriage.masses != ("mass",):
+        where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
+        raise BadInput("the maps know rigid masses only", where=where, expected=expected)
     if getattr(carriage.motion, "kind", "") != "cruise":
         where, expected = study.source.where(f"carriage.{name}.motion.kind"), '"cruise"'
         raise BadInput("the maps start from a passage", where=where, expected=expected)

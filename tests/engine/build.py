@@ -56,6 +56,11 @@ def force(newtons: float, motion: Table, **changes: Any) -> Table:
     return {"on": "bed", "kind": "force", "force": newtons, "motion": motion} | changes
 
 
+def oscillator(kilograms: float, stiffness: float, motion: Table, **changes: Any) -> Table:
+    """A sprung mass on the bed."""
+    return {"on": "bed", "kind": "oscillator", "mass": kilograms, "stiffness": stiffness, "motion": motion} | changes
+
+
 def fixed(at: float, quantity: str = "displacement", body: str = "bed") -> Table:
     """A sensor at a place."""
     return {"body": body, "at": at, "quantity": quantity}
@@ -64,6 +69,11 @@ def fixed(at: float, quantity: str = "displacement", body: str = "bed") -> Table
 def under(carriage: str, quantity: str = "displacement") -> Table:
     """A sensor at the point that a carriage touches."""
     return {"under": carriage, "quantity": quantity}
+
+
+def aboard(carriage: str, quantity: str = "displacement") -> Table:
+    """A sensor of a carriage's sprung mass."""
+    return {"carriage": carriage, "quantity": quantity}
 
 
 def study(bed: Table, carriages: Table | Mapping[str, Table], **changes: Any) -> Study:

@@ -27,13 +27,15 @@ class Reading:
     @cached_property
     def place(self) -> Array:
         """Where it reads at every instant, m; NaN where it does not."""
-        if self.sensor.under is None:
+        if self.sensor.rides is None:
             return np.full(self.twin.history.t.shape, self.sensor.at)
-        return self.twin.history.position[:, self.twin.riders.index(self.sensor.under)]
+        return self.twin.history.position[:, self.twin.riders.index(self.sensor.rides)]
 
     @property
     def values(self) -> Array:
         """(S,) what it reads."""
+        if self.sensor.carriage is not None:
+            return np.where(np.isnan(self.place), math.nan, self._aboard)
         if self.sensor.quantity in DERIVATIVE:
             history = self.twin.history
             read = zip(self.place, history.position, history.q, history.v, history.contact_force, strict=True)
@@ -41,9 +43,23 @@ class Reading:
         return np.array([math.nan if math.isnan(x) else self._rate(n) for n, x in enumerate(self.place)])
 
     @property
+    def _aboard(self) -> Array:
+        """The motion of a sprung mass, its displacement from where it stands on rigid ground."""
+        history, load = self.twin.history, self.twin.scene.loads[self.twin.riders.index(self.sensor.carriage)]
+        assert load.sprung is not None
+        number = load.sprung.number
+        if self.sensor.quantity == "displacement":
+            return history.q[:, number] - load.sprung.weight / load.sprung.stiffness
+        return (history.v if self.sensor.quantity == "velocity" else history.a)[:, number]
+
+    @property
     def values_before(self) -> list[float]:
         """What it reads just before events, where the history has the values just after them."""
         found = []
+        if self.sensor.carriage is not None:  # its displacement does not jump
+            load = self.twin.scene.loads[self.twin.riders.index(self.sensor.carriage)]
+            left = [event.step for event in self.twin.history.before if load.active(event.t, "left")]
+            return [float(self._aboard[step]) for step in left]
         for event in self.twin.history.before:
             phases = [load.phase(event.t, "left") for load in self.twin.scene.loads]
             position = np.array([math.nan if phase is None else phase.s(event.t) for phase in phases])
@@ -56,7 +72,7 @@ class Reading:
 
     def _state(self, x: float, position: Array, q: Array, v: Array, contact_force: Array) -> float:
         bed, order = self.twin.bed, DERIVATIVE[self.sensor.quantity]
-        value = float(bed.phi(x, order) @ q) + self.twin.gravity * bed.sag(x, order)
+        value = float(self.twin.scene.phi(x, order) @ q) + self.twin.gravity * bed.sag(x, order)
         if self.study.solver.static_correction:
             for s, force in zip(position, contact_force, strict=True):
                 if not math.isnan(s):
@@ -75,7 +91,8 @@ class Reading:
 
     def _rate(self, n: int) -> float:
         bed, history, x = self.twin.bed, self.twin.history, float(self.place[n])
-        row = bed.phi(x, 0)
+        phi = self.twin.scene.phi
+        row = phi(x, 0)
         if self.sensor.under is None:
             return float(row @ (history.v if self.sensor.quantity == "velocity" else history.a)[n])
         load = self.twin.scene.loads[self.twin.riders.index(self.sensor.under)]
@@ -83,7 +100,7 @@ class Reading:
         phase = load.phase(t, "right" if n < len(history.t) - 1 else "left")
         assert phase is not None
         ds, dds = phase.ds(t), phase.dds(t)
-        slope, bend = bed.phi(x, 1), bed.phi(x, 2)
+        slope, bend = phi(x, 1), phi(x, 2)
         own = [self.twin.gravity * bed.sag(x, j) for j in (1, 2)]
         if self.sensor.quantity == "velocity":
             return float(row @ history.v[n] + ds * (slope @ history.q[n])) + ds * own[0]

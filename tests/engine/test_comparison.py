@@ -273,7 +273,7 @@ def test_what_they_do_not_march_is_refused() -> None:
     springs = [{"at": 0.0, "stiffness": 60.0}, {"at": 1.0, "stiffness": 90.0, "damping": 0.5}]
     damped = build_model(study(beam(supports=springs), mass(0.1, way)), {}, {})
     for model in (two, damped):
-        with pytest.raises(BadInput, match="one carriage and no dampers"):
+        with pytest.raises(BadInput, match="one carriage, no dampers"):
             frozen_track(COMPARISON["rk4"], model, 0.5, 1)
     for refused in (study(beam(), force(1.0, way)), study(beam(own_weight=True), mass(0.1, way))):
         with pytest.raises(BadInput, match="own weight does not act"):

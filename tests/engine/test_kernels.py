@@ -20,7 +20,7 @@ from engine.execution import run
 from engine.kernels import jit
 from engine.kernels.march import march_many
 from engine.scene import Study
-from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, under
+from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, shuttle, study, under
 
 ROOT = Path(__file__).parents[2]
 QUANTITIES = ("displacement", "velocity", "acceleration", "bending_moment", "shear_force")
@@ -28,8 +28,8 @@ SPRINGS = [{"at": 0.0, "stiffness": 60.0}, {"at": 1.0, "stiffness": 90.0, "dampi
 
 
 def small(name: str) -> Study:
-    """Small studies that reach every branch of the kernels: one tie and three, sensors of every kind, events, steps
-    of one station, mode counts that are and are not multiples of four."""
+    """Small studies that reach every branch of the kernels: one tie, three, springs, sensors of every kind, events,
+    steps of one station, mode counts that are and are not multiples of four."""
     sensors = {quantity: fixed(0.31, quantity) for quantity in QUANTITIES}
     sensors |= {f"below_{quantity}": under("car", quantity) for quantity in QUANTITIES}
     sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 0.5, "count": 18}}
@@ -42,11 +42,15 @@ def small(name: str) -> Study:
         return study(beam(modes=4), force(0.3, short), sweep=pushed, solver={"steps": 1})
     if name == "turning":
         return study(beam(modes=2), mass(0.3, shuttle(0.2, 0.8, 1.0, 0.0, 2)), **given, solver={"steps": 16})
+    if name == "sprung":
+        given["sensor"] = sensors | {f"on_{quantity}": aboard("car", quantity) for quantity in QUANTITIES[:3]}
+        riding = {"car": oscillator(0.3, 20.0, short, wheel_mass=0.1, damping=0.6), "next": mass(0.2, short, delay=0.1)}
+        return study(beam(modes=6, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 90})
     riding = {"car": mass(0.3, short), "next": force(2.0, cruise(1.0, 0.0, 1.1), delay=0.2)}
     return study(beam(modes=5, supports=SPRINGS, own_weight=True), riding, **given, solver={"steps": 30})
 
 
-NAMES = ("one", "quiet", "turning", "many")
+NAMES = ("one", "quiet", "turning", "many", "sprung")
 SCRIPT = """
 import json, sys
 import numpy as np

@@ -178,8 +178,9 @@ def start_of(carriage: Any) -> float:
     return float(carriage.delay or 0.0)
 
 
-def load_of(study: Study, name: str, length: float, end: float) -> Load:
-    """A carriage as a load; one that does not cruise stands on its place before and after its motion."""
+def load_of(study: Study, name: str, length: float, end: float, number: int = 0) -> Load:
+    """A carriage as a load; one that does not cruise stands on its place before and after its motion. number: of its
+    sprung mass's coordinate."""
     carriage: Any = study.carriage[name]
     begin = start_of(carriage)
     phases = phases_of(carriage.motion, begin, length)
@@ -192,6 +193,11 @@ def load_of(study: Study, name: str, length: float, end: float) -> Load:
         phases = motions.joined(phases)
     if carriage.kind == "force":
         return scenes.moving_force(carriage.force, phases)
+    if carriage.kind == "oscillator":
+        wheel = scenes.moving_mass(carriage.wheel_mass, study.gravity, phases)
+        weight = carriage.mass * study.gravity
+        above = scenes.Sprung(number, carriage.mass, carriage.stiffness, carriage.damping, weight)
+        return replace(wheel, sprung=above)
     if study.solver.fidelity == "force":
         return scenes.moving_force(carriage.mass * study.gravity, phases)
     if study.solver.fidelity == "mass-without-convective":
@@ -236,16 +242,29 @@ def scene_of(study: Study, body: str, end: float) -> tuple[Bed, Scene, tuple[str
     """One body of a study up to an instant, the names of its carriages, and its first state."""
     bed = bed_of(study, body)
     riders = tuple(name for name, carriage in study.carriage.items() if carriage.on == body)
-    loads = tuple(load_of(study, name, bed.length, end) for name in riders)
-    dampers = tuple(Damper(bed.phi(at, 0), c) for at, c in bed.dampers)
+    modes = bed.omega.size
+    sprung = [name for name in riders if study.carriage[name].kind == "oscillator"]  # type: ignore[attr-defined]
+    numbers = {name: modes + number for number, name in enumerate(sprung)}
+    phi = padded_by(bed.phi, len(sprung))
+    loads = tuple(load_of(study, name, bed.length, end, numbers.get(name, 0)) for name in riders)
+    dampers = tuple(Damper(phi(at, 0), c) for at, c in bed.dampers)
     table: Any = study.body[body]
-    zeta = damping_of(table.damping_ratio, bed.omega)
-    scene = Scene(bed.phi, bed.omega, zeta, loads, dampers)
+    zeta = np.append(damping_of(table.damping_ratio, bed.omega), np.zeros(len(sprung)))
+    scene = Scene(phi, np.append(bed.omega, np.zeros(len(sprung))), zeta, loads, dampers)
     own = bool(table.own_weight)
-    start = scenes.equilibrium(scene, 0.0) if study.start == "equilibrium" else scenes.rest(scene)
-    if own and study.start == "rest":
-        start = State(-study.gravity * bed.own_modal / bed.omega**2, start.v)
+    if study.start == "equilibrium":
+        return bed, scene, riders, scenes.equilibrium(at_rest(scene, bed, study.gravity), 0.0)
+    start = scenes.rest(scene)
+    if own:
+        start.q[:modes] = -study.gravity * bed.own_modal / bed.omega**2
     return bed, scene, riders, start
+
+
+def padded_by(phi: scenes.Shape, coordinates: int) -> scenes.Shape:
+    """Rows with zeros for more coordinates."""
+    if not coordinates:
+        return phi
+    return lru_cache(maxsize=None)(lambda s, derivative: np.append(phi(s, derivative), np.zeros(coordinates)))
 
 
 BETA = {"average-acceleration": 1 / 4, "linear-acceleration": 1 / 6, "fox-goodwin": 1 / 12, "central-difference": 0.0}
@@ -285,8 +304,35 @@ def sagging_weight(bed: Bed, load: Load, gravity: float, t: float, side: scenes.
 
 def heavy(scene: Scene, bed: Bed, gravity: float, t: float, side: scenes.Side) -> Scene:
     """The scene of one instant, its loads with the weights that they have along the sag."""
-    loads = tuple(replace(load, weight=sagging_weight(bed, load, gravity, t, side)) for load in scene.loads)
+    loads = tuple(
+        replace(
+            load,
+            weight=sagging_weight(bed, load, gravity, t, side),
+            sprung=sagging_spring(bed, load, gravity, t, side),
+        )
+        for load in scene.loads
+    )
     return replace(scene, loads=loads)
+
+
+def at_rest(scene: Scene, bed: Bed, gravity: float) -> Scene:
+    """The scene with its springs over the body's sag, nothing moving at time 0."""
+    sprung = [sagging_spring(bed, load, gravity, 0.0, "right") for load in scene.loads]
+    loads = [
+        replace(load, sprung=None if one is None else replace(one, climb=0.0))
+        for load, one in zip(scene.loads, sprung, strict=True)
+    ]
+    return replace(scene, loads=tuple(loads))
+
+
+def sagging_spring(bed: Bed, load: Load, gravity: float, t: float, side: scenes.Side) -> scenes.Sprung | None:
+    """The spring of a load over the curve of the body's sag."""
+    phase = load.phase(t, side)
+    if load.sprung is None or phase is None:
+        return load.sprung
+    s = phase.s(t)
+    climb = load.sprung.convective * phase.ds(t) * gravity * bed.sag(s, 1)
+    return replace(load.sprung, level=gravity * bed.sag(s, 0), climb=climb)
 
 
 def arrival_on_sag(scene: Scene, bed: Bed, gravity: float, t: float, state: State) -> Array:
@@ -298,7 +344,7 @@ def arrival_on_sag(scene: Scene, bed: Bed, gravity: float, t: float, state: Stat
         if after is not None:
             change = after.ds(t) - (0.0 if before is None else before.ds(t))
             slope = gravity * bed.sag(after.s(t), 1)
-            extra += load.convective_mass * bed.phi(after.s(t), 0) * change * slope
+            extra += load.convective_mass * scene.phi(after.s(t), 0) * change * slope
     return jump - np.linalg.solve(scenes.system(scene, t, "right").mass, extra)
 
 

@@ -9,13 +9,20 @@ contact force F = m (g - D2w) acting on the modes, moving all that is linear in 
     K = diag(omega^2)      + sum m phi (s'^2 phi'' + s'' phi')^T
     f = sum m g phi + own weight
 
+A sprung mass m_s at the absolute place y is one more coordinate, a row phi of zeros with one entry e; with the row
+r = phi - e its spring and damper push the body by  S = -k (r.q) - c (r.q' + s' phi'.q):
+
+    M += m_s e e^T,  C += c r r^T,  K += k r r^T + c r (s' phi')^T,  f += m_s g e
+
+Before it arrives and after it has left it stands on rigid ground: phi = 0.
+
 Nothing here is clever on purpose.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
@@ -42,11 +49,43 @@ class Phase:
 
 
 @dataclass(frozen=True)
+class Sprung:
+    """A mass on a spring: the number of its coordinate, kg, N/m, N s/m, N along gravity.
+
+    convective: whether the damper sees s' phi'. level, climb: place (m) and rate (m/s) of the unloaded track.
+    """
+
+    number: int
+    mass: float
+    stiffness: float
+    damping: float
+    weight: float
+    convective: bool = True
+    level: float = 0.0
+    climb: float = 0.0
+
+    def rows(self, scene: Scene, phase: Phase | None, t: float) -> tuple[Array, Array]:
+        """r and s' phi'."""
+        row = np.zeros(len(scene.omega))
+        row[self.number] = -1.0
+        if phase is None:
+            return row, np.zeros_like(row)
+        return row + scene.phi(phase.s(t), 0), self.convective * phase.ds(t) * scene.phi(phase.s(t), 1)
+
+    def push(self, scene: Scene, phase: Phase, t: float, state: State) -> float:
+        """S."""
+        row, slope = self.rows(scene, phase, t)
+        gap, rate = row @ state.q + self.level, row @ state.v + slope @ state.q + self.climb
+        return -float(self.stiffness * gap + self.damping * rate)
+
+
+@dataclass(frozen=True)
 class Load:
     """A load and its motion; off the body before the first phase and after the last.
 
     mass: kg in M(t). convective_mass: kg in C(t) and K(t); equal to mass, or 0 where convective terms are left out.
-    weight: N along gravity. arrival_speed: vertical speed in m/s before the load touches the body.
+    weight: N along gravity. arrival_speed: vertical speed in m/s before the load touches the body. sprung: a mass on a
+    spring above it.
     """
 
     phases: tuple[Phase, ...]
@@ -54,6 +93,7 @@ class Load:
     mass: float = 0.0
     convective_mass: float = 0.0
     arrival_speed: float = 0.0
+    sprung: Sprung | None = None
 
     @property
     def enter(self) -> float:
@@ -106,6 +146,7 @@ class Scene:
     """A body of N modes and what acts on it.
 
     phi(s, derivative) -> (N,), unit modal mass; omega (N,) rad/s; zeta (N,); own_weight (N,) modal force of gravity.
+    Where masses are sprung, N counts them too: phi and omega are zero there.
     """
 
     phi: Shape
@@ -148,6 +189,14 @@ def system(scene: Scene, t: float, side: Side) -> System:
         damping = damping + damper.coefficient * np.outer(damper.row, damper.row)
     for load in scene.loads:
         phase = load.phase(t, side)
+        if load.sprung is not None:
+            one = load.sprung
+            r, slope = one.rows(scene, phase, t)
+            mass[one.number, one.number] = one.mass
+            damping = damping + one.damping * np.outer(r, r)
+            stiffness = stiffness + one.stiffness * np.outer(r, r) + one.damping * np.outer(r, slope)
+            force = force - r * (one.stiffness * one.level + one.damping * one.climb)
+            force[one.number] += one.weight
         if phase is None:
             continue
         row, rate_row, position_row = convective_rows(scene.phi, phase, t)
@@ -174,6 +223,7 @@ def contact_forces(scene: Scene, t: float, state: State, a: Array, side: Side) -
             row, rate_row, position_row = convective_rows(scene.phi, phase, t)
             convective = rate_row @ state.v + position_row @ state.q
             forces[j] = load.weight - load.mass * (row @ a) - load.convective_mass * convective
+            forces[j] += 0.0 if load.sprung is None else load.sprung.push(scene, phase, t, state)
     return forces
 
 
@@ -220,11 +270,26 @@ def events(scene: Scene) -> tuple[float, ...]:
 
 
 def rest(scene: Scene) -> State:
-    """Undeformed and at rest."""
+    """Undeformed and at rest, sprung masses as on rigid ground."""
     zero = np.zeros(len(scene.omega))
-    return State(zero, zero.copy())
+    q = zero.copy()
+    for load in scene.loads:
+        if load.sprung is not None:
+            q[load.sprung.number] = load.sprung.weight / load.sprung.stiffness
+    return State(q, zero)
 
 
 def equilibrium(scene: Scene, t: float) -> State:
-    """Static equilibrium with every load resting where it is just after t: omega^2 q = f; q' = 0."""
-    return State(system(scene, t, "right").force / scene.omega**2, np.zeros(len(scene.omega)))
+    """Static equilibrium with every load resting where it is just after t: K q = f without convective terms; q' = 0."""
+    resting = [replace(load, phases=_still(load, t)) for load in scene.loads]
+    now = system(replace(scene, loads=tuple(resting)), t, "right")
+    return State(np.linalg.solve(now.stiffness, now.force), np.zeros(len(scene.omega)))
+
+
+def _still(load: Load, t: float) -> tuple[Phase, ...]:
+    """The load at rest where it is just after t, off the body where it is off."""
+    phase = load.phase(t, "right")
+    if phase is None:
+        return (Phase(t - 2.0, t - 1.0, lambda u: 0.0, lambda u: 0.0, lambda u: 0.0),)
+    place = phase.s(t)
+    return (Phase(t, t + 1.0, lambda u: place, lambda u: 0.0, lambda u: 0.0),)
