@@ -114,12 +114,16 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     gathering results; the mean over ``repeats`` marches in a row."""
     from engine.lanes import padded
     from engine.march import prepare
+    from engine.richardson import march_pair
     from engine.tables import SceneTables
 
-    nothing = np.zeros(0, dtype=np.int64)
-    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors") for b in plan.buckets}
+    nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
+    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors", stride) for b in plan.buckets}
     workers = threads or os.cpu_count() or 1
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
+    if stride > 1:
+        pairs = [(tables[id(bucket)], plan.values(bucket, padded(part)), nothing, part.size) for bucket, part in chunks]
+        return seconds_of_jobs([partial(march_pair, *pair) for pair in pairs], workers) / repeats
     marches = [prepare(tables[id(bucket)], plan.values(bucket, padded(part)), nothing) for bucket, part in chunks]
     return seconds_of(marches, workers) / repeats
 
