@@ -109,7 +109,7 @@ def round_up(steps: Array) -> Counts:
 
 def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
     """Refuse fixed steps beyond the scheme's stability limit (fault 12), or too few for the alias rule where the scheme
-    does not damp. Raises BadInput with limit and suggestion."""
+    does not damp enough. Raises BadInput with limit and suggestion."""
     _check_limit(model, time_scale, steps)
     if not model.scheme.is_damped:
         _check_alias(model, time_scale, steps)
@@ -153,7 +153,7 @@ def _least_steps(model: SceneModel, time_scale: Array) -> Array:
 
 
 def _enough(model: SceneModel, time_scale: Array) -> str:
-    """A number of steps that is refused for no variant."""
+    """A number of steps that these two rules refuse for no variant."""
     inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
     enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, _least_steps(model, time_scale))))
     stride = model.scheme.stride

@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 
 #: Keys of numbers that a lane may have to itself.
 LANE_KEYS = re.compile(
-    r"gravity|solver\.(steps|tolerance)|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)|carriage\.\w+\.(mass|wheel_mass"
-    r"|stiffness|damping|force|delay|headway)"
+    r"gravity|solver\.(steps|tolerance)"
+    r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
+    r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|force|delay|headway)"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding

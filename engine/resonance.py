@@ -85,10 +85,12 @@ def _least_for_limit(model: SceneModel, values: LaneValues) -> Array:
 def _refuse(model: SceneModel, least: Array, steps: Counts, what: str) -> None:
     worst = int(np.argmax(least / steps))
     if least[worst] > steps[worst]:
+        stride = model.scheme.stride
+        enough = stride * math.ceil(LIMIT_MARGIN * float(least.max()) / stride)
         raise BadInput(
             what,
             where=model.study.source.where("solver.steps"),
             expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle",
             received=str(int(steps[worst])),
-            remedy=f'steps = {math.ceil(LIMIT_MARGIN * float(least.max()))} or more, or steps = "auto"',
+            remedy=f'steps = {enough} or more, or steps = "auto"',
         )

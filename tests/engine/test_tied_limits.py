@@ -240,3 +240,17 @@ def test_bad_sensors_are_refused() -> None:
     assert "exactly one place" in sensing({"carriage": "car", "under": "car"})
     assert "exactly one place" in sensing({"carriage": "car", "at": 0.5, "body": "bed"})
     assert "no bending_moment" in sensing({"carriage": "car", "quantity": "bending_moment"})
+
+
+@pytest.mark.parametrize("scheme", ["average-acceleration", "richardson"])
+def test_the_steps_suggested_for_a_stiff_spring_are_accepted(scheme: str) -> None:
+    """For several stiffnesses, since half of all numbers are even."""
+
+    def given(stiffness: float, steps: int) -> Study:
+        car = oscillator(0.5, stiffness, cruise(0.0, 1.0, 0.3))
+        return study(beam(modes=1), car, solver={"scheme": scheme, "steps": steps})
+
+    for stiffness in np.linspace(1.9e6, 2.6e6, 8):
+        with pytest.raises(BadInput, match="contact on its spring") as caught:
+            make_plan(given(float(stiffness), 150))
+        assert make_plan(given(float(stiffness), int(caught.value.remedy.split()[2]))).buckets
