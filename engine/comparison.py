@@ -21,10 +21,12 @@ from engine.kernels.layout import CURVE, FORCE, LANES, MARKS, RATE, Alpha, Lanes
 from engine.kernels.schemes import NewmarkScheme
 from engine.lanes import LaneValues, from_blocks
 from engine.march import March, Marched, prepare
-from engine.model import CarriageTie, SceneModel
+from engine.model import SceneModel
 from engine.tables import SceneTables
+from engine.ties import CarriageTie
 from engine.timeline import Segment
-from engine.track import Way, tabulate_ties
+from engine.track import tabulate_ties
+from engine.ways import Way
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.lanes import LaneValues
+from engine.envelopes import envelope_places
+from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
 from engine.plan import Plan
+from engine.sweep import Cases
 from results_schema.parts import Rows
 from results_schema.variables import QUANTITY_UNITS, Variable, axes, declarations, expand
 
@@ -61,10 +63,15 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
 
     study = plan.study
     sensors = {name: QUANTITY_UNITS[sensor.quantity] for name, sensor in study.sensor.items()}
-    declared = expand(_declared_kind(study.kind), sensors, list(study.carriage))
-    dataset = xr.Dataset(coords=_coordinates(plan))
+    envelopes = {name: QUANTITY_UNITS[envelope.quantity] for name, envelope in study.envelope.items()}
+    declared = expand(_declared_kind(study.kind), sensors, list(study.carriage), envelopes)
+    dataset = xr.Dataset(coords=coordinates(plan.cases))
     dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
+    for name, places in envelope_places(plan.base).items():
+        dim = f"{name}_place"
+        dataset = dataset.assign_coords({dim: (dim, places, declared[dim].attributes())})
     extra = {} if plan.reduction is None else dict(plan.reduction.outputs(study))
+    extra |= {f"{name}_envelope_{end}": (f"{name}_place",) for name in study.envelope for end in ("max", "min")}
     for name, array in arrays.items():
         dims = (*plan.cases.dims, *extra.get(name, ()))
         shape = (*plan.cases.shape, *array.shape[1:])
@@ -117,14 +124,14 @@ def _own_attributes(name: str, sensors: dict[str, str]) -> dict[str, str]:
     return {"long_name": name.replace("_", " ")}
 
 
-def _coordinates(plan: Plan) -> dict[str, Any]:
+def coordinates(cases: Cases) -> dict[str, Any]:
     """The sweep's axes with units; zipped or sampled parameters stand along ``variant``."""
     found: dict[str, Any] = {}
-    for axis in plan.cases.axes:
+    for axis in cases.axes:
         attributes = {"units": axis.units or "1", "long_name": f"{axis.name} ({', '.join(axis.paths)})"}
         found[axis.name] = (axis.dim, axis.values, attributes)
-    if "variant" in plan.cases.dims:
-        count = plan.cases.shape[plan.cases.dims.index("variant")]
+    if "variant" in cases.dims:
+        count = cases.shape[cases.dims.index("variant")]
         found["variant"] = ("variant", np.arange(count, dtype=np.int64), axes()["variant"].attributes())
     return found
 
@@ -158,7 +165,7 @@ def _mass_ratio(plan: Plan) -> Array | None:
     found = np.empty(plan.size)
     for bucket in plan.buckets:
         found[bucket.variants] = (
-            plan.values(bucket, bucket.variants).moving_mass(first) / bucket.scene.leading_body.modal.mass
+            moving_mass(bucket.scene, plan.values(bucket, bucket.variants), 0) / bucket.scene.leading_body.modal.mass
         )
     return found
 

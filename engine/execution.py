@@ -204,7 +204,7 @@ def _task(
         left[id(bucket)] -= 1
         last = left[id(bucket)] == 0
     if last:
-        bucket.tables.forget()
+        bucket.forget()
     _hand_over(found, results, halted)
 
 

@@ -77,8 +77,9 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2).
     """
     found = np.zeros_like(time_scale)
-    for carriage in model.carriages:
-        if carriage.inertia != "force":
+    joined = {spring.carriage for spring in model.springs if spring.rigid}
+    for number, carriage in enumerate(model.carriages):
+        if carriage.inertia != "force" or number in joined:
             body = model.bodies[carriage.body].modal
             wave = float(body.wave_number.max()) * carriage.rider.top_speed
             found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega.max()) * time_scale))

@@ -24,6 +24,7 @@ LANE_KEYS = re.compile(
     r"gravity|solver\.(steps|tolerance)"
     r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
     r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|force|delay|headway)"
+    r"|carriage\.\w+\.contacts\.\w+\.damping"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
@@ -69,16 +70,10 @@ class LaneValues:
             for name in self.study.carriage
         }
 
-    def moving_mass(self, carriage: str) -> Array:
-        """(V,) kg of a whole carriage."""
+    def own_mass(self, carriage: str) -> Array:
+        """(V,) kg of a carriage by its own keys."""
         keys = self.study.carriage[carriage].masses
         return sum((self.of(f"carriage.{carriage}.{key}") for key in keys), np.zeros(self.size))
-
-    def weight(self, carriage: str) -> Array:
-        """(V,) N along gravity."""
-        if self.study.carriage[carriage].inertial:
-            return self.moving_mass(carriage) * self.of("gravity")
-        return self.of(f"carriage.{carriage}.force")
 
     def damping_rates(self, body: str, omega: Array) -> Array:
         """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
@@ -89,6 +84,20 @@ class LaneValues:
         if isinstance(spec, tuple):
             return np.stack([2.0 * self.of(f"{key}.{k}") * w for k, w in enumerate(omega)])
         return 2.0 * self.of(key) * omega[:, None]
+
+
+def moving_mass(model: SceneModel, values: LaneValues, carriage: int) -> Array:
+    """(V,) kg of a whole carriage."""
+    tie = model.carriages[carriage]
+    return values.own_mass(tie.name) + tie.own_mass
+
+
+def weight(model: SceneModel, values: LaneValues, carriage: int) -> Array:
+    """(V,) N of a carriage along the deflections of the track that it rides."""
+    tie = model.carriages[carriage]
+    if not model.study.carriage[tie.name].inertial:
+        return values.of(f"carriage.{tie.name}.force")
+    return moving_mass(model, values, carriage) * values.of("gravity") * model.bodies[tie.body].modal.gravity_share
 
 
 def rounded(values: Array) -> Array:
@@ -120,14 +129,15 @@ class LaneTable:
 
     omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mobility (blocks, N, LANES): 1, and 1/m (1/kg) of sprung
     masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches
-    the body and has inertia;  damper, spring (blocks, ties, LANES): N s/m and N/m, zero for carriages;
-    time_scale, gravity (blocks, LANES).
+    the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES):
+    N s/m and N/m, zero for carriages;  time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
     rates: Array
     mobility: Array
     mass: Array
+    joint: Array
     weight: Array
     damper: Array
     spring: Array
@@ -141,7 +151,7 @@ class LaneTable:
             stiffness=(self.omega[:, None] * h) ** 2,
             damping=self.rates * h,
             mobility=self.mobility,
-            gain=self.mass + self.damper * h,
+            gain=self.mass + self.joint + self.damper * h,
             stiff=self.spring * h**2,
             load=self.weight * h**2,
             gravity=self.gravity,
@@ -152,21 +162,25 @@ class LaneTable:
 def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     """The lanes of some variants, whose number must be a multiple of LANES."""
     rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
-    none = np.zeros(values.size)
-    weights = [values.weight(c.name) for c in model.carriages]
-    masses = [_contact_mass(model, values, number) for number in range(len(model.carriages))]
-    sprung = [f"carriage.{model.carriages[spring.carriage].name}" for spring in model.springs]
+    none, numbers = np.zeros(values.size), range(len(model.carriages))
+    weights = [weight(model, values, number) for number in numbers]
+    masses = [_contact_mass(model, values, number) for number in numbers]
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
-    coefficients = [values.of(key) for key in (*(d.key for d in model.dampers), *(f"{one}.damping" for one in sprung))]
+    rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
+    coefficients = [
+        values.of(key) for key in (*(d.key for d in model.dampers), *(f"{s.key}.damping" for s in model.springs))
+    ]
+    stiffness = [none if s.rigid else values.of(f"{s.key}.stiffness") for s in model.springs]
     ones = np.ones((model.body_modes, values.size))
     return LaneTable(
         omega=model.omega,
-        rates=to_blocks(np.concatenate([*rates, np.zeros((len(springs), values.size))])),
-        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.of(f"{one}.mass")[None] for one in sprung)])),
+        rates=to_blocks(np.concatenate([*rates, np.zeros((len(model.sprung), values.size))])),
+        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.of(f"{s.key}.mass")[None] for s in model.sprung)])),
         mass=to_blocks(np.stack(masses + dampers + springs)),
+        joint=to_blocks(np.stack(carriages + dampers + rigid)),
         weight=to_blocks(np.stack(weights + dampers + springs)),
         damper=to_blocks(np.stack(carriages + coefficients)),
-        spring=to_blocks(np.stack(carriages + dampers + [values.of(f"{one}.stiffness") for one in sprung])),
+        spring=to_blocks(np.stack(carriages + dampers + stiffness)),
         time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
         gravity=to_blocks(values.of("gravity")),
     )
@@ -177,6 +191,6 @@ def _contact_mass(model: SceneModel, values: LaneValues, number: int) -> Array:
     carriage = model.carriages[number]
     if carriage.inertia == "force":
         return np.zeros(values.size)
-    if model.spring_of(number) is None:
-        return values.moving_mass(carriage.name)
+    if not model.springs_of(number):
+        return moving_mass(model, values, number)
     return values.of(f"carriage.{carriage.name}.wheel_mass")

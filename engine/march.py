@@ -29,7 +29,8 @@ from engine.kernels.layout import (
 from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
 from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table
-from engine.model import SceneModel
+from engine.signals import contact_forces
+from engine.starting import initial_state
 from engine.tables import SceneTables
 from engine.timeline import Segment
 from engine.track import tabulate_blow
@@ -84,7 +85,7 @@ class March:
         stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
-            active[: len(model.carriages)] = segment.active
+            active[: len(model.carriages)] = segment.active[: len(model.carriages)]
             mass = np.where(active[:, None], self.lanes.mass, 0.0)
             self._board(segment)
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
@@ -97,7 +98,7 @@ class March:
     def _board(self, segment: Segment) -> None:
         """Sprung masses that arrive were at rest on level ground, whatever they did where they did not matter."""
         arriving = {blow.rider for blow in segment.strikes if blow.kind == "arrival"}
-        for spring in self.tables.model.springs:
+        for spring in self.tables.model.sprung:
             if spring.carriage in arriving:
                 self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0
 
@@ -125,11 +126,11 @@ def prepare(tables: SceneTables, values: LaneValues, counts: Counts, sampled: in
     of the tables' signals, or the sensors."""
     lanes = lane_table(tables.model, values)
     blocks = lanes.gravity.shape[0]
-    sensors = len(tables.sensors)
-    marks = _blank_marks(blocks, len(tables.signals))
-    guard = _blank_marks(blocks, len(tables.signals) - sensors)
+    sensors, signals = len(tables.sensors), len(tables.signals)
+    guarded = sensors if signals > sensors else 0  # where no contacts are read, all signals stand guard
+    marks, guard = _blank_marks(blocks, signals), _blank_marks(blocks, signals - guarded)
     bounds = _bounds(tables, lanes)
-    marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, sensors:]
+    marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, guarded:]
     history = np.full((blocks, counts.size, sensors if sampled is None else sampled, LANES), np.nan)
     return March(tables, lanes, counts, initial_state(tables.model, lanes), marks, guard, history)
 
@@ -157,38 +158,6 @@ def _step(tables: SceneTables, segment: Segment, lanes: LaneTable) -> Array:
     return np.full_like(lanes.time_scale, tables.timeline.free_periods * period / steps)
 
 
-def initial_state(model: SceneModel, lanes: LaneTable) -> State:
-    """Modal state at time 0, (blocks, N, LANES): undeformed and at rest, or the static equilibrium under the weights
-    at their first places. Coordinates count from the body's own sag where its weight acts."""
-    shape = lanes.rates.shape
-    q = np.zeros(shape)
-    for part in model.bodies:
-        if part.own_weight and model.study.start == "rest":
-            sag = part.modal.participation / part.modal.omega**2
-            q[:, part.modes] = -sag[:, None] * lanes.gravity[:, None]
-    if model.study.start == "equilibrium":
-        for r, carriage in enumerate(model.carriages):
-            if not carriage.rider.touches(0.0, 1e-9):
-                continue
-            part = model.bodies[carriage.body]
-            place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length)
-            soft = part.modal.shape(place.reshape(1))[0] / part.modal.omega**2
-            q[:, part.modes] += soft[:, None] * lanes.weight[:, r, None]
-        _carry_sprung(model, lanes, q)
-    return State(q, np.zeros(shape), np.zeros(shape), np.zeros(shape))
-
-
-def _carry_sprung(model: SceneModel, lanes: LaneTable, q: Array) -> None:
-    """Put the sprung masses where their bodies carry them: each spring has just the weight."""
-    for spring in model.springs:
-        carriage = model.carriages[spring.carriage]
-        if carriage.rider.touches(0.0, 1e-9):
-            part = model.bodies[carriage.body]
-            place = np.clip(carriage.rider.motion.path(0.0).S, 0.0, carriage.rider.length).reshape(1)
-            lift = part.modal.shape(place)[0][:, None] * q[:, part.modes]
-            q[:, spring.mode] = lift.sum(axis=1) + model.sag(carriage.body, place, 0)[0] * lanes.gravity
-
-
 def _blank_marks(blocks: int, signals: int) -> Array:
     marks = np.zeros((blocks, signals, MARKS, LANES))
     marks[:, :, LARGEST], marks[:, :, SMALLEST] = -np.inf, np.inf
@@ -202,7 +171,7 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     own = sum(part.modal.mass for part in model.bodies if part.own_weight)
     weight = np.abs(lanes.weight[:, : len(model.carriages)]).sum(axis=1) + own * lanes.gravity
     scale = tables.static_scales * DIVERGED
-    contact = DIVERGED * np.abs(lanes.weight[:, : len(model.carriages)])
+    contact = DIVERGED * np.abs(lanes.weight[:, [force.carriage for force in contact_forces(model)]])
     sensors = scale[None, :, None] * weight[:, None]
     loose = [model.bodies[sensor.body].modal.rigid_modes > 0 for sensor in tables.sensors]
     sensors = np.where(np.array(loose)[None, :, None], np.inf, sensors)  # a rigid body may go anywhere

@@ -8,23 +8,22 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
 from engine.bodies.modal import ModalBody
-from engine.carriages import OscillatorCarriage
+from engine.carriages import BodyCarriage, OscillatorCarriage
 from engine.kernels.schemes import Scheme
 from engine.scene import Study
+from engine.standing import Place, Standing, stand
+from engine.ties import CarriageTie, DamperTie, Grip, Inertia, SpringTie
 from engine.timeline import Rider
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
-
-Inertia = Literal["force", "mass", "mass-without-convective"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,55 +42,16 @@ class BodyPart:
 
 
 @dataclass(frozen=True, eq=False)
-class CarriageTie:
-    """A carriage as the march sees it: its body's number, its way, and which inertia terms act at its contact."""
-
-    name: str
-    body: int
-    rider: Rider
-    inertia: Inertia
-
-
-@dataclass(frozen=True, eq=False)
-class SpringTie:
-    """The spring and damper under a carriage's sprung mass.
-
-    carriage: its number. mode: of the mass, whose coordinate is its displacement (m) from where the spring carries it
-    on a level track; so the tie's force is what the spring has beyond the weight, which stays with the contact.
-    damped: whether there is a damper.
-    """
-
-    carriage: int
-    mode: int
-    damped: bool
-
-
-@dataclass(frozen=True, eq=False)
-class DamperTie:
-    """A damper at a place of a body's track (m) or a point of it (by name): force -c w', c at the dotted key, N s/m."""
-
-    body: int
-    at: float | str
-    key: str
-
-    def row(self, modal: ModalBody) -> Array:
-        """(N,) what every mode of its body moves it by."""
-        if isinstance(self.at, str):
-            assert modal.points is not None
-            return modal.points.row(self.at)
-        return np.asarray(modal.shape([self.at])[0])
-
-
-@dataclass(frozen=True, eq=False)
 class SceneModel:
     """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
-    them."""
+    them. contacts: the ways of the contacts of bodies that ride."""
 
     study: Study
     bodies: tuple[BodyPart, ...]
     carriages: tuple[CarriageTie, ...]
     dampers: tuple[DamperTie, ...]
     springs: tuple[SpringTie, ...] = ()
+    contacts: tuple[Rider, ...] = ()
 
     @property
     def ties(self) -> int:
@@ -106,7 +66,12 @@ class SceneModel:
     @cached_property
     def omega(self) -> Array:
         """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass."""
-        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(len(self.springs))])
+        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(len(self.sprung))])
+
+    @property
+    def sprung(self) -> tuple[SpringTie, ...]:
+        """The springs under sprung masses."""
+        return tuple(spring for spring in self.springs if spring.mode is not None)
 
     @cached_property
     def scheme(self) -> Scheme:
@@ -126,17 +91,28 @@ class SceneModel:
 
     @property
     def riders(self) -> tuple[Rider, ...]:
-        """The ways of all carriages."""
-        return tuple(carriage.rider for carriage in self.carriages)
+        """The ways of all carriages, then of all contacts of bodies that ride."""
+        return (*(carriage.rider for carriage in self.carriages), *self.contacts)
 
-    def spring_of(self, carriage: int) -> int | None:
-        """Number of the spring tie of a carriage, counted among all ties; None where it has none."""
-        first = len(self.carriages) + len(self.dampers)
-        return next((r for r, spring in enumerate(self.springs, start=first) if spring.carriage == carriage), None)
+    @property
+    def first_spring(self) -> int:
+        """Number of the first spring among all ties."""
+        return len(self.carriages) + len(self.dampers)
+
+    @cached_property
+    def grips(self) -> tuple[tuple[Grip, ...], ...]:
+        """Where every tie acts on the bodies."""
+        springs = (spring.grips(self.carriages[spring.carriage].body) for spring in self.springs)
+        return (*(c.grips for c in self.carriages), *(d.grips for d in self.dampers), *springs)
+
+    def springs_of(self, carriage: int) -> dict[int, SpringTie]:
+        """The springs of a carriage by their number among all ties."""
+        numbered = enumerate(self.springs, start=self.first_spring)
+        return {r: spring for r, spring in numbered if spring.carriage == carriage}
 
     def reacts(self, carriage: int) -> bool:
         """Whether the contact force of a carriage depends on how its body moves."""
-        return self.carriages[carriage].inertia != "force" or self.spring_of(carriage) is not None
+        return self.carriages[carriage].inertia != "force" or bool(self.springs_of(carriage))
 
     @property
     def fidelity(self) -> Fidelity:
@@ -173,20 +149,23 @@ def build_model(
         parts.append(part)
         first = part.modes.stop
     carriages = []
-    for name, carriage in study.carriage.items():
+    for number, (name, carriage) in enumerate(study.carriage.items()):
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
-        carriages.append(CarriageTie(name, body, rider, _inertia(study, name, swept)))
+        carriages.append(CarriageTie(name, body, rider, _inertia(study, name, swept), ((number, 1.0),)))
     dampers = [
         DamperTie(number, at, f"body.{name}.{key}")
         for number, name in enumerate(used)
         for key, at, coefficient in study.body[name].dampers()
         if coefficient > 0.0 or f"body.{name}.{key}" in swept
     ]
-    springs = _springs(study, first, swept)
-    model = SceneModel(study, tuple(parts), tuple(carriages), tuple(dampers), springs)
+    standing = _standing(study, carriages, parts, swept)
+    contacts = tuple(rider for stands in standing.values() for rider in stands.riders)
+    on_contacts = tuple(spring for stands in standing.values() for spring in stands.springs)
+    springs = (*_springs(study, first, swept), *on_contacts)
+    carried = tuple(standing[n].carried(tie) if n in standing else tie for n, tie in enumerate(carriages))
+    model = SceneModel(study, tuple(parts), carried, tuple(dampers), springs, contacts)
     _check_rigid_modes(model)
-    _check_weights(model)
     return model
 
 
@@ -198,15 +177,17 @@ def check_moves(study: Study) -> None:
 
 
 def _in_use(study: Study, body: str) -> bool:
-    """Whether a body carries a carriage or a sensor."""
-    ridden = any(carriage.on == body for carriage in study.carriage.values())
-    return ridden or any(study.body_of(sensor) == body for sensor in study.sensor)
+    """Whether a body carries a carriage, a sensor or an envelope."""
+    rides = (carriage.body for carriage in study.carriage.values() if isinstance(carriage, BodyCarriage))
+    ridden = (carriage.on for carriage in study.carriage.values())
+    read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
+    return body in (*rides, *ridden, *read)
 
 
 def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
     """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
     fidelity, carriage = study.solver.fidelity, study.carriage[name]
-    if fidelity == "force" or not carriage.inertial:
+    if fidelity == "force" or not carriage.inertial or isinstance(carriage, BodyCarriage):
         return "force"
     if _sprung(study, name):
         wheel = f"carriage.{name}.wheel_mass"
@@ -224,9 +205,25 @@ def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTi
     found: list[SpringTie] = []
     for number, name in enumerate(study.carriage):
         if _sprung(study, name):
-            key = f"carriage.{name}.damping"
-            found.append(SpringTie(number, first + len(found), study.value(key) > 0.0 or key in swept))
+            key = f"carriage.{name}"
+            damped = study.value(f"{key}.damping") > 0.0 or f"{key}.damping" in swept
+            found.append(SpringTie(number, number, key, None, first + len(found), damped))
     return tuple(found)
+
+
+def _standing(
+    study: Study, carriages: list[CarriageTie], parts: list[BodyPart], swept: Collection[str]
+) -> dict[int, Standing]:
+    """The bodies that ride, by the number of their carriage."""
+    found: dict[int, Standing] = {}
+    names, first = [part.name for part in parts], len(carriages)
+    for number, tie in enumerate(carriages):
+        carriage = study.carriage[tie.name]
+        if isinstance(carriage, BodyCarriage):
+            rides = names.index(carriage.body)
+            found[number] = stand(study, Place(number, tie, rides, first), parts[rides].modal, swept)
+            first += len(carriage.contacts)
+    return found
 
 
 def _body_part(study: Study, name: str, first: int) -> BodyPart:
@@ -243,24 +240,15 @@ def _body_part(study: Study, name: str, first: int) -> BodyPart:
     return BodyPart(name, built.modal, modes, built.second_moment, built.fibre_distance, body.own_weight)
 
 
-def _check_weights(model: SceneModel) -> None:
-    """The weight of a mass acts along w: its track must stand so, or there must be no gravity."""
-    for carriage in model.carriages:
-        share = model.bodies[carriage.body].modal.gravity_share
-        if model.study.carriage[carriage.name].inertial and abs(share - 1.0) > 1e-9 and model.study.gravity != 0.0:
-            raise BadInput(
-                "the weight of this mass does not act in the direction of its track",
-                where=model.study.source.where(f"carriage.{carriage.name}.kind"),
-                expected="a track whose loads act along gravity",
-                received=f"{share:.3g} of gravity along it",
-                remedy='kind = "force", or gravity = 0',
-            )
-
-
 def _check_rigid_modes(model: SceneModel) -> None:
     """A body that nothing holds has no static equilibrium and no sag, and needs a mode that bends."""
-    for part in model.bodies:
+    riding = {carriage.rides for carriage in model.carriages}
+    for number, part in enumerate(model.bodies):
         where = model.study.source.where(f"body.{part.name}.supports")
+        if part.modal.rigid_modes and part.own_weight:
+            raise BadInput("nothing holds this body against its own weight", where=where, remedy="own_weight = false")
+        if number in riding:
+            continue
         if part.modal.rigid_modes == len(part.modal.omega):
             raise BadInput(
                 "only rigid-body modes are kept",
@@ -274,5 +262,3 @@ def _check_rigid_modes(model: SceneModel) -> None:
                 expected="supports that hold it",
                 remedy='hold the body, or set initial = "rest"',
             )
-        if part.modal.rigid_modes and part.own_weight:
-            raise BadInput("nothing holds this body against its own weight", where=where, remedy="own_weight = false")

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES
-from engine.lanes import LaneValues, lane_table
-from engine.march import initial_state
+from engine.lanes import LaneValues, lane_table, moving_mass, weight
 from engine.model import SceneModel
 from engine.signals import ContactForce
+from engine.starting import initial_state
 from engine.tables import SceneTables
 from engine.timeline import Segment, build_timeline
 from results_schema.errors import BadInput, Interrupted
@@ -68,12 +68,12 @@ class ModalEquations:
     @cached_property
     def mass(self) -> float:
         """Of the carriage, kg."""
-        return float(self._values.moving_mass(self.model.carriages[0].name)[0])
+        return float(moving_mass(self.model, self._values, 0)[0])
 
     @cached_property
     def weight(self) -> float:
         """Of the carriage, N."""
-        return float(self._values.weight(self.model.carriages[0].name)[0])
+        return float(weight(self.model, self._values, 0)[0])
 
     @cached_property
     def _rates(self) -> Array:

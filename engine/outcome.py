@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.envelopes import MOST_KEPT, envelope_names
 from engine.histories import counts_reduced
 from engine.kernels.layout import (
     BELOW_AT,
@@ -17,13 +18,14 @@ from engine.kernels.layout import (
     SMALLEST_AT,
     SQUARES,
 )
-from engine.lanes import LaneValues, padded
+from engine.lanes import LaneValues, padded, weight
 from engine.march import Marched
 from engine.model import SceneModel
 from engine.plan import Bucket, Plan
 from engine.reduction import Cycle
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_chosen, relative_error
+from engine.signals import contact_forces
 from engine.tables import SceneTables
 from results_schema.parts import Rows
 from results_schema.status import Status
@@ -46,10 +48,12 @@ def run_chunk(
         counts = counts_reduced(tables.timeline, plan.reduction.stations)
     values = plan.values(bucket, padded(variants))
     marched, gap = march_chosen(tables, values, counts, variants.size, halted)
+    envelopes = _envelopes(bucket, values, variants.size, halted)
     values = plan.values(bucket, variants)
     flat: Flat = {
         **_extremes(tables, marched),
         **_contact_forces(tables, marched),
+        **envelopes,
         **_statics(tables, values),
         **_reduced(plan, tables, values, counts, marched.history),
     }
@@ -87,6 +91,20 @@ def _extremes(tables: SceneTables, marched: Marched) -> Flat:
     return found
 
 
+def _envelopes(bucket: Bucket, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:
+    """(V, places) largest and smallest values of every envelope, from marches that watch its places alone."""
+    found: dict[str, list[Array]] = {name: [] for name in envelope_names(bucket.scene.study)}
+    nothing = np.zeros(0, dtype=np.int64)
+    for tables in bucket.envelopes:
+        marched, _ = march_chosen(tables, values, nothing, size, halted)
+        for j, place in enumerate(tables.sensors):
+            for end, mark in (("max", LARGEST), ("min", SMALLEST)):
+                found[f"{place.name}_envelope_{end}"].append(marched.marks[j, mark])
+        if len(bucket.envelopes) > MOST_KEPT:
+            tables.forget()
+    return {name: np.stack(readings, axis=1) for name, readings in found.items()}
+
+
 def _counted(tables: SceneTables) -> list[int]:
     """Number of steps at which every sensor counts."""
     segments = [segment for segment in tables.timeline.segments if segment.recorded]
@@ -99,11 +117,12 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
     """Extremes of every contact force, and where it first was negative."""
     found: Flat = {}
     for c, carriage in enumerate(tables.model.carriages):
-        marks = marched.marks[len(tables.sensors) + c]
-        seen = marks[LARGEST_AT] >= 0.0
-        found[f"{carriage.name}_contact_force_max"] = np.where(seen, marks[LARGEST], np.nan)
-        found[f"{carriage.name}_contact_force_min"] = np.where(seen, marks[SMALLEST], np.nan)
-        place = tables.timeline.positions(c, marks[SMALLEST_AT])
+        marks = marched.marks[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
+        seen = (marks[:, LARGEST_AT] >= 0.0).any(axis=0)
+        least = np.argmin(marks[:, SMALLEST], axis=0)[None]  # where a contact never counts, its smallest is infinite
+        found[f"{carriage.name}_contact_force_max"] = np.where(seen, marks[:, LARGEST].max(axis=0), np.nan)
+        found[f"{carriage.name}_contact_force_min"] = np.where(seen, marks[:, SMALLEST].min(axis=0), np.nan)
+        place = tables.timeline.positions(c, np.take_along_axis(marks[:, SMALLEST_AT], least, axis=0)[0])
         found[f"{carriage.name}_contact_force_min_position"] = place
         opened = _opened_at(tables, marched, c)
         found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
@@ -112,11 +131,18 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
 
 def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
     """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
-    marks = marched.marks[len(tables.sensors) + carriage]
+    contacts = _contacts_of(tables.model, carriage)
     if not tables.model.reacts(carriage):
-        return np.full(marks.shape[-1], -1.0)
-    early, late = marched.guard[carriage][BELOW_AT], marks[BELOW_AT]
-    return np.asarray(np.where(early >= 0.0, early, late))
+        return np.full(marched.marks.shape[-1], -1.0)
+    after = [len(tables.sensors) + number for number in contacts]
+    below = np.concatenate([marched.guard[contacts, BELOW_AT], marched.marks[after, BELOW_AT]])
+    first = np.min(np.where(below >= 0.0, below, np.inf), axis=0)
+    return np.asarray(np.where(np.isfinite(first), first, -1.0))
+
+
+def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
+    """Numbers of the contact forces of a carriage among all contact forces."""
+    return [number for number, force in enumerate(contact_forces(model)) if force.carriage == carriage]
 
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
@@ -125,7 +151,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     diverged = np.isfinite(first) | ~marched.finite
     sensors = len(marched.marks) - len(marched.guard)
-    reacting = [c for c in range(len(model.carriages)) if model.reacts(c)]
+    reacting = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
     below = np.concatenate(
         [marched.marks[[sensors + c for c in reacting], BELOW_AT], marched.guard[reacting, BELOW_AT]]
     )
@@ -138,7 +164,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 def _statics(tables: SceneTables, values: LaneValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
     unit = tables.static_over_window
-    weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
+    weights = np.stack([weight(tables.model, values, c) for c in range(len(tables.model.carriages))])
     gravity = values.of("gravity")
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors):
@@ -172,7 +198,7 @@ def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts
     if plan.reduction is None:
         return {}
     unit = tables.static_at(counts)
-    weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
+    weights = np.stack([weight(tables.model, values, c) for c in range(len(tables.model.carriages))])
     static = unit.gravity[:, :, None] * values.of("gravity")
     for r in range(weights.shape[0]):
         static = static + unit.force[:, :, r, None] * weights[r]
@@ -182,7 +208,7 @@ def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts
         position=tables.timeline.positions(0, counts.astype(np.float64)),
         history=history,
         static=static,
-        static_slope=unit.slope[:, :, 0, None] * weights[0],
+        static_slope=tables.static_slope_at(counts)[:, :, None] * weights[0],
         motion=tables.model.carriages[0].rider.motion,
     )
     return dict(plan.reduction(cycle))

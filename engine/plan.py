@@ -13,9 +13,10 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.envelopes import EnvelopeTables, check_places, envelope_tables, places_read
 from engine.fidelity import Needs, check_even_steps, check_most_steps, needed_steps, round_up
 from engine.histories import counts_shown
-from engine.kernels.layout import LANES
+from engine.kernels.layout import LANES, MARKS
 from engine.lanes import LANE_KEYS, LaneValues
 from engine.model import SceneModel, build_model, check_moves
 from engine.reduction import Reduction
@@ -33,12 +34,16 @@ CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
 PAIR = 2.5  # times the work of one march: a Richardson pair, 1.5 of it by its steps; for expected times only
+PLACE, PLACE_MODES = 0.2, 8.0  # an envelope's place costs as that part of a march with so many more modes; likewise
+PAIR_PLACES = 2.5  # times that much again in a Richardson pair, whose histories of all places are made; likewise
 START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
 MOST_LANES = 65536  # of one chunk
 MOST_HISTORY_BYTES = 48 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
+READING_SECONDS = 6e-7  # of an envelope's place at a station, in tables
+MOST_MARK_BYTES = 32 * 2**20  # of one chunk's extremes along bodies
 MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
 SHOWN = 64  # variants whose histories are kept by default
@@ -62,13 +67,27 @@ class Bucket:
         """Steps over one passage or cycle."""
         return self.tables.steps
 
+    @cached_property
+    def envelopes(self) -> tuple[EnvelopeTables, ...]:
+        """The tables of the marches that watch the envelopes."""
+        return envelope_tables(self.tables)
+
     @property
     def seconds_per_variant(self) -> float:
         """Expected time on one thread."""
         signals = 1.0 + 0.1 * len(self.tables.signals)
-        ties = self.scene.ties**1.5
-        marches = 1.0 if self.scene.scheme.stride == 1 else PAIR
-        return float(self.scene.omega.size * self.tables.timeline.steps * marches * signals * ties / PACE)
+        ties = self.scene.ties**1.2
+        marches, more = (1.0, 1.0) if self.scene.scheme.stride == 1 else (PAIR, PAIR_PLACES)
+        modes = self.scene.omega.size
+        work = modes * signals * ties
+        for part in self.envelopes:
+            work += modes * ties + (modes + PLACE_MODES) * PLACE * more * len(part.places) * (1.0 + 0.7 * (ties - 1.0))
+        return float(work * self.tables.timeline.steps * marches / PACE)
+
+    def forget(self) -> None:
+        """Drop the tables, when no chunk needs them any more."""
+        for tables in (self.tables, *self.envelopes):
+            tables.forget()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +139,7 @@ class Plan:
             tabulated = min(timeline.steps, bucket.steps) if timeline.repeats else timeline.steps
             found += bucket.seconds_per_variant * lanes / threads
             found += BUCKET_SECONDS + STATION_SECONDS * tabulated * bucket.scene.ties
+            found += READING_SECONDS * tabulated * places_read(self.study)
         return found
 
     def counts_shown(self, bucket: Bucket) -> Counts:
@@ -164,9 +184,11 @@ class Plan:
         if self.reduction is not None:
             rows = min(2 * self.reduction.stations, bucket.steps)
             lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
+        watched = max(len(tables.signals) for tables in (bucket.tables, *bucket.envelopes))
+        lanes = min(lanes, MOST_MARK_BYTES / (8 * MARKS * watched))
         if bucket.tables.refinement > 1:  # a pair has all histories of a segment in memory
             stations = 1.5 * max(segment.steps for segment in bucket.tables.timeline.segments)
-            lanes = min(lanes, MOST_PAIR_BYTES / (8 * stations * len(bucket.tables.signals)))
+            lanes = min(lanes, MOST_PAIR_BYTES / (8 * stations * watched))
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
 
     def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Bucket, Counts]]:
@@ -199,18 +221,18 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     window: Window = "whole" if reduction is None else "last-cycle"
     buckets = tuple(
         bucket
-        for scene, variants in _scenes(study, cases)
+        for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64))
         for bucket in _buckets(scene, cases, variants, window, check_steps)
     )
-    base = build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
-    plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base)
+    check_places(study, (bucket.scene for bucket in buckets))
+    plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
     check_memory(study, plan.size, plan.disk_bytes, reduction)
     return plan
 
 
 def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
-    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 4
+    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 4 + 2 * places_read(study)
     if reduction is not None:
         sizes = reduction.sizes(study)
         found += sum(prod(sizes[dim] for dim in dims) for dims in reduction.outputs(study).values())
@@ -236,10 +258,9 @@ def check_memory(study: Study, size: int, result_bytes: int, reduction: Reductio
         )
 
 
-def _scenes(study: Study, cases: Cases) -> Iterator[tuple[SceneModel, Counts]]:
-    """Distinct scenes with their variants."""
-    everything = np.arange(cases.size, dtype=np.int64)
-    for variants in _split(everything, _structure(cases, everything)):
+def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
+    """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
+    for variants in _split(chosen, structure(cases, chosen)):
         own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
         values = LaneValues(own, cases.columns_of(variants), variants.size)
         timing = values.timing()
@@ -249,6 +270,11 @@ def _scenes(study: Study, cases: Cases) -> Iterator[tuple[SceneModel, Counts]]:
             codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
         for part in _split(np.arange(variants.size), codes):
             yield build_model(own, *_timing_of(values, int(part[0])), cases.paths), variants[part]
+
+
+def base_scene(study: Study) -> SceneModel:
+    """The scene of a study without its sweep."""
+    return build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
 
 
 def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
@@ -265,8 +291,8 @@ def _structural(cases: Cases) -> list[str]:
     return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
 
 
-def _structure(cases: Cases, variants: Counts) -> Counts:
-    """(V,) number of the scene that each variant has, by the dimensions that change it."""
+def structure(cases: Cases, variants: Counts) -> Counts:
+    """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
     positions = cases.positions(variants)
     dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(_structural(cases))}
     code = np.zeros(variants.size, dtype=np.int64)

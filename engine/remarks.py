@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.lanes import LaneValues
+from engine.lanes import LaneValues, moving_mass, weight
 from engine.plan import Bucket, Plan
 
 Array = NDArray[np.float64]
@@ -23,8 +23,9 @@ def remarks(plan: Plan) -> list[str]:
 
 
 def _unsupported(plan: Plan) -> Iterator[str]:
-    for part in plan.base.bodies:
-        if part.modal.rigid_modes:
+    riding = {carriage.rides for carriage in plan.base.carriages}
+    for number, part in enumerate(plan.base.bodies):
+        if part.modal.rigid_modes and number not in riding:
             yield f"nothing holds body {part.name} fully: it will move away as a rigid body"
 
 
@@ -56,9 +57,9 @@ def _fast(plan: Plan) -> Iterator[str]:
 def _heavy(plan: Plan) -> Iterator[str]:
     worst = 0.0
     for bucket, values in _lanes(plan):
-        for carriage in bucket.scene.carriages:
+        for number, carriage in enumerate(bucket.scene.carriages):
             mass = bucket.scene.bodies[carriage.body].modal.mass
-            worst = max(worst, float(values.moving_mass(carriage.name).max()) / mass)
+            worst = max(worst, float(moving_mass(bucket.scene, values, number).max()) / mass)
     if worst > HEAVY:
         yield f"a carriage weighs up to {worst:.3g} times its body: look at more modes and steps before believing it"
 
@@ -66,12 +67,12 @@ def _heavy(plan: Plan) -> Iterator[str]:
 def _deep(plan: Plan) -> Iterator[str]:
     worst = 0.0
     for bucket, values in _lanes(plan):
-        for carriage in bucket.scene.carriages:
+        for number, carriage in enumerate(bucket.scene.carriages):
             body = bucket.scene.bodies[carriage.body].modal
             if not body.rigid_modes:
                 s = np.linspace(0.0, body.length, 33)
                 flexibility = np.abs(body.influence_at(s, s)).max() / body.length
-                worst = max(worst, float(np.abs(values.weight(carriage.name)).max()) * flexibility)
+                worst = max(worst, float(np.abs(weight(bucket.scene, values, number)).max()) * flexibility)
     if worst > DEEP:
         yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
 

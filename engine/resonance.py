@@ -2,9 +2,10 @@
 
 With the mass held by nothing and the contact by the kept modes alone, spring k swings at
 omega_c^2 = k (1/m + 1/m_c),  1/m_c = mu/(1 + m_w mu),  mu = largest sum of phi^2 along the track: no frequency of the
-coupled scene exceeds (omega_N^2 + sum omega_c^2)^1/2. Where a step is many contact periods long, the tie is as good as
-rigid at position level and the march may grow: measured at omega_c h = 200, 6e5 times per passage with average
-acceleration, 2.8e3 times with HHT-alpha -0.02, at most 1.4 with -0.05. Up to omega_c h = 2 pi it was 1.3 at most.
+coupled scene exceeds (omega_N^2 + sum omega_c^2)^1/2. A body on its contacts has sum v^2, its own mobility there, in
+place of 1/m. Where a step is many contact periods long, the tie is as good as rigid at position level and the march may
+grow: measured at omega_c h = 200, 6e5 times per passage with average acceleration, 2.8e3 times with HHT-alpha -0.02, at
+most 1.4 with -0.05. Up to omega_c h = 2 pi it was 1.3 at most.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from engine.fidelity import LIMIT_MARGIN, STEPS_PER_PERIOD, check_fixed_steps
 from engine.lanes import LaneValues
-from engine.model import SceneModel, SpringTie
+from engine.model import SceneModel
+from engine.ties import SpringTie
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -27,11 +29,11 @@ PLACES = 257  # along the track, at which the mobility is looked for
 
 
 def bounce_omega(model: SceneModel, values: LaneValues) -> Array:
-    """(V,) rad/s: of the fastest sprung mass on a spring that stands on rigid ground; 0 without any."""
+    """(V,) rad/s: of the fastest sprung mass on a spring that stands on rigid ground; 0 without any. Bodies on contacts
+    have no rule of this kind: where they swing faster than what they ride they are like its higher modes."""
     found = np.zeros(values.size)
-    for spring in model.springs:
-        key = f"carriage.{model.carriages[spring.carriage].name}"
-        found = np.maximum(found, np.sqrt(values.of(f"{key}.stiffness") / values.of(f"{key}.mass")))
+    for spring in model.sprung:
+        found = np.maximum(found, np.sqrt(values.of(f"{spring.key}.stiffness") / values.of(f"{spring.key}.mass")))
     return found
 
 
@@ -41,11 +43,16 @@ def contact_omega(model: SceneModel, values: LaneValues) -> Array:
 
 
 def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) -> Array:
-    carriage = model.carriages[spring.carriage]
-    key, body = f"carriage.{carriage.name}", model.bodies[carriage.body].modal
+    if spring.rigid:
+        return np.zeros(values.size)
+    body = model.bodies[model.carriages[spring.carriage].body].modal
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, PLACES)) ** 2, axis=1)))
-    contact = mobility / (1.0 + values.of(f"{key}.wheel_mass") * mobility)
-    return np.asarray(values.of(f"{key}.stiffness") * (1.0 / values.of(f"{key}.mass") + contact))
+    stiffness = values.of(f"{spring.key}.stiffness")
+    if spring.held is not None:
+        own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
+        return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
+    contact = mobility / (1.0 + values.of(f"{spring.key}.wheel_mass") * mobility)
+    return np.asarray(stiffness * (1.0 / values.of(f"{spring.key}.mass") + contact))
 
 
 def spring_steps(model: SceneModel, values: LaneValues) -> dict[str, Array]:
@@ -53,8 +60,12 @@ def spring_steps(model: SceneModel, values: LaneValues) -> dict[str, Array]:
     if not model.springs:
         return {}
     turns = values.time_scale(model.carriages[0].name) / (2.0 * math.pi)
-    rules = {
-        f"{STEPS_PER_PERIOD} per period of a sprung mass": STEPS_PER_PERIOD * turns * bounce_omega(model, values),
+    rules = (
+        {}
+        if not model.sprung
+        else {f"{STEPS_PER_PERIOD} per period of a sprung mass": STEPS_PER_PERIOD * turns * bounce_omega(model, values)}
+    )
+    rules |= {
         f"{STEPS_PER_CONTACT_PERIOD} per period of a contact resonance": STEPS_PER_CONTACT_PERIOD
         * turns
         * contact_omega(model, values),

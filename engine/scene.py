@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import AnyBody
-from engine.carriages import AnyCarriage
+from engine.carriages import AnyCarriage, BodyCarriage
 from engine.checks import Check, on_body
 from engine.document import Document, Source, document_of, read_document, shortened
 from engine.motions import Cruise
-from engine.sensors import Sensor
+from engine.sensors import OF_A_BODY, Envelope, Sensor
 from engine.settings import Output, Solver, Sweep
 from engine.spec import Keys, Spec, field_at, nearest, refuse
 from engine.units import Acceleration, Unit, fault
@@ -26,7 +26,7 @@ STANDARD_GRAVITY = 9.80665
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
 # numbers that do not belong to the model
-FIXED = ("schema_version", "sweep", "output", "question", "solver.audit")
+FIXED = ("schema_version", "sweep", "output", "question", "solver.audit", "envelope")
 
 
 def _known_version(version: int) -> int:
@@ -53,6 +53,7 @@ class Scene(Spec):
     body: dict[str, AnyBody] = Field(default_factory=dict)
     carriage: dict[str, AnyCarriage] = Field(default_factory=dict)
     sensor: dict[str, Sensor] = Field(default_factory=dict)
+    envelope: dict[str, Envelope] = Field(default_factory=dict)
     sweep: Sweep = Field(default_factory=lambda: Sweep.model_validate({}))
     solver: Solver = Field(default_factory=Solver)
     output: Output = Field(default_factory=Output)
@@ -182,10 +183,17 @@ def checks(study: Study) -> Iterator[Check]:
         yield from body.checks(f"body.{name}")
     for name, carriage in study.carriage.items():
         yield from carriage.motion.checks(f"carriage.{name}.motion", f"body.{carriage.on}.length")
+        if isinstance(carriage, BodyCarriage):
+            yield from carriage.places(f"carriage.{name}", f"body.{carriage.body}.length")
     for name, sensor in study.sensor.items():
         if sensor.at is not None:
             here = f"sensor.{name}.at"
             yield on_body(here, (here, f"body.{sensor.body}.length"), "a sensor off its body")
+    for name, envelope in study.envelope.items():
+        for key, field in (("from", "from_"), ("to", "to")):
+            if getattr(envelope, field) is not None:
+                here, needs = f"envelope.{name}.{key}", (f"envelope.{name}.{field}", f"body.{envelope.body}.length")
+                yield on_body(here, needs, "an envelope off its body")
 
 
 def _replaced(data: Any, keys: Keys, value: Any, path: str) -> Any:
@@ -221,7 +229,13 @@ def _numbers(here: str, value: Any) -> Iterator[tuple[str, float]]:
 def _check_names(study: Study) -> None:
     """Names that can stand in an archive, and results that do not collide."""
     tables: dict[str, Iterable[str]]
-    tables = {"body": study.body, "carriage": study.carriage, "sensor": study.sensor, "sweep": study.sweep.axes}
+    tables = {
+        "body": study.body,
+        "carriage": study.carriage,
+        "sensor": study.sensor,
+        "envelope": study.envelope,
+        "sweep": study.sweep.axes,
+    }
     for table, names in tables.items():
         for name in names:
             where = study.source.where(f"{table}.{name}")
@@ -230,8 +244,9 @@ def _check_names(study: Study) -> None:
             if table != "body" and name in RESERVED:
                 raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
     sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+    envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
     try:
-        results = expand("march", sensors, list(study.carriage))
+        results = expand("march", sensors, list(study.carriage), envelopes)
     except BadInput as error:
         where = study.source.where(error.where)
         raise BadInput(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
@@ -245,23 +260,64 @@ def _check_references(study: Study) -> None:
     """Every name that is mentioned exists, and sensors suit their bodies."""
     for name, carriage in study.carriage.items():
         _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
+        if isinstance(carriage, BodyCarriage):
+            _check_rider(study, name, carriage)
     for name, sensor in study.sensor.items():
         here = f"sensor.{name}"
         if sensor.rides is not None:
             _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
-        if sensor.carriage is not None and not hasattr(study.carriage[sensor.carriage], "stiffness"):
-            where = study.source.where(f"{here}.carriage")
-            remedy = f'under = "{sensor.carriage}" reads the body where the carriage touches it'
-            raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
+        if sensor.carriage is not None:
+            _check_of_carriage(study, here, sensor)
         if sensor.body is not None:
             _must_exist(study, f"{here}.body", sensor.body, "body")
         body = study.body_of(name)
         if sensor.body not in (None, body):
             where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
             raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
-        if sensor.quantity == "stress" and (missing := study.body[body].lacks_for_stress):
-            where = study.source.where(f"body.{body}.{missing}")
-            raise BadInput("a stress sensor needs this key", where=where, expected="a length (m), > 0")
+        _check_quantity(study, here, body, sensor.quantity)
+    for name, envelope in study.envelope.items():
+        _must_exist(study, f"envelope.{name}.body", envelope.body, "body")
+        _check_quantity(study, f"envelope.{name}", envelope.body, envelope.quantity)
+
+
+def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
+    """A body has the quantity that is read of it, and the keys that this needs."""
+    body = study.body[name]
+    if quantity in body.untold:
+        expected = f"one of {', '.join(told for told in OF_A_BODY if told not in body.untold)}"
+        raise BadInput(
+            f"the body {name} tells no {quantity}", where=study.source.where(f"{here}.quantity"), expected=expected
+        )
+    if quantity in ("stress", "strain") and (missing := body.lacks_for_stress):
+        where = study.source.where(f"body.{name}.{missing}")
+        raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
+
+
+def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
+    """A carriage has what a sensor of its own reads."""
+    carriage = study.carriage[str(sensor.carriage)]
+    if sensor.quantity == "contact_force":
+        contacts = carriage.contacts if isinstance(carriage, BodyCarriage) else {}
+        if sensor.contact is not None and sensor.contact not in contacts:
+            where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"
+            missing = "none: leave this key out" if not contacts else expected
+            raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
+    elif not hasattr(carriage, "stiffness"):
+        remedy = f'under = "{sensor.carriage}" reads the body where the carriage touches it'
+        if isinstance(carriage, BodyCarriage):
+            remedy = f'body = "{carriage.body}" and at = metres along its track read the body that rides'
+        where = study.source.where(f"{here}.carriage")
+        raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
+
+
+def _check_rider(study: Study, name: str, carriage: BodyCarriage) -> None:
+    """A body that rides is another one, rides once, and has the points that its contacts name."""
+    here = f"carriage.{name}.body"
+    _must_exist(study, here, carriage.body, "body")
+    riding = [c.body for c in study.carriage.values() if isinstance(c, BodyCarriage)]
+    if carriage.body == carriage.on or riding.count(carriage.body) > 1:
+        what = "a body cannot ride on itself" if carriage.body == carriage.on else "this body rides twice"
+        raise BadInput(what, where=study.source.where(here), received=shortened(carriage.body), remedy="another body")
 
 
 def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carriage"]) -> None:

@@ -74,11 +74,15 @@ class Every(Spec):
 
 
 class Output(Spec):
-    """What the archive keeps of the histories."""
+    """What the archive keeps of the histories.
+
+    unreduced: number of variants, spread over the sweep, that are computed again by the unreduced finite-element model.
+    """
 
     histories: Annotated[
         Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
     ] = "auto"
+    unreduced: int = Field(default=0, ge=0, le=1000)
 
 
 def read_amount(value: Any) -> float | int | str:

@@ -1,13 +1,14 @@
 """What is observed at every step, and the rows of numbers that make it: sensors at a place, sensors under a carriage,
 contact forces.
 
-Displacement, bending moment, shear force and stress are linear in w and its derivatives along the track and carry the
+Displacement, section forces, stress and strain are linear in w and its derivatives along the track and carry the
 static residual of the modes left out (mechanics section 7.8): influence line minus kept modes, times the actual
 contact force. Velocity and acceleration are those of the kept modes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,17 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.modal import ModalBody, Sections
+from engine.grips import holds, place
+from engine.grips import rows as shape_rows
 from engine.kernels.layout import Watch
-from engine.model import BodyPart, CarriageTie, DamperTie, SceneModel
+from engine.model import BodyPart, SceneModel
+from engine.ties import CarriageTie, Grip
 from engine.timeline import Rider
-from engine.track import Way
+from engine.ways import Way
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
-DERIVATIVE = {"displacement": 0, "bending_moment": 2, "stress": 2, "shear_force": 3}
-OF_SECTIONS = ("bending_moment", "shear_force", "stress")
+# of w along the track, for what statics make; axial forces are those of `ModalBody.sections` alone
+DERIVATIVE = {"displacement": 0, "axial_force": 1, "bending_moment": 2, "stress": 2, "strain": 2, "shear_force": 3}
+OF_SECTIONS = ("bending_moment", "shear_force", "axial_force", "stress", "strain")
 RATE_ORDER = {"velocity": 1, "acceleration": 2}
 
 
@@ -78,22 +83,40 @@ class Sensor:
         found = np.zeros((along[0].s.size, model.ties))
         if self.quantity not in DERIVATIVE or not model.study.solver.static_correction:
             return found
-        for r, (carriage, way) in enumerate(zip(model.carriages, along, strict=True)):
-            if way.active and carriage.body == self.body:
-                missing = self._full(model, along, way.s) - self._kept(model, along, way.shape(self._modal(model)))
-                found[:, contact_ties(model, r)] = np.broadcast_to(missing, found.shape[:1])[:, None]
-        for r, damper in enumerate(model.dampers, start=len(model.carriages)):
-            if damper.body == self.body:
-                kept = self._kept(model, along, damper.row(self._modal(model))[None, :])
-                found[:, r] = self._full_of(model, along, damper) - kept
+        for r, grip in self._felt(model, along):
+            kept = self._kept(model, along, shape_rows(model, grip, along))
+            found[:, r] += grip.factor * (self._full(model, along, place(grip, along)) - kept)
         return found
 
-    def unit_static(self, model: SceneModel, along: tuple[Way, ...], rider: int) -> Array:
-        """(1 or stations,) static reading per unit force of a carriage, by what the march tends to when it is slow:
-        the whole influence line with the static correction, else the kept modes."""
-        if model.study.solver.static_correction:
-            return self._full(model, along, along[rider].s)
-        return self._kept(model, along, along[rider].shape(self._modal(model)))
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations, ties) static reading per unit force of each tie, by what the march tends to when it is slow: the
+        whole influence line with the static correction, else the kept modes."""
+        found = np.zeros((along[0].s.size, model.ties))
+        if self.offset_order == 0:
+            for r, grip in self._felt(model, along):
+                found[:, r] += grip.factor * self.unit_reading(model, along, grip)
+        return found
+
+    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
+        """(1 or stations,) static reading per unit force where a grip holds its body."""
+        if not model.study.solver.static_correction:
+            return self._kept(model, along, shape_rows(model, grip, along))
+        whole = self._full(model, along, place(grip, along))
+        here = None if grip.rider is None else along[grip.rider].here
+        return whole if here is None else np.where(here, whole, 0.0)
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(1 or stations, N) what it reads of the coordinates that only contacts hold (`statics.loose_modes`)."""
+        if self.offset_order:
+            return np.zeros((1, model.omega.size))
+        return _spread(model, model.bodies[self.body], self._rows(model, along))
+
+    def _felt(self, model: SceneModel, along: tuple[Way, ...]) -> Iterator[tuple[int, Grip]]:
+        """The grips of all ties on its body, with the ties' numbers."""
+        for r, grips in enumerate(model.grips):
+            for grip in grips:
+                if grip.body == self.body and holds(grip, along):
+                    yield r, grip
 
     def _modal(self, model: SceneModel) -> ModalBody:
         return model.bodies[self.body].modal
@@ -110,30 +133,29 @@ class Sensor:
         shape = self.shape(model, along, DERIVATIVE[self.quantity])
         return np.asarray(_factor(model.bodies[self.body], self.quantity) * shape)
 
-    def _full(self, model: SceneModel, along: tuple[Way, ...], s: Array) -> Array:
-        """Static reading per unit force at s."""
+    def _full(self, model: SceneModel, along: tuple[Way, ...], loaded: Array | str) -> Array:
+        """Static reading per unit force at places of the track (m), or at a point (its name)."""
         part, sections = model.bodies[self.body], self._sections(model)
+        if isinstance(loaded, str):
+            return self._under_point(model, along, loaded)
         if sections is not None:
-            return sections.influence_at(self.quantity, self.places(along), s)
-        line = part.modal.influence_at(self.places(along), s, DERIVATIVE[self.quantity])
+            return sections.influence_at(self.quantity, self.places(along), loaded)
+        line = part.modal.influence_at(self.places(along), loaded, DERIVATIVE[self.quantity])
         return np.asarray(_factor(part, self.quantity) * line)
 
-    def _full_of(self, model: SceneModel, along: tuple[Way, ...], damper: DamperTie) -> Array:
-        """Static reading per unit force of a damper."""
+    def _under_point(self, model: SceneModel, along: tuple[Way, ...], point: str) -> Array:
+        """Static reading per unit force at a point."""
         part, x = model.bodies[self.body], self.places(along)
-        if not isinstance(damper.at, str):
-            return self._full(model, along, np.array([damper.at]))
         assert part.modal.points is not None
         if self._sections(model) is not None:
-            return part.modal.points.section_influence(self.quantity, damper.at, x)
-        line = part.modal.points.influence(damper.at, x, DERIVATIVE[self.quantity])
-        return np.asarray(_factor(part, self.quantity) * line)
+            return part.modal.points.section_influence(self.quantity, point, x)
+        return np.asarray(
+            _factor(part, self.quantity) * part.modal.points.influence(point, x, DERIVATIVE[self.quantity])
+        )
 
     def _kept(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
-        omega = self._modal(model).omega
-        flexible = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0.0)
-        return np.asarray(np.sum(self._rows(model, along) * loaded * flexible, axis=1))
+        return np.asarray(np.sum(self._rows(model, along) * loaded * self._modal(model).modal_flexibility, axis=1))
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""
@@ -184,30 +206,34 @@ class SprungSensor(Sensor):
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return np.zeros((along[0].s.size, model.ties))
 
-    def unit_static(self, model: SceneModel, along: tuple[Way, ...], rider: int) -> Array:
-        return self._kept(model, along, along[rider].shape(self._modal(model)))
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((along[0].s.size, model.ties))
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        found = np.zeros((1, model.omega.size))
+        found[0, self.mode] = float(self.offset_order == 0)
+        return found
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return np.zeros(along[0].s.size)
 
     def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
-        x = self.places(along)
-        return model.sag(self.body, x, 0) if self.offset_order == 0 else np.zeros(x.size)
+        return np.zeros(along[0].s.size)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactForce:
-    """The force between a carriage (its number) and its body, N."""
+    """The force (N) between a carriage (its number) and its body, or at one contact of a body that rides (the number of
+    its spring among all ties)."""
 
     carriage: int
+    spring: int | None = None
 
     def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
         return []
 
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
-        found = np.zeros((along[0].s.size, model.ties))
-        found[:, contact_ties(model, self.carriage)] = 1.0
-        return found
+        return np.broadcast_to(contact_row(model, self.carriage, self.spring), (along[0].s.size, model.ties))
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return np.zeros(along[0].s.size)
@@ -216,22 +242,71 @@ class ContactForce:
     def offset_order(self) -> int:
         return 0
 
+    def rider(self, model: SceneModel) -> int:
+        """The rider whose place it is."""
+        return self.carriage if self.spring is None else model.springs[self.spring - model.first_spring].rider
+
     def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
-        way, carriage = along[self.carriage], model.carriages[self.carriage]
+        rider = self.rider(model)
+        way, body = along[rider], model.carriages[self.carriage].body
         if not way.active:
             return np.zeros(way.s.size, dtype=np.bool_)
-        low, high = span_counted(model, carriage.rider, carriage.body)
+        low, high = span_counted(model, model.riders[rider], body)
         return np.asarray((way.s >= low) & (way.s <= high))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSensor(Sensor):
+    """The force at one contact of a body that rides (the number of its spring among all ties), or at all contacts of a
+    carriage together, as a sensor with its history. It counts wherever the carriage's contact is on its body."""
+
+    carriage: int
+    spring: int | None
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        return []
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.broadcast_to(contact_row(model, self.carriage, self.spring), (along[0].s.size, model.ties))
+
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return self.missed(model, along)
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((1, model.omega.size))
+
+    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
+        return np.ones(1)
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+        return np.full(along[0].s.size, along[ContactForce(self.carriage, self.spring).rider(model)].active)
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
 
 
 Signal = Sensor | ContactForce
 
 
-def contact_ties(model: SceneModel, carriage: int) -> list[int]:
-    """The ties whose forces add up to the contact force of a carriage."""
-    spring = model.spring_of(carriage)
-    return [carriage] if spring is None else [carriage, spring]
+def contact_row(model: SceneModel, carriage: int, spring: int | None = None) -> Array:
+    """(ties,) parts of all ties' forces that make the contact force of a carriage, or that at one of its contacts."""
+    found = np.zeros(model.ties)
+    if spring is None:
+        found[[carriage, *model.springs_of(carriage)]] = 1.0
+    else:
+        found[spring] = 1.0
+        found[carriage] = model.springs[spring - model.first_spring].share
+    return found
+
+
+def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
+    """The contact force of every carriage; of a body that rides, that of every contact."""
+    found: list[ContactForce] = []
+    for number, carriage in enumerate(model.carriages):
+        springs = model.springs_of(number) if carriage.rides is not None else {}
+        found += [ContactForce(number, spring) for spring in springs] or [ContactForce(number)]
+    return tuple(found)
 
 
 def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, float]:
@@ -247,21 +322,36 @@ def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, flo
 
 def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
     """The sensors in the study's order, the acceleration across of some carriages, then all contact forces."""
-    bodies = [part.name for part in model.bodies]
     names = [carriage.name for carriage in model.carriages]
-    sensors: list[Signal] = []
-    for name, spec in model.study.sensor.items():
-        under = None if spec.rides is None else names.index(spec.rides)
-        at, body = 0.0 if spec.at is None else spec.at, bodies.index(model.study.body_of(name))
-        sprung = [spring.mode for spring in model.springs if spec.carriage is not None and spring.carriage == under]
-        if sprung:
-            sensors.append(SprungSensor(name, spec.quantity, body, at, under, sprung[0]))
-        else:
-            sensors.append(Sensor(name, spec.quantity, body, at, under))
+    sensors: list[Signal] = [_sensor(model, name, names) for name in model.study.sensor]
     for carriage in accelerated:
         name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
-        sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))
-    return (*sensors, *(ContactForce(number) for number in range(len(names))))
+        if carriage.rides is None:
+            sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))
+        else:
+            sensors.append(Sensor(name, "acceleration", carriage.rides, carriage.reference, None))
+    return (*sensors, *contact_forces(model))
+
+
+def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
+    """A sensor of the study."""
+    spec, study = model.study.sensor[name], model.study
+    under = None if spec.rides is None else carriages.index(spec.rides)
+    body = [part.name for part in model.bodies].index(study.body_of(name))
+    at = 0.0 if spec.at is None else spec.at
+    if spec.carriage is None or under is None:
+        return Sensor(name, spec.quantity, body, at, under)
+    springs = model.springs_of(under)
+    if spec.quantity == "contact_force":
+        key = f"carriage.{spec.carriage}.contacts.{spec.contact}"
+        chosen = [r for r, spring in springs.items() if spring.key == key]
+        return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)
+    mode = next((spring.mode for spring in springs.values()), None)
+    return (
+        Sensor(name, spec.quantity, body, at, under)
+        if mode is None
+        else SprungSensor(name, spec.quantity, body, at, under, mode)
+    )
 
 
 def tabulate_watch(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Watch:
@@ -284,9 +374,12 @@ def tabulate_watch(model: SceneModel, signals: tuple[Signal, ...], along: tuple[
 
 
 def _factor(part: BodyPart, quantity: str) -> float:
-    """What a derivative of w is multiplied by: M = -E I w'', V = dM/ds, extreme-fibre stress M c / I."""
+    """What a derivative of w is multiplied by: M = -E I w'', V = dM/ds; of the extreme fibre strain -c w'', stress
+    M c / I."""
     if quantity == "displacement":
         return 1.0
+    if quantity == "strain":
+        return -part.fibre_distance
     factor = -part.modal.bending_stiffness
     return factor * part.fibre_distance / part.second_moment if quantity == "stress" else factor
 

@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.fidelity import free_steps
+from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
 from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
+from engine.ties import Grip
 from engine.timeline import Segment, Timeline, Window, build_timeline, refined
-from engine.track import Way, tabulate_ties, ways
+from engine.track import tabulate_ties
+from engine.ways import Way, ways
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -40,12 +43,10 @@ class SegmentTable(NamedTuple):
 
 
 class StaticUnit(NamedTuple):
-    """Static readings at some stations: per unit force of each carriage (H, J, C), per unit gravity (H, J), and the
-    first one's derivative by the first carriage's position (H, J, C)."""
+    """Static readings at some stations: per unit force of each carriage (H, J, C), and per unit gravity (H, J)."""
 
     force: Array
     gravity: Array
-    slope: Array
 
 
 @dataclass(eq=False)
@@ -165,49 +166,53 @@ class SceneTables:
             reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
             if sensor.under is not None:
                 reader = replace(reader, under=0)
-            largest = np.abs(reader.unit_static(self.model, (everywhere,), 0)).max()
+            largest = np.abs(reader.unit_reading(self.model, (everywhere,), Grip(1.0, sensor.body, 0))).max()
             found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 
     def ways_at(self, counts: Array | Counts) -> tuple[Way, ...]:
-        """Places of all carriages at stations by their count; ``active`` says whether any of them is on its body."""
+        """Places of all riders at stations by their count; ``active`` says whether it is on its body at any of them."""
         found = []
-        for rider in range(len(self.model.carriages)):
+        for rider in range(len(self.model.riders)):
             place = self.timeline.positions(rider, counts)
             here = np.isfinite(place)
             nowhere = np.zeros_like(place)
-            found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any())))
+            found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any()), here))
         return tuple(found)
 
     def static_at(self, counts: Array | Counts) -> StaticUnit:
         """Static readings of every sensor with the carriages where they are at stations by their count."""
         along = self.ways_at(counts)
-        here = [np.isfinite(self.timeline.positions(rider, counts)) for rider in range(len(along))]
-        shape = (counts.size, len(self.sensors), len(along))
-        force, slope, gravity = np.zeros(shape), np.zeros(shape), np.zeros(shape[:2])
-        for j, sensor in enumerate(self.sensors):
-            gravity[:, j] = sensor.sagging(self.model, along)
-            for r in range(len(along)):
-                if along[r].active:
-                    force[:, j, r] = np.where(here[r], self._unit(sensor, along, r), 0.0)
-            if along[0].active:
-                slope[:, j, 0] = np.where(here[0], self._unit_slope(sensor, along), 0.0)
-        return StaticUnit(force, gravity, slope)
+        readings = self._readings(along)
+        return StaticUnit(readings[:, :, :-1], readings[:, :, -1])
 
-    def _unit(self, sensor: Sensor, along: tuple[Way, ...], rider: int) -> Array:
-        """Static reading of a sensor per unit force of a carriage, at every station."""
-        if sensor.offset_order != 0 or self.model.carriages[rider].body != sensor.body:
-            return np.zeros(along[0].s.size)
-        return np.broadcast_to(sensor.unit_static(self.model, along, rider), along[0].s.shape)
+    def static_slope_at(self, counts: Array | Counts) -> Array:
+        """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""
+        along = self.ways_at(counts)
+        first = along[0]
+        assert first.here is not None
+        if not first.active:
+            return np.zeros((counts.size, len(self.sensors)))
+        return np.where(first.here[:, None], self._slope(along), 0.0)
 
-    def _unit_slope(self, sensor: Sensor, along: tuple[Way, ...]) -> Array:
-        """Derivative of the first carriage's unit reading by its position, from places a little apart."""
-        length = self.model.carriages[0].rider.length
-        first, others = along[0], along[1:]
-        before = replace(first, _shapes={}, s=np.maximum(first.s - SLOPE_STEP * length, 0.0))
-        after = replace(first, _shapes={}, s=np.minimum(first.s + SLOPE_STEP * length, length))
-        change = self._unit(sensor, (after, *others), 0) - self._unit(sensor, (before, *others), 0)
-        return np.asarray(change / (after.s - before.s))
+    def _readings(self, along: tuple[Way, ...]) -> Array:
+        """(S, J, C + 1) static readings of every sensor per unit weight of each carriage, and last per unit gravity."""
+        return static_readings(self.model, self.sensors, along)
+
+    def _slope(self, along: tuple[Way, ...]) -> Array:
+        """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
+        apart, which it reaches with all its contacts."""
+        riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
+        own = {0, *(spring.rider for spring in self.model.springs_of(0).values())}
+        lowest = np.minimum.reduce([along[r].s for r in own])
+        highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
+        before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)
+        left, right = (
+            tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
+            for shift in (before, after)
+        )
+        change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
+        return np.asarray(change / (after - before)[:, None])
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

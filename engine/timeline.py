@@ -32,15 +32,17 @@ _SAME = 1e-12  # events closer than this part of the scene are one
 
 @dataclass(frozen=True)
 class Rider:
-    """A carriage's way in scene time: its motion on a body of a length (m), started late, at its own pace.
+    """A way in scene time: a carriage's motion on a body of a length (m), started late, at its own pace.
 
-    pace: units of the motion's own tau per unit of scene time. delay: scene time at which it sets off.
+    pace: units of the motion's own tau per unit of scene time. delay: scene time at which it sets off. offset: m by
+    which a contact of the carriage is ahead of it.
     """
 
     motion: Motion
     length: float
     pace: float = 1.0
     delay: float = 0.0
+    offset: float = 0.0
 
     @property
     def end(self) -> float:
@@ -62,11 +64,11 @@ class Rider:
         first, last = (self._own(t) for t in (start, end))
         middle = 0.5 * (first + last)  # and not an end, which rounding may put on the other side
         if not 0.0 < middle < self.motion.duration:
-            place = self.motion.path(0.0 if middle <= 0.0 else self.motion.duration).S
+            place = self.motion.path(0.0 if middle <= 0.0 else self.motion.duration).S + self.offset
             return Path(np.full_like(tau, place), np.zeros_like(tau), np.zeros_like(tau))
         own = first + (tau - start) / (end - start) * (last - first)
         found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
-        return Path(found.S, found.dS * self.pace, found.ddS * self.pace**2)
+        return Path(found.S + self.offset, found.dS * self.pace, found.ddS * self.pace**2)
 
     def _own(self, tau: float) -> float:
         """The motion's own time; exactly that of an event where rounding puts it beside one."""
@@ -108,17 +110,18 @@ class Rider:
 
     def _crossings(self) -> Iterator[float]:
         """The motion's own times at which it passes an end of the body."""
-        low, high = self.motion.range()
+        low, high = (end + self.offset for end in self.motion.range())
         ends = [place for place, beyond in ((0.0, low < 0.0), (self.length, high > self.length)) if beyond]
         if not ends:
             return
         from scipy.optimize import brentq
 
         tau = np.linspace(0.0, self.motion.duration, 4001)
-        places = self.motion.path(tau).S
+        places = self.motion.path(tau).S + self.offset
         for end in ends:
+            own = end - self.offset
             for i in np.flatnonzero(np.diff(np.signbit(places - end))):
-                yield float(brentq(lambda t, e=end: float(self.motion.path(t).S) - e, tau[i], tau[i + 1], xtol=1e-15))
+                yield float(brentq(lambda t, e=own: float(self.motion.path(t).S) - e, tau[i], tau[i + 1], xtol=1e-15))
 
 
 class Strike(NamedTuple):

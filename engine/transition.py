@@ -22,7 +22,8 @@ from engine.march import prepare
 from engine.model import SceneModel
 from engine.signals import ContactForce, tabulate_watch
 from engine.tables import SceneTables
-from engine.track import Way, tabulate_ties
+from engine.track import tabulate_ties
+from engine.ways import Way
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class Frozen:
         """The ways of all carriages at the stations 0..steps."""
         still = np.zeros(steps + 1)
         way = Way(still + self.place, still + self.advance, still, active=True)
-        return tuple(way for _ in self.model.carriages)
+        return tuple(way for _ in self.model.riders)
 
 
 @dataclass(frozen=True, eq=False)

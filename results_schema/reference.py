@@ -7,7 +7,7 @@ from results_schema.variables import AXES, EVERY_KIND, Variable, registered
 
 
 def reference_table() -> str:
-    """All results that are written as a markdown table, for the README; what most kinds share stands once."""
+    """All results that are written as a markdown table, for docs/results.md; what most kinds share stands once."""
     rows = ["| variable | in | dimensions | type | unit | meaning |", "|---|---|---|---|---|---|"]
     shared = registered()["march"]
     for kind, variables in registered().items():
@@ -20,7 +20,8 @@ def reference_table() -> str:
 def _row(where: str, variable: Variable) -> str:
     lead = {"grid": ["the sweep's"], "history": ["the sweep's or `history`"], "none": []}[variable.lead]
     dims = ", ".join(lead + [" or ".join(f"`{name}`" for name in dim.split("|")) for dim in variable.dims])
-    unit = "the sensor's" if variable.units == "{sensor}" else (variable.units or "1")
+    own = {"{sensor}": "the sensor's", "{envelope}": "the envelope's"}
+    unit = own.get(variable.units or "", variable.units or "1")
     if variable.flags is not None:
         unit = "flags"
     elif variable.dtype == "str":

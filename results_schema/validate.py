@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,22 +17,35 @@ if TYPE_CHECKING:
 
 _TEXT_KINDS = "UTO"
 _COUNT_SHOWN = 3
+_NONE: Mapping[str, str] = MappingProxyType({})
 
 
-def validate(dataset: xr.Dataset, kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> None:
+def validate(
+    dataset: xr.Dataset,
+    kind: str,
+    sensors: Mapping[str, str],
+    carriages: Sequence[str],
+    envelopes: Mapping[str, str] = _NONE,
+) -> None:
     """Compare a dataset of a kind ("passage"; a group: "/audit") with what is declared.
 
-    sensors: name -> unit. The grid is the dimensions of `status` (of a group: none). Raises ArchiveError that lists
-    all findings.
+    sensors, envelopes: name -> unit. The grid is the dimensions of `status` (of a group: none). Raises ArchiveError
+    that lists all findings.
     """
-    findings = list(findings_of(dataset, kind, sensors, carriages))
+    findings = list(findings_of(dataset, kind, sensors, carriages, envelopes))
     if findings:
         raise ArchiveError(f"the results of {kind} are not as declared: " + "; ".join(findings))
 
 
-def findings_of(dataset: xr.Dataset, kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> Iterator[str]:
+def findings_of(
+    dataset: xr.Dataset,
+    kind: str,
+    sensors: Mapping[str, str],
+    carriages: Sequence[str],
+    envelopes: Mapping[str, str] = _NONE,
+) -> Iterator[str]:
     """Every difference from the declarations as one text."""
-    declared = expand(kind, sensors, carriages)
+    declared = expand(kind, sensors, carriages, envelopes)
     grid = tuple(map(str, dataset["status"].dims)) if "status" in dataset else ()
     for name, variable in declared.items():
         if variable.required and name not in dataset:

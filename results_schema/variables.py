@@ -1,8 +1,8 @@
 """Every output declared once: name, dimensions, type, unit, meaning.
 
-Checks, attributes in the archive and the table of the README derive from the declarations here and from those that
-each kind of study adds with `declare`. Names are templates: `{sensor}` and `{carriage}` stand for every sensor's
-and every carriage's name.
+Checks, attributes in the archive and the table in docs/results.md derive from the declarations here and from those that
+each kind of study adds with `declare`. Names are templates: `{sensor}`, `{carriage}` and `{envelope}` stand for every
+sensor's, carriage's and envelope's name.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from types import MappingProxyType
 from typing import Any, Literal
 
 from results_schema.errors import BadInput
@@ -24,7 +25,10 @@ QUANTITY_UNITS: Mapping[str, str] = {
     "acceleration": "m s-2",
     "bending_moment": "N m",
     "shear_force": "N",
+    "axial_force": "N",
     "stress": "Pa",
+    "strain": "1",
+    "contact_force": "N",
 }
 
 _RESERVED_WORDS = """
@@ -41,10 +45,10 @@ RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
 
 @dataclass(frozen=True)
 class Variable:
-    """One output, or one template for the outputs of every sensor or carriage.
+    """One output, or one template for the outputs of every sensor, carriage or envelope.
 
     dims: dimensions beyond the leading ones; "a|b" allows either.
-    units: udunits text; "{sensor}" is the sensor's own unit, "" dimensionless.
+    units: udunits text; "{sensor}", "{envelope}" are its own unit, "" dimensionless.
     lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
         (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
@@ -110,35 +114,41 @@ def axes() -> dict[str, Variable]:
     return dict(_REGISTRY[AXES])
 
 
-def expand(kind: str, sensors: Mapping[str, str], carriages: Sequence[str]) -> dict[str, Variable]:
+def expand(
+    kind: str, sensors: Mapping[str, str], carriages: Sequence[str], envelopes: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Variable]:
     """The declarations of a kind with the names and units of one study filled in.
 
-    sensors: name -> unit. Raises BadInput when two outputs get the same name or a name is reserved.
+    sensors, envelopes: name -> unit. Raises BadInput when two outputs get the same name or a name is reserved.
 
     >>> expand("march", {"midspan": "m"}, ["table"])["midspan_max"].units
     'm'
     """
-    for name in (*sensors, *carriages):
+    for name in (*sensors, *carriages, *envelopes):
         if name in RESERVED:
             raise BadInput("this name is reserved for results", where=name, remedy="choose another name")
     found: dict[str, Variable] = {}
     for variable in declarations(kind):
-        for one in _instances(variable, sensors, carriages):
+        for one in _instances(variable, sensors, carriages, envelopes):
             if one.name in found or (one.name != variable.name and one.name in RESERVED):
                 raise BadInput(
                     "two results would get this name",
                     where=one.name,
-                    remedy="rename the sensor or carriage",
+                    remedy="rename the sensor, carriage or envelope",
                 )
             found[one.name] = one
     return found
 
 
-def _instances(variable: Variable, sensors: Mapping[str, str], carriages: Sequence[str]) -> Iterable[Variable]:
+def _instances(
+    variable: Variable, sensors: Mapping[str, str], carriages: Sequence[str], envelopes: Mapping[str, str]
+) -> Iterable[Variable]:
     if "{sensor}" in variable.name:
         return [_filled(variable, "sensor", name, unit) for name, unit in sensors.items()]
     if "{carriage}" in variable.name:
         return [_filled(variable, "carriage", name, "") for name in carriages]
+    if "{envelope}" in variable.name:
+        return [_filled(variable, "envelope", name, unit) for name, unit in envelopes.items()]
     if variable.units == "{sensor}":
         units = set(sensors.values())
         return [replace(variable, units=units.pop() if len(units) == 1 else None)]
@@ -150,9 +160,10 @@ def _filled(variable: Variable, word: str, name: str, unit: str) -> Variable:
     return replace(
         variable,
         name=variable.name.replace(mark, name),
+        dims=tuple(dim.replace(mark, name) for dim in variable.dims),
         long_name=variable.long_name.replace(mark, name),
         meaning=variable.meaning.replace(mark, name),
-        units=unit if variable.units == "{sensor}" else variable.units,
+        units=None if variable.units is None else variable.units.replace(mark, unit),
     )
 
 
@@ -191,7 +202,7 @@ declare(
     Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
     _axis("peak", "number of the peak in the cycle", dtype="int64"),
     _axis("mode", "number of the mode, from 1", dtype="int64"),
-    _planned("sample", "number of the variant that was run again", dtype="int64"),
+    _axis("sample", "flat number of the variant that was run again", dtype="int64"),
     _axis("scheme", "time integration scheme", dtype="str"),
     _axis("step_count", "steps over one passage or cycle", dtype="int64"),
     _axis("mode_count", "number of modes", dtype="int64"),
@@ -327,7 +338,28 @@ HISTORIES: tuple[Variable, ...] = (
         gaps_allowed=True,
     ),
 )
-MARCH: tuple[Variable, ...] = (*EXTREMES, *ROOT_MEAN_SQUARES, *CONTACT_FORCES, *HISTORIES)
+ENVELOPES: tuple[Variable, ...] = (
+    *(
+        Variable(
+            f"{{envelope}}_envelope_{which}",
+            ("{envelope}_place",),
+            units="{envelope}",
+            long_name=f"{word} value at each place of {{envelope}}",
+            meaning="over the same instants as the extremes of sensors",
+        )
+        for which, word in (("max", "largest"), ("min", "smallest"))
+    ),
+    Variable(
+        "{envelope}_place",
+        ("{envelope}_place",),
+        units="m",
+        long_name="place of {envelope} along its body",
+        meaning="a coordinate",
+        required=False,
+        lead="none",
+    ),
+)
+MARCH: tuple[Variable, ...] = (*EXTREMES, *ROOT_MEAN_SQUARES, *CONTACT_FORCES, *HISTORIES, *ENVELOPES)
 
 declare("march", *MARCH)
 
@@ -343,6 +375,67 @@ declare(
         meaning="unit modal mass",
         lead="none",
         required=False,
+    ),
+)
+
+
+def _history(name: str, words: str, meaning: str = "") -> Variable:
+    dims = ("sample", "sensor", "station")
+    return Variable(name, dims, units=None, long_name=words, meaning=meaning, lead="none", nan_allowed=True)
+
+
+def _gap(name: str, words: str, meaning: str) -> Variable:
+    return Variable(name, ("sample", "sensor"), long_name=words, meaning=meaning, lead="none", nan_allowed=True)
+
+
+_SAMPLED = ("sample", "station")
+declare(
+    "/unreduced",
+    _history("marched", "history by the march of modes", "in the unit of its sensor"),
+    _history("marched_static", "static response by the modes at the same places"),
+    _history("unreduced", "history by the unreduced finite-element model"),
+    _history("unreduced_static", "static response by the unreduced model at the same places"),
+    Variable("elapsed", _SAMPLED, units="s", long_name="time since the start", lead="none", nan_allowed=True),
+    Variable(
+        "position",
+        _SAMPLED,
+        units="m",
+        long_name="position of the first carriage",
+        meaning="NaN where it is off its body",
+        lead="none",
+        nan_allowed=True,
+    ),
+    _gap(
+        "difference",
+        "largest difference of both models",
+        "of their histories, over the range of the unreduced model's; NaN where that does not vary",
+    ),
+    _gap(
+        "dynamic_difference",
+        "largest difference of the dynamic parts",
+        "history less static response at the same places, each model with its own; over the range of the unreduced "
+        "model's dynamic part",
+    ),
+    _gap(
+        "static_difference",
+        "largest difference of the static responses",
+        "of both models at the same places, over the range of the unreduced model's",
+    ),
+    _gap("dynamic_range", "range of the unreduced model's dynamic part", "of that part, over the range of its history"),
+    Variable("sensor_quantity", ("sensor",), "str", long_name="quantity of the sensor", lead="none"),
+    Variable(
+        "degrees_of_freedom",
+        ("sample",),
+        "int64",
+        long_name="degrees of freedom of the unreduced model",
+        lead="none",
+    ),
+    Variable(
+        "unreduced_steps",
+        ("sample",),
+        "int64",
+        long_name="steps of the unreduced model over the whole way",
+        lead="none",
     ),
 )
 declare(

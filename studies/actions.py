@@ -11,7 +11,7 @@ from studies import catalogue, console
 from studies.words import counted
 
 if TYPE_CHECKING:
-    from studies.bench import Throughput
+    from studies.bench import Scene, Throughput
     from studies.options import RunOptions
     from studies.runner import Outcome
 
@@ -116,8 +116,8 @@ def _refuse_unfinished(archive: Path) -> None:
     )
 
 
-def bench(modes: int, steps: int, variants: int, scheme: str, threads: int | None) -> Throughput:
+def bench(scene: Scene, threads: int | None) -> Throughput:
     """Measure the throughput of the march."""
-    from studies.bench import Scene, measure
+    from studies.bench import measure
 
-    return measure(Scene(modes, steps, variants, scheme), threads)
+    return measure(scene, threads)

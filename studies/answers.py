@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from studies.results import Results
 from studies.study import kind_named
+from studies.telling import told_envelopes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,11 +16,21 @@ if TYPE_CHECKING:
 
 def findings(dataset: xr.Dataset) -> list[str]:
     """The answer in sentences, the most important first."""
-    results = Results.of(dataset)
-    return kind_named(results.study.kind).findings(results)
+    return findings_of(Results.of(dataset))
 
 
 def figures(dataset: xr.Dataset) -> list[Figure]:
     """The figures of the report, the most important first."""
-    results = Results.of(dataset)
-    return kind_named(results.study.kind).figures(results)
+    return figures_of(Results.of(dataset))
+
+
+def findings_of(results: Results) -> list[str]:
+    """What the kind of study finds, then what the envelopes say."""
+    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results)]
+
+
+def figures_of(results: Results) -> list[Figure]:
+    """The figures of the kind of study, then the envelopes."""
+    from studies.pictures import envelopes
+
+    return [*kind_named(results.study.kind).figures(results), *envelopes.pictures(results)]

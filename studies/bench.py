@@ -34,35 +34,49 @@ PARAMETERS: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class Scene:
-    """Size of the fixed scene: a mass crosses the pinned beam of DLR 2012, section 2.3, in `steps` steps.
+    """Size of the fixed scene: a mass crosses the pinned beam of DLR 2012, section 2.3, in `steps` steps; or several,
+    one behind another at equal distances, all of them on the beam from the first step to the last.
 
-    Mass 10-500 kg, speed 1-20 m/s and damping 0-5 % of the variants are random with seed 0. The slowest are left out
-    where the scheme would leave its stability limit, since numbers that blow up take time of their own.
+    ties: how many masses. Mass 10-500 kg in all, speed 1-20 m/s and damping 0-5 % of the variants are random with
+    seed 0. The slowest are left out where the scheme would leave its stability limit, since numbers that blow up take
+    time of their own.
     """
 
     modes: int = 10
     steps: int = 1000
     variants: int = 16384
     scheme: str = "average-acceleration"
+    ties: int = 1
 
     def study(self) -> Study:
         """The scene as a study whose variants are listed one by one."""
         random = np.random.default_rng(0)
+        carriages = self.carriages()
+        speeds, masses = ([f"carriage.{name}.{key}" for name in carriages] for key in ("motion.speed", "mass"))
         axes = {
-            "speed": ("carriage.mass.motion.speed", random.uniform(self.least_speed(), MOST_SPEED, self.variants)),
-            "mass": ("carriage.mass.mass", random.uniform(10.0, 500.0, self.variants)),
+            "speed": (speeds, random.uniform(self.least_speed(), MOST_SPEED, self.variants)),
+            "mass": (masses, random.uniform(10.0, 500.0, self.variants) / self.ties),
             "damping_ratio": ("body.beam.damping_ratio", random.uniform(0.0, 0.05, self.variants)),
         }
         return Study(
             kind="passage",
             gravity=9.81,
             body={"beam": _BEAM | {"modes": self.modes}},
-            carriage={"mass": _CARRIAGE},
+            carriage=carriages,
             sensor={MIDSPAN: {"body": "beam", "at": 7.5, "quantity": "displacement"}},
             sweep={"zip": True} | {name: {"of": path, "values": values} for name, (path, values) in axes.items()},
             solver={"steps": self.steps, "static_correction": False, "scheme": self.scheme, **self.parameters},
             output={"histories": "none"},
         )
+
+    def carriages(self) -> dict[str, dict[str, Any]]:
+        """The masses; each goes as far as puts the first one at the end of the beam."""
+        apart = LENGTH / (self.ties + 1)
+        motions = [{"start": i * apart, "end": (i + 2) * apart} for i in range(self.ties)]
+        return {
+            f"mass_{i + 1}": _CARRIAGE | {"motion": {"kind": "cruise", "speed": 10.0, **motion}}
+            for i, motion in enumerate(motions)
+        }
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -100,7 +114,6 @@ _CARRIAGE = {
     "on": "beam",
     "kind": "mass",
     "mass": 100.0,
-    "motion": {"kind": "cruise", "start": 0.0, "end": 15.0, "speed": 10.0},
 }
 
 
@@ -117,6 +130,7 @@ class Throughput:
     threads: int
     best_of: int
     scheme: str
+    ties: int
 
     def as_json(self) -> dict[str, Any]:
         """For `bench --json`."""
@@ -141,6 +155,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
         threads=threads,
         best_of=best_of,
         scheme=scene.scheme,
+        ties=scene.ties,
     )
 
 

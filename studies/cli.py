@@ -118,13 +118,15 @@ def list_() -> None:
 @click.option("--steps", type=click.IntRange(1, 10**6), default=1000, show_default=True, help="Steps of a passage.")
 @click.option("--variants", type=click.IntRange(1, 10**6), default=16384, show_default=True, help="Variants at once.")
 @click.option("--scheme", default="average-acceleration", show_default=True, help="Time integration scheme.")
+@click.option("--ties", type=click.IntRange(1, 12), default=1, show_default=True, help="Masses on the beam at once.")
 @_THREADS
 @_JSON
-def bench(modes: int, steps: int, variants: int, scheme: str, threads: int | None, as_json: bool) -> None:
+def bench(threads: int | None, as_json: bool, **scene: Any) -> None:
     """Measure the pace of the march on this machine."""
     from studies import actions, console
+    from studies.bench import Scene
 
-    found = actions.bench(modes, steps, variants, scheme, threads)
+    found = actions.bench(Scene(**scene), threads)
     if as_json:
         console.say_json(found.as_json())
     else:

@@ -145,7 +145,8 @@ def show_outcome(outcome: Outcome) -> None:
 def show_throughput(found: Throughput) -> None:
     """What `bench` measured."""
     say(
-        f"{found.scheme}, {found.modes} modes, {found.steps} steps, {found.variants} variants, "
+        f"{found.scheme}, {counted(found.ties, 'tie')}, {found.modes} modes, {found.steps} steps, "
+        f"{found.variants} variants, "
         f"{counted(found.threads, 'thread')}, best of {found.best_of}: {number(found.seconds)} s",
         f"{number(found.case_mode_steps_per_second / 1e9)} thousand million modes x steps x variants per second, "
         f"{number(found.variants_per_second, 4)} variants per second",
@@ -162,11 +163,11 @@ def _about_statuses(counts: Mapping[str, int], noun: str) -> Iterator[str]:
 def _about_work(outcome: Outcome) -> str:
     from studies import summary
 
-    measured = summary.is_measured(outcome.results)
+    pieced = summary.is_pieced(outcome.results)
     variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))
     if outcome.was_finished:
         return f"{outcome.archive} holds the finished results of this very study; nothing to do"
-    resumed = counted(outcome.resumed, "piece") if measured else f"{outcome.resumed:,} of them"
+    resumed = counted(outcome.resumed, "piece") if pieced else f"{outcome.resumed:,} of them"
     earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
     return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"
 

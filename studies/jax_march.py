@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
 from engine.lanes import LaneValues, lane_table
-from engine.march import initial_state
+from engine.starting import initial_state
 from engine.tables import SceneTables
 
 Array = NDArray[np.float64]

@@ -1,4 +1,5 @@
-"""Studies that measure methods instead of answering about one scene: no sweep and no plan, computed piece by piece.
+"""Studies without a march's plan, computed piece by piece: those that measure methods instead of answering about one
+scene, which take no sweep, and those that compute a scene and its sweep in another way.
 
 Each finished piece is stored beside the archive, so a killed run goes on from there. What a method does wrong, such as
 blowing up, is the answer of such a study and no failure of the run.
@@ -29,6 +30,7 @@ else:
     AnySpec = TypeVar("AnySpec")
 
 WAIT_SECONDS = 0.05  # between looks at the request to stop
+PIECES_BYTES = 64 * 2**20  # more than what studies that measure leave on the disk
 GRACE_SECONDS = 1.0  # for a piece to end by itself after it
 
 
@@ -57,25 +59,29 @@ class Piece:
     """A part of a study's work, about 1 to 20 s of it, which depends on no other piece.
 
     name: small letters, digits and dashes, unique in its study. words: what it does. seconds: expected on two cores.
+    size: bytes on the disk, where they are many.
     """
 
     name: str
     words: str
     compute: Callable[[Work], xr.Dataset]
     seconds: float = field(default=1.0)
+    size: int = 0
 
 
 @runtime_checkable
 class MeasuringKind(Protocol):
-    """A kind of study that measures. settings: the class of its table [question].
+    """A kind of study that is computed in pieces. settings: the class of its table [question].
 
-    name, summary, question: as of every kind (see `studies.study.Kind`).
+    name, summary, question: as of every kind (see `studies.study.Kind`). sweeps: whether it takes a [sweep], whose grid
+    is then that of its results; else it measures, and a method that fails is an answer.
     """
 
     name: str
     summary: str
     question: str
     settings: type[Spec]
+    sweeps: bool
 
     def check(self, study: Study) -> None:
         """Refuse a scene that does not suit the kind; [question] and [sweep] are checked before. Raises BadInput."""
@@ -116,8 +122,9 @@ def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
 
 
 def check_measurable(study: Study, kind: MeasuringKind) -> None:
-    """Refuse a sweep, and a table [question] that the kind does not understand. Raises BadInput."""
-    if study.sweep.axes:
+    """Refuse a sweep where there can be none, envelopes, names that the results have, and a table [question] that the
+    kind does not understand. Raises BadInput."""
+    if study.sweep.axes and not kind.sweeps:
         raise BadInput(
             f"a study of the kind {kind.name} takes no sweep: it varies methods, not the scene",
             where=study.source.where("sweep"),
@@ -125,15 +132,46 @@ def check_measurable(study: Study, kind: MeasuringKind) -> None:
             received=f"the axes {', '.join(study.sweep.axes)}",
             remedy="what it varies stands in the table [question]",
         )
+    if study.envelope:
+        raise BadInput(
+            f"studies of the kind {kind.name} have no envelopes",
+            where=study.source.where("envelope"),
+            expected="no table [envelope]",
+            received=", ".join(study.envelope),
+        )
     question_of(study, kind.settings)
+    if kind.sweeps:
+        _check_names(study, kind)
 
 
-def key_of(study: Study, kind: MeasuringKind) -> str:
-    """What finished pieces belong to: the study's text, the kernels, and the names of the pieces."""
+def _check_names(study: Study, kind: MeasuringKind) -> None:
+    """Refuse names of sensors, carriages and axes that the kind's own results have."""
+    from results_schema.variables import expand, sensor_unit
+
+    units = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+    try:
+        declared = expand(kind.name, units, tuple(study.carriage))
+    except BadInput as error:
+        raise BadInput(error.what, where=study.source.where(error.where), remedy=error.remedy) from None
+    for name in study.sweep.axes:
+        if name in declared:
+            where = study.source.where(f"sweep.{name}")
+            raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
+
+
+def key_of(study: Study, pieces: Sequence[Piece]) -> str:
+    """What finished pieces belong to: the study's text, the files of its bodies, the kernels, the pieces' names."""
     from engine.kernels.jit import kernel_hash
 
-    names = "\n".join(piece.name for piece in kind.pieces(study))
-    return f"{study.source.sha256}-{kernel_hash()}-{hashlib.sha256(names.encode()).hexdigest()[:16]}"
+    names = "\n".join(piece.name for piece in pieces)
+    files = [body.content for body in study.body.values() if body.content]
+    texts = "-".join([study.source.sha256, *files])
+    return f"{texts}-{kernel_hash()}-{hashlib.sha256(names.encode()).hexdigest()[:16]}"
+
+
+def disk_bytes(pieces: Sequence[Piece]) -> int:
+    """Upper bound of what pieces and their archive take on the disk."""
+    return PIECES_BYTES + 2 * sum(piece.size for piece in pieces)
 
 
 def measure(

@@ -27,7 +27,7 @@ from engine.richardson import march_pair
 from engine.scene import Study
 from engine.tables import SceneTables
 from engine.timeline import Segment
-from engine.track import Way, ways
+from engine.ways import Way, ways
 from studies.measuring import Work
 
 Array = NDArray[np.float64]

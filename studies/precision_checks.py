@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 VARIED = ("scheme", "beta", "gamma", "alpha", "rho_inf", "steps")  # keys of [solver] that this study is about
 REMEDIES = {
-    "scheme": "name schemes in question.schemes; each has the parameters that the README gives",
+    "scheme": "name schemes in question.schemes; each has the parameters that docs/study-file.md gives",
     "steps": "give numbers of steps in question.step_counts",
 }
 NAMED = ("body", "carriage", "sensor")

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.lanes import LaneValues
-from engine.plan import Bucket, Plan, explain
+from engine.lanes import LaneValues, moving_mass
+from engine.model import SceneModel
+from engine.plan import Bucket, Plan, base_scene, explain
 from engine.remarks import remarks
+from engine.sweep import Cases, expand
+from studies.measuring import disk_bytes
 from studies.words import counted, number, unit_text
 
 if TYPE_CHECKING:
@@ -22,7 +25,6 @@ Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
 BUCKETS_SHOWN = 30
-PIECES_BYTES = 64 * 2**20  # more than any study that measures leaves on the disk
 
 
 class Table(NamedTuple):
@@ -44,7 +46,7 @@ class Preview:
 
 def preview(plan: Plan, threads: int) -> Preview:
     """The explanation of a plan for so many threads; computes nothing large."""
-    tables = (_study(plan), _bodies(plan), _sweep(plan), _ratios(plan), _work(plan))
+    tables = (_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan), _work(plan))
     cost = (
         f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
         f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk."
@@ -56,16 +58,28 @@ def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
     """The explanation of a study that measures: its pieces, one after another, and the time they take."""
     pieces = kind.pieces(study)
     rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
+    cases = expand(study)
+    if kind.sweeps:
+        rows.insert(1, ("variants", f"{cases.size:,}"))
     work = [(piece.name, piece.words, duration(piece.seconds)) for piece in pieces]
     tables = (
         Table(study.title or study.source.name, ("", ""), rows),
+        *(_of_scene(study, cases) if kind.sweeps else ()),
         Table("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work),
     )
     cost = (
         f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
-        f"{size(PIECES_BYTES)} on the disk."
+        f"{size(disk_bytes(pieces))} on the disk."
     )
-    return Preview(tables, cost, ())
+    return Preview(tuple(table for table in tables if table.rows), cost, ())
+
+
+def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:
+    """The scene of a study that is computed in pieces, as a march's preview shows it."""
+    base = base_scene(study)
+    yield _bodies(base)
+    yield from _checks(base)
+    yield _sweep(cases)
 
 
 def duration(seconds: float) -> str:
@@ -104,9 +118,9 @@ def _study(plan: Plan) -> Table:
 _START = {"rest": "undeformed, at rest", "equilibrium": "static equilibrium of the first position"}
 
 
-def _bodies(plan: Plan) -> Table:
-    values, rows = LaneValues(plan.base.study, {}, 1), []
-    for part in plan.base.bodies:
+def _bodies(base: SceneModel) -> Table:
+    values, rows = LaneValues(base.study, {}, 1), []
+    for part in base.bodies:
         omega = part.modal.omega
         rates = values.damping_rates(part.name, omega)[:, 0]
         elastic = omega > 0.0
@@ -117,7 +131,13 @@ def _bodies(plan: Plan) -> Table:
     return Table("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 
-def _sweep(plan: Plan) -> Table:
+def _checks(base: SceneModel) -> Iterator[Table]:
+    """One table per body that was checked when it was imported."""
+    for part in base.bodies:
+        yield Table(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
+
+
+def _sweep(cases: Cases) -> Table:
     rows = [
         (
             axis.name,
@@ -125,7 +145,7 @@ def _sweep(plan: Plan) -> Table:
             f"{span(axis.values)} {unit_text(axis.units)}".strip(),
             ", ".join(axis.paths),
         )
-        for axis in plan.cases.axes
+        for axis in cases.axes
     ]
     return Table("Sweep", ("axis", "values", "range", "sets"), rows)
 
@@ -149,7 +169,7 @@ def _ratios_of(plan: Plan, bucket: Bucket, name: str) -> Iterator[tuple[str, Arr
     if rider.motion.period is not None:
         yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
     if plan.study.carriage[name].inertial:
-        yield "mass over the body's mass", values.moving_mass(name) / scene.leading_body.modal.mass
+        yield "mass over the body's mass", moving_mass(scene, values, 0) / scene.leading_body.modal.mass
 
 
 def _work(plan: Plan) -> Table:

@@ -21,10 +21,13 @@ from results_schema.archive import Archive, open_archive
 from results_schema.errors import BadInput
 from results_schema.status import Status, label
 from results_schema.variables import Variable, expand
+from studies.answers import figures_of, findings_of
 from studies.figures import Figure, png, svg
-from studies.results import Results, sensor_units
+from studies.pictures import unreduced
+from studies.results import Results
 from studies.study import kind_named
 from studies.summary import noun, ranges
+from studies.unreduced import GROUP, told_unreduced
 from studies.words import counted, number, quantity, unit_text
 
 if TYPE_CHECKING:
@@ -55,7 +58,7 @@ class Drawn(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence of the answer; subject: the sensor or carriage that it is about, or ""."""
+    """One sentence of the answer; subject: the sensor, carriage or envelope that it is about, or ""."""
 
     subject: str
     text: str
@@ -89,7 +92,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     _check_folder(folder)
     source = open_archive(archive)
     results = Results.of(source.root)
-    figures = kind_named(results.study.kind).figures(results)
+    figures = [*figures_of(results), *unreduced.pictures(results, source.groups.get(GROUP))]
     page = page_of(source, results, figures)
     text = _template().render(page=page)
     files.make_folder(folder)
@@ -109,7 +112,9 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
         question=kind.question,
         noun=noun(source.root),
         facts=_facts(results, noun(source.root)),
-        findings=[_finding(results, text) for text in kind.findings(results)],
+        findings=[
+            _finding(results, text) for text in (*findings_of(results), *told_unreduced(source.groups.get(GROUP)))
+        ],
         figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
         statuses=_statuses(results, noun(source.root)),
         scene=_scene(results),
@@ -177,13 +182,13 @@ def _facts(results: Results, noun: str) -> list[Row]:
         Row("kind of study", results.study.kind),
         *(counts if _statuses(results, noun) else ()),
         Row("modes", " to ".join(str(count) for count in dict.fromkeys((modes[0], modes[-1])))),
-        Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}"),
+        *([Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}")] if high else []),
     ]
 
 
 def _finding(results: Results, text: str) -> Finding:
     subject, colon, rest = text.partition(": ")
-    if colon and subject in (*results.sensors, *results.study.carriage):
+    if colon and subject in (*results.sensors, *results.study.carriage, *results.envelopes):
         return Finding(subject, rest)
     return Finding("", text)
 
@@ -206,7 +211,7 @@ def _scene(results: Results) -> dict[str, list[Row]]:
     for name, value in results.study.data.items():
         if name in ("sweep", "schema_version", "title", "kind"):
             continue
-        if name in ("body", "carriage", "sensor"):
+        if name in ("body", "carriage", "sensor", "envelope"):
             for own, table in value.items():
                 found[f"{name} {own}"] = _rows(results, f"{name}.{own}", table, swept)
         elif isinstance(value, dict):
@@ -273,7 +278,7 @@ def _results(results: Results) -> list[tuple[str, ...]]:
 
 def _declarations(results: Results) -> list[tuple[str, ...]]:
     """Name, dimensions, unit and meaning of every variable in the archive."""
-    declared = expand(results.study.kind, sensor_units(results.study), tuple(results.study.carriage))
+    declared = expand(results.study.kind, results.sensors, tuple(results.study.carriage), results.envelopes)
     names = [str(name) for name in results.dataset.data_vars]
     return [_declaration(results, declared[name]) for name in names if name in declared]
 

@@ -141,6 +141,11 @@ class Results:
         return next(iter(self.study.carriage))
 
     @cached_property
+    def envelopes(self) -> dict[str, str]:
+        """Name and unit of every envelope."""
+        return envelope_units(self.study)
+
+    @cached_property
     def kept(self) -> xr.DataArray:
         """Where the status keeps values."""
         return self.dataset["status"] < int(Status.NOT_CONVERGED)
@@ -149,6 +154,16 @@ class Results:
     def held(self) -> NDArray[np.bool_]:
         """Where values are kept and the contact holds, in the sweep's shape: beyond, the equations say no more."""
         return np.asarray(self.kept.values & (self.dataset["status"].values != int(Status.SEPARATED)))
+
+    @cached_property
+    def with_values(self) -> NDArray[np.bool_]:
+        """Which variants speak for all, in the sweep's shape: those whose contact holds, or all with values if none."""
+        return self.held if self.held.any() else np.asarray(self.kept.values)
+
+    def envelope(self, name: str, end: str) -> Array:
+        """An envelope's "max" or "min", in the sweep's shape and over its places."""
+        values = self.dataset[f"{name}_envelope_{end}"].transpose(*self.dims, f"{name}_place")
+        return np.asarray(values.values, dtype=np.float64)
 
     @cached_property
     def status_counts(self) -> dict[Status, int]:
@@ -245,6 +260,11 @@ class Results:
 def sensor_units(study: Study) -> dict[str, str]:
     """Name and unit of every sensor."""
     return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+
+
+def envelope_units(study: Study) -> dict[str, str]:
+    """Name and unit of every envelope."""
+    return {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
 
 
 def statuses(counts: Mapping[Status, int]) -> str:

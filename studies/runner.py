@@ -20,12 +20,12 @@ from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
 from results_schema.pieces import PieceStore
 from studies.gathering import Gatherer
-from studies.measuring import MeasuringKind, Work, key_of, measure
+from studies.measuring import MeasuringKind, Work, disk_bytes, key_of, measure
 from studies.options import RunOptions
-from studies.preview import PIECES_BYTES
 from studies.provenance import attributes
 from studies.stopping import Stop
 from studies.study import Kind, finish, gathered, kind_of
+from studies.unreduced import check_unreduced, refuse_unreduced, unreduced_group
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,6 +89,7 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
     from engine.plan import make_plan
     from engine.remarks import remarks
 
+    check_unreduced(run.study)
     plan = make_plan(run.study, reduction=kind.reduction(run.study))
     files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
     worth_knowing = tuple(remarks(plan))
@@ -97,26 +98,36 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
         _march(plan, store, done, run)
         run.stop.check()
         root = _finished_dataset(plan, store)
-        seconds = _write(run, root, plan.key, model_groups(plan.base))
+        groups = model_groups(plan.base) | unreduced_group(plan, root, run.stop.check)
+        seconds = _write(run, root, plan.key, groups)
         store.remove()
     return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing)
 
 
 def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
-    """A study that measures: its pieces, one after another."""
-    files.check_free(run.archive.parent, PIECES_BYTES, "the pieces and the archive")
-    key = key_of(run.study, kind)
+    """A study in pieces, one after another."""
+    refuse_unreduced(run.study)
+    pieces = kind.pieces(run.study)
+    files.check_free(run.archive.parent, disk_bytes(pieces), "the pieces and the archive")
+    key = key_of(run.study, pieces)
     with (PieceStore.discard_foreign if run.options.overwrite else PieceStore)(run.archive, key) as store:
-        pieces = kind.pieces(run.study)
         names = {piece.name for piece in pieces}
         done = {name: found for name, found in store.finished().items() if name in names}
         work, progress = Work(run.options.threads, run.stop), run.progress or (lambda finished, total: None)
         found = measure(pieces, work, done=done, keep=store.write, progress=progress)
         run.stop.check()
         root = _as_declared(gathered, found, run.study)
-        seconds = _write(run, root, key, {})
+        seconds = _write(run, root, key, _bodies(run.study) if kind.sweeps else {})
         store.remove()
     return Outcome(run.archive, root, len(done), False, seconds)
+
+
+def _bodies(study: Study) -> Mapping[str, xr.Dataset]:
+    """The bodies of the scene without its sweep, by group."""
+    from engine.dataset import model_groups
+    from engine.plan import base_scene
+
+    return model_groups(base_scene(study))
 
 
 def _write(run: _Run, root: xr.Dataset, key: str, groups: Mapping[str, xr.Dataset]) -> float:

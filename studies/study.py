@@ -106,12 +106,12 @@ def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     Raises ArchiveError where the two differ.
     """
     from results_schema.variables import expand
-    from studies.results import sensor_units
+    from studies.results import envelope_units, sensor_units
 
     kind = kind_named(study.kind)
     assert not isinstance(kind, MeasuringKind)
     finished = kind.summarise(dataset, study)
-    declared = expand(kind.name, sensor_units(study), tuple(study.carriage))
+    declared = expand(kind.name, sensor_units(study), tuple(study.carriage), envelope_units(study))
     # The engine offers static values to every summary; they are results only where the kind says so.
     offered = [f"{sensor}_static" for sensor in study.sensor]
     return _compared(finished.drop_vars([n for n in offered if n not in declared], errors="ignore"), study)
@@ -130,14 +130,14 @@ def gathered(pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
 def _compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """With units of sensors and the study's attributes, and as declared."""
     from results_schema.validate import validate
-    from studies.results import sensor_units
+    from studies.results import envelope_units, sensor_units
 
     if "sensor" in dataset.dims:
         units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
         dataset = dataset.assign_coords(sensor_unit=units)
     missing = {key: value for key, value in study_attributes(study).items() if key not in dataset.attrs}
     dataset = dataset.assign_attrs(missing)
-    validate(dataset, study.kind, sensor_units(study), tuple(study.carriage))
+    validate(dataset, study.kind, sensor_units(study), tuple(study.carriage), envelope_units(study))
     return dataset
 
 

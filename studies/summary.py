@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.status import Status, label
+from results_schema.variables import expand
 from studies.words import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from studies.runner import Outcome
+    from studies.study import AnyKind
 
 _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
@@ -50,10 +52,21 @@ class Range:
 
 def is_measured(results: xr.Dataset) -> bool:
     """Whether these are results of a study that measures: its grid is no sweep."""
+    kind = _kind(results)
+    return is_pieced(results) and not getattr(kind, "sweeps", False)
+
+
+def is_pieced(results: xr.Dataset) -> bool:
+    """Whether these were computed in pieces, and not by a march."""
     from studies.measuring import MeasuringKind
+
+    return isinstance(_kind(results), MeasuringKind)
+
+
+def _kind(results: xr.Dataset) -> AnyKind:
     from studies.study import kind_named
 
-    return isinstance(kind_named(str(results.attrs["study_kind"])), MeasuringKind)
+    return kind_named(str(results.attrs["study_kind"]))
 
 
 def noun(results: xr.Dataset) -> str:
@@ -73,22 +86,33 @@ def all_ok(results: xr.Dataset) -> bool:
 
 
 def ranges(results: xr.Dataset) -> Iterator[Range]:
-    """The range of every result that is one number per variant, or one per variant and sensor; of studies that
-    measure, which have no variants, of every result."""
+    """The range of every result that is one number per variant, or one per variant and sensor or place; of studies
+    in pieces of every result, but where they take a sweep without what belongs to no variant."""
     grid = results["status"].dims
-    if is_measured(results):
+    if is_pieced(results):
+        beside = () if is_measured(results) else _beside_the_grid(results)
         for name, array in results.data_vars.items():
-            if array.dtype.kind == "f":
+            if array.dtype.kind == "f" and name not in beside:
                 yield from _range(results, str(name), "", array)
         return
     for name, array in results.data_vars.items():
         if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
             continue
-        if array.dims == grid:
+        of_places = len(array.dims) == len(grid) + 1 and str(array.dims[-1]).endswith("_place")
+        if array.dims == grid or of_places:
             yield from _range(results, str(name), "", array)
         elif array.dims == (*grid, "sensor"):
             for place, sensor in enumerate(results["sensor"].values):
                 yield from _range(results, str(name), str(sensor), array.isel(sensor=place))
+
+
+def _beside_the_grid(results: xr.Dataset) -> set[str]:
+    """Results whose dimensions do not begin with the sweep's."""
+    from studies.results import Results, sensor_units
+
+    study = Results.of(results).study
+    declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
+    return {name for name, variable in declared.items() if variable.lead != "grid"}
 
 
 def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from studies.results import Index, Results, statuses
+from studies.results import Index, Results, extreme, statuses
 from studies.words import counted, percent, quantity
 
 if TYPE_CHECKING:
@@ -53,6 +53,27 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
     if lowest == axis.values.min():
         return f"exceeds {percent(threshold)} already at {quantity(lowest, axis.units)}"
     return f"first exceeds {percent(threshold)} at {quantity(lowest, axis.units)}"
+
+
+def told_envelopes(results: Results) -> list[str]:
+    """The value of largest size anywhere along a body, of every envelope."""
+    said = []
+    for name, envelope in results.study.envelope.items():
+        ends = [results.envelope(name, end) for end in ("max", "min")]
+        values = np.where(np.abs(ends[0]) >= np.abs(ends[1]), *ends)
+        place = extreme(np.where(results.with_values[..., None], np.abs(values), np.nan))
+        if place is None:
+            said.append(f"{name}: no variant has values.")
+            continue
+        value = quantity(float(values[place]), results.envelopes[name])
+        at = quantity(float(results.dataset[f"{name}_place"].values[place[-1]]), "m")
+        held = "while the contact holds, " if not results.held.all() and results.held.any() else ""
+        words = envelope.quantity.replace("_", " ")
+        said.append(
+            f"{name}: {held}the largest {words} along {envelope.body} is {value}, at {at} of its track"
+            f"{f' ({which})' if (which := results.at(place[:-1])) else ''}."
+        )
+    return said
 
 
 def told_statuses(results: Results) -> list[str]:

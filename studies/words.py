@@ -45,14 +45,16 @@ def number(value: float, digits: int = 3) -> str:
 def unit_text(units: str) -> str:
     """A unit of the archive as people write it.
 
-    >>> unit_text("m s-2"), unit_text("N m"), unit_text("1"), unit_text("kg m-3")
-    ('m/s²', 'N m', '', 'kg/m³')
+    >>> unit_text("m s-2"), unit_text("N m"), unit_text("1"), unit_text("kg m-3"), unit_text("kg-0.5")
+    ('m/s²', 'N m', '', 'kg/m³', '1/√kg')
     """
     over, under = [], []
     for part in ("" if units == "1" else units).split():
-        stem = part.rstrip("-0123456789")
+        stem = part.rstrip("-.0123456789")
         power = part[len(stem) :]
-        if power.startswith("-"):
+        if power == "-0.5":
+            under.append(f"√{stem}")
+        elif power.startswith("-"):
             under.append(stem + ("" if power == "-1" else power[1:].translate(_SUPERSCRIPTS)))
         else:
             over.append(stem + power.translate(_SUPERSCRIPTS))

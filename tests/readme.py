@@ -1,15 +1,16 @@
-"""The parts of the README that are made from the code; `python -m tests.readme` writes them anew."""
+"""The documentation that is made from the code: `python -m tests.readme` writes docs/results.md anew."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 README = Path(__file__).parents[1] / "README.md"
+RESULTS = README.parent / "docs" / "results.md"
 BEGIN, END = "<!-- declarations: begin -->\n", "<!-- declarations: end -->\n"
 
 
 def with_declarations(text: str) -> str:
-    """The README's text with the table of all declared results between its marks."""
+    """A text with the table of all declared results between its marks."""
     from results_schema.reference import reference_table
     from studies.study import kind_named, kind_names
 
@@ -21,4 +22,4 @@ def with_declarations(text: str) -> str:
 
 
 if __name__ == "__main__":
-    README.write_text(with_declarations(README.read_text(encoding="utf-8")), encoding="utf-8")
+    RESULTS.write_text(with_declarations(RESULTS.read_text(encoding="utf-8")), encoding="utf-8")

@@ -19,17 +19,26 @@ PACKAGES = ("results_schema", "engine", "studies")
 STAGES = {
     "formulas": "kernels kernels.layout kernels.schemes",
     "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
-    "bodies bodies.body bodies.beam bodies.frame bodies.frame_geometry bodies.frame_rules bodies.reduced",
-    "numbers only": "kernels.jit kernels.record kernels.pairs kernels.stepping kernels.ties kernels.start "
-    "kernels.march kernels.comparison_steps kernels.comparison",
+    "bodies bodies.body bodies.beam bodies.frame bodies.frame_geometry bodies.frame_rules bodies.reduced bodies.rigid "
+    "bodies.imported bodies.import_ansys bodies.import_cards bodies.import_child bodies.import_extras "
+    "bodies.import_files bodies.import_market bodies.import_matrices bodies.import_model bodies.import_nastran "
+    "bodies.import_text bodies.import_track bodies.import_turn",
+    "numbers only": "kernels.jit kernels.vector kernels.record kernels.pairs kernels.stepping kernels.ties "
+    "kernels.start kernels.march kernels.comparison_steps kernels.comparison",
     "bodies as modes": "bodies.modal bodies.unit_modes bodies.beam_modes bodies.beam_statics bodies.flexibility "
     "bodies.craig_bampton bodies.frame_elements bodies.frame_assembly bodies.frame_track bodies.frame_shapes "
-    "bodies.frame_statics bodies.frame_sections bodies.frame_points bodies.frame_body bodies.reduced_body bodies.build",
-    "scenes as arrays": "timeline model track signals lanes fidelity tables resonance resolution",
+    "bodies.frame_statics bodies.frame_sections bodies.frame_points bodies.frame_body bodies.reduced_body "
+    "bodies.rigid_body bodies.imported_body bodies.imported_checks bodies.imported_line bodies.imported_model "
+    "bodies.imported_rows bodies.build",
+    "scenes as arrays": "timeline ties standing model ways grips statics track signals lanes influence coupled "
+    "fidelity tables envelopes resonance resolution",
     "all work of a study": "reduction plan histories remarks",
-    "the run": "march richardson ode transition comparison outcome dataset execution",
+    "the run": "starting march richardson ode transition comparison outcome dataset execution unreduced_track "
+    "unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march unreduced_comparison",
 }
-HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"}
+HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {
+    "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",
+}  # fmt: skip
 # Packages that only these modules of ours may import.
 ONLY_IN = {
     "dask": ("engine.execution",),

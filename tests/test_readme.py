@@ -1,4 +1,4 @@
-"""The README tells the truth: its table of results, and its study file."""
+"""The documentation tells the truth: its table of results, its study file, its links."""
 
 from __future__ import annotations
 
@@ -15,9 +15,22 @@ from tests.readme import README
 
 def test_the_table_of_results_is_the_declarations() -> None:
     """In a process of its own: tests declare kinds too."""
-    made = "import tests.readme as r; t = r.README.read_text(); import sys; sys.exit(t != r.with_declarations(t))"
+    made = "import tests.readme as r; t = r.RESULTS.read_text(); import sys; sys.exit(t != r.with_declarations(t))"
     finished = subprocess.run([sys.executable, "-c", made], cwd=README.parent, check=False)
     assert finished.returncode == 0, "run: python -m tests.readme"
+
+
+def test_links_lead_somewhere() -> None:
+    for page in (README, *README.parent.glob("docs/*.md")):
+        text = page.read_text(encoding="utf-8")
+        heads = {
+            re.sub(r"[^\w -]", "", head).strip().lower().replace(" ", "-")
+            for head in re.findall(r"^#+ (.*)", text, re.M)
+        }
+        for link in re.findall(r"\]\(([^)]+)\)", text):
+            path, _, anchor = link.partition("#")
+            assert link.startswith("http") or (page.parent / path).exists(), link
+            assert path or anchor in heads, link
 
 
 def test_the_study_file_runs() -> None:

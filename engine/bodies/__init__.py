@@ -8,10 +8,20 @@ from typing import Annotated
 from engine.bodies.beam import Beam
 from engine.bodies.body import Body
 from engine.bodies.frame import Frame
+from engine.bodies.imported import Ansys, Matrices, Nastran
 from engine.bodies.reduced import Reduced
+from engine.bodies.rigid import Rigid
 from engine.spec import KindOf, Spec
 
-BODIES: Mapping[str, type[Spec]] = {"beam": Beam, "frame": Frame, "reduced": Reduced}
-AnyBody = Annotated[Body, KindOf("body", BODIES, planned=("nastran", "ansys"))]
+BODIES: Mapping[str, type[Spec]] = {
+    "beam": Beam,
+    "frame": Frame,
+    "reduced": Reduced,
+    "rigid": Rigid,
+    "matrices": Matrices,
+    "ansys": Ansys,
+    "nastran": Nastran,
+}
+AnyBody = Annotated[Body, KindOf("body", BODIES)]
 
-__all__ = ["BODIES", "AnyBody", "Beam", "Body", "Frame", "Reduced"]
+__all__ = ["BODIES", "Ansys", "AnyBody", "Beam", "Body", "Frame", "Matrices", "Nastran", "Reduced", "Rigid"]

@@ -95,6 +95,10 @@ class Beam(Body):
         return () if isinstance(self.supports, str) else self.supports
 
     @property
+    def untold(self) -> tuple[str, ...]:
+        return ("axial_force",)  # loads act across it
+
+    @property
     def lacks_for_stress(self) -> str:
         return "fibre_distance" if self.fibre_distance is None else ""
 

@@ -46,8 +46,13 @@ class Body(Spec):
 
     @property
     def lacks_for_stress(self) -> str:
-        """The key within the body that a stress sensor needs and that is not given, or ""."""
+        """The key within the body that stress and strain need and that is not given, or ""."""
         return ""
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Quantities that no sensor can read on this body."""
+        return ()
 
     @property
     def content(self) -> str:

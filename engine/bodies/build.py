@@ -13,9 +13,13 @@ from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
 from engine.bodies.body import AUTO_MODES, Body
 from engine.bodies.frame import Frame
 from engine.bodies.frame_body import frame_body
+from engine.bodies.imported import Ansys, Imported, Matrices, Nastran
+from engine.bodies.imported_body import imported_body
 from engine.bodies.modal import ModalBody
 from engine.bodies.reduced import Reduced
 from engine.bodies.reduced_body import load_body
+from engine.bodies.rigid import Rigid
+from engine.bodies.rigid_body import rigid_body
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,4 +60,20 @@ def _reduced(body: Reduced) -> Built:
     return Built(load_body(body.file, body.modes))
 
 
-BUILDERS: Mapping[type[Body], Callable[[Any], Built]] = {Beam: _beam, Frame: _frame, Reduced: _reduced}
+def _rigid(body: Rigid) -> Built:
+    return Built(rigid_body(body))
+
+
+def _imported(body: Imported) -> Built:
+    return Built(imported_body(body))
+
+
+BUILDERS: Mapping[type[Body], Callable[[Any], Built]] = {
+    Beam: _beam,
+    Frame: _frame,
+    Reduced: _reduced,
+    Rigid: _rigid,
+    Matrices: _imported,
+    Ansys: _imported,
+    Nastran: _imported,
+}

@@ -16,10 +16,10 @@ from engine.bodies.frame_assembly import MASSES, Assembly, Counts, assemble, rig
 from engine.bodies.frame_geometry import unit
 from engine.bodies.frame_points import frame_points, point_loads
 from engine.bodies.frame_sections import TrackSections
-from engine.bodies.frame_shapes import TrackShapes, mode_forces, track_shapes
+from engine.bodies.frame_shapes import mode_forces, track_shapes
 from engine.bodies.frame_statics import track_statics
 from engine.bodies.frame_track import track_of
-from engine.bodies.modal import Array, ModalBody
+from engine.bodies.modal import Array, ModalBody, Shapes
 from engine.document import shortened
 from results_schema.errors import BadInput
 
@@ -75,9 +75,10 @@ def _reduced(frame: Frame) -> ModalBody:
     omega, shapes = frame_modes(frame, assembly, flexibility)
     moved = points.of(assembly.whole(shapes))
     masses = MASSES[frame.mass_matrix](track.beams)
-    turn = _settled(omega, track_shapes(track, moved, mode_forces(track, moved, omega, masses)), shapes)
+    along = track_shapes(track, moved, mode_forces(track, moved, omega, masses))
+    turn = settled(omega, along, float(track.places[-1]), shapes)
     moved, shapes = moved @ turn, shapes @ turn
-    kept = _kept(frame, omega)
+    kept = kept_modes(frame, omega)
     omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
     gravity = unit(frame.gravity)
     spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
@@ -115,7 +116,7 @@ def frame_modes(frame: Frame, assembly: Assembly, flexibility: Flexibility) -> t
     omega, shapes = reduction.modes(flexibility.rigid)
     if frame.modes == "auto":
         count = min(len(omega), MAX_MODES)
-    ends = np.append(_groups(omega)[1:], len(omega))
+    ends = np.append(groups(omega)[1:], len(omega))
     count = int(ends[ends >= min(count, len(omega))][0])
     return omega[:count], shapes[:, :count]
 
@@ -127,13 +128,13 @@ def interface_freedoms(frame: Frame, assembly: Assembly) -> Counts:
     return np.flatnonzero(np.isin(assembly.free, wanted))
 
 
-def _groups(omega: Array) -> Counts:
+def groups(omega: Array) -> Counts:
     """First modes of the groups of equal frequencies."""
     apart = np.diff(omega) > SAME_FREQUENCY * omega[1:]
     return np.concatenate([[0], np.flatnonzero(apart) + 1])
 
 
-def _settled(omega: Array, along: TrackShapes, shapes: Array) -> Array:
+def settled(omega: Array, along: Shapes, length: float, shapes: Array) -> Array:
     """(k, k) turn within groups of equal frequencies, and signs, so that modes do not depend on the solver's whim.
 
     Within a group the first mode moves the track most, the next what is left, by the mean square along it. Then the
@@ -141,8 +142,8 @@ def _settled(omega: Array, along: TrackShapes, shapes: Array) -> Array:
     """
     count = len(omega)
     turn = np.eye(count)
-    fine = along.rows(np.linspace(0.0, along.places[-1], 16 * count + 1), 0)
-    for first, end in pairwise([*_groups(omega), count]):
+    fine = along.rows(np.linspace(0.0, length, 16 * count + 1), 0)
+    for first, end in pairwise([*groups(omega), count]):
         part = fine[:, first:end]
         if end - first > 1:
             _, vectors = np.linalg.eigh(part.T @ part)
@@ -157,7 +158,7 @@ def _settled(omega: Array, along: TrackShapes, shapes: Array) -> Array:
     return turn
 
 
-def _kept(frame: Frame, omega: Array) -> Counts:
+def kept_modes(frame: Frame, omega: Array) -> Counts:
     """The modes that stay: not those left out (nor their equals), nor rigid-body modes if these are dropped."""
     out = np.zeros(len(omega), dtype=np.bool_)
     for index, number in enumerate(frame.leave_out):
@@ -170,7 +171,7 @@ def _kept(frame: Frame, omega: Array) -> Counts:
                 received=str(number),
             )
         out[number - 1] = True
-    for first, end in pairwise([*_groups(omega), len(omega)]):
+    for first, end in pairwise([*groups(omega), len(omega)]):
         out[first:end] |= out[first:end].any()
     if frame.rigid_body_modes == "drop":
         out |= omega == 0.0

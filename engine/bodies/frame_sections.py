@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.bodies.frame_elements import deflection_shapes, stiffness
 from engine.bodies.frame_shapes import FORCES, ModeForces
-from engine.bodies.frame_statics import TrackStatics
+from engine.bodies.frame_statics import TrackStatics, is_every_pair
 from engine.bodies.frame_track import TrackBeams, track_places
 from engine.bodies.modal import Array
 from results_schema.errors import BadInput
@@ -49,19 +49,34 @@ class TrackSections:
     def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
         """The same at `x` per unit force at `s`, for pairs that are broadcast against each other."""
         track, length = self.statics.track, self.statics.length
-        places, loads = np.broadcast_arrays(track_places(x, length), track_places(s, length))
+        at_x, at_s = track_places(x, length), track_places(s, length)
+        if is_every_pair(at_x, at_s):
+            return self._lines(quantity, at_x.reshape(-1), at_s).reshape(np.broadcast_shapes(at_x.shape, at_s.shape))
+        places, loads = np.broadcast_arrays(at_x, at_s)
         place, load = places.reshape(-1), loads.reshape(-1)
         element, at = track.at(place)
         moved = self.statics.moved(element, load)
-        forces = _from_ends(track, element, at, moved) + _held(track, place, load)
+        forces = forces_from_ends(track, element, at, moved) + held_forces(track, place, load)
         return np.asarray(np.sum(section_weights(track, quantity)[element] * forces, axis=1).reshape(places.shape))
+
+    def _lines(self, quantity: str, x: Array, s: Array) -> Array:
+        """(X, S) the same for all places with all loads."""
+        track = self.statics.track
+        element, at = track.at(x)
+        weights = section_weights(track, quantity)[element]
+        each = np.repeat(np.arange(len(x)), 12)
+        ends = forces_from_ends(track, element[each], at[each], np.tile(np.eye(12), (len(x), 1)))
+        found = self.statics.lines(element, np.sum(weights[each] * ends, axis=1).reshape(-1, 12), s)
+        i, j = np.nonzero(element[:, None] == track.at(s)[0])
+        found[i, j] += np.sum(weights[i] * held_forces(track, x[i], s[j]), axis=1)
+        return found
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
         """The same at `x` under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
         self.statics.refuse_loose()
         track = self.statics.track
         element, at = track.at(track_places(x, self.statics.length))
-        spread = _spread(track, element, at, self.statics.spread)
+        spread = spread_forces(track, element, at, self.statics.spread[element])
         found = np.sum(section_weights(track, quantity)[element] * spread, axis=1)
         return np.asarray(found + self.under_response(quantity, self.statics.weight, x))
 
@@ -70,7 +85,7 @@ class TrackSections:
         track = self.statics.track
         element, at = track.at(track_places(x, self.statics.length))
         ends = response.reshape(-1, 6)
-        forces = _from_ends(track, element, at, np.concatenate([ends[element], ends[element + 1]], axis=1))
+        forces = forces_from_ends(track, element, at, np.concatenate([ends[element], ends[element + 1]], axis=1))
         return np.asarray(np.sum(section_weights(track, quantity)[element] * forces, axis=1))
 
 
@@ -99,7 +114,7 @@ def section_weights(track: TrackBeams, quantity: str) -> Array:
     return found
 
 
-def _from_ends(track: TrackBeams, element: Counts, x: Array, moved: Array) -> Array:
+def forces_from_ends(track: TrackBeams, element: Counts, x: Array, moved: Array) -> Array:
     """(S, 6) section forces from displacements (S, 12) of the ends of elements without load."""
     axes, beams = track.axes[element], track.beams.part(element)
     local = np.einsum("sij,sbj->sbi", axes, moved.reshape(-1, 4, 3)).reshape(-1, 12)
@@ -109,7 +124,7 @@ def _from_ends(track: TrackBeams, element: Counts, x: Array, moved: Array) -> Ar
     return found
 
 
-def _held(track: TrackBeams, x: Array, s: Array) -> Array:
+def held_forces(track: TrackBeams, x: Array, s: Array) -> Array:
     """(S, 6) section forces of an element with held ends under the unit load at s, from `TrackBeams.within`."""
     element, _ = track.at(x)
     beams = track.beams.part(element)
@@ -121,9 +136,9 @@ def _held(track: TrackBeams, x: Array, s: Array) -> Array:
     return found
 
 
-def _spread(track: TrackBeams, element: Counts, x: Array, load: Array) -> Array:
-    """(S, 6) section forces of an element with held ends under force per length `load` (E, 3)."""
-    length, (along, y, z) = track.beams.length[element], load[element].T
+def spread_forces(track: TrackBeams, element: Counts, x: Array, load: Array) -> Array:
+    """(S, 6) section forces of an element with held ends under force per length `load` (S, 3)."""
+    length, (along, y, z) = track.beams.length[element], load.T
     curve = (length**2 - 6.0 * x * (length - x)) / 12.0
     found = np.zeros((len(x), FORCES))
     found[:, 0], found[:, 1], found[:, 2] = ((0.5 * length - x) * part for part in (along, y, z))

@@ -48,10 +48,11 @@ class TrackStatics:
     def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
         left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
-        return self._broadcast(left[:, None], right, derivative)
+        place, load = np.broadcast_arrays(left[:, None], right)
+        return self._broadcast(place, load, derivative)
 
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """The same for pairs, `x` and `s` broadcast against each other."""
+        """The same for pairs, `x` and `s` broadcast against each other; (X, 1) and (S,) are fast."""
         left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
         return self._broadcast(left, right, derivative)
 
@@ -93,7 +94,30 @@ class TrackStatics:
                     found[:, row] += flexible * acts[:, end, pattern]
         return found
 
+    def lines(self, element: Counts, takes: Array, s: Array) -> Array:
+        """(X, S) sums of `takes` (X, 12) times the motions of the ends of elements (X,) under a unit load at each s.
+
+        As `moved`, for all places with all loads, in a small part of the time.
+        """
+        count = len(self.patterns)
+        rows = 6 * element[:, None] + np.arange(12)
+        flexible = np.sum(takes[:, :, None] * self.flexibility[rows], axis=1)
+        other, _ = self.track.at(s)
+        ends = self.track.to_ends(s).reshape(-1, 2, 6)
+        found = np.zeros((len(element), len(s)))
+        for end in range(2):
+            for number, pattern in enumerate(self.patterns):
+                found += flexible[:, count * (other + end) + number] * np.sum(ends[:, end] * pattern, axis=1)
+        return found
+
     def _broadcast(self, x: Array, s: Array, derivative: int) -> Array:
+        if is_every_pair(x, s):
+            place = x.reshape(-1)
+            element, _ = self.track.at(place)
+            whole = self.lines(element, self.track.to_ends(place, derivative), s)
+            i, j = np.nonzero(element[:, None] == self.track.at(s)[0])
+            whole[i, j] += self.track.within(place[i], s[j], derivative)
+            return whole.reshape(np.broadcast_shapes(x.shape, s.shape))
         place, load = np.broadcast_arrays(x, s)
         return self._deflection(place.reshape(-1), load.reshape(-1), derivative).reshape(place.shape)
 
@@ -105,6 +129,11 @@ class TrackStatics:
         for row in range(12):
             found = found + takes[:, row] * moved[:, row]
         return found
+
+
+def is_every_pair(x: Array, s: Array) -> bool:
+    """Whether places (X, 1), or a single one, meet many loads (S,)."""
+    return s.ndim == 1 and s.size > 1 and x.size == x.shape[0] and (x.ndim == 2 or x.size == 1)
 
 
 def track_statics(

@@ -85,6 +85,7 @@ class ModalBody:
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
     points              places off the track; None: there are none
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
+    checks              what a body out of foreign files was checked for, and what was found, in words
     """
 
     length: float
@@ -99,6 +100,7 @@ class ModalBody:
     gravity_share: float = 1.0
     sections: Sections | None = None
     points: Points | None = None
+    checks: tuple[tuple[str, str], ...] = ()
 
     @property
     def rigid_modes(self) -> int:
@@ -126,6 +128,22 @@ class ModalBody:
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """`influence` for pairs of places, broadcast against each other (sensors under a carriage: x = s)."""
         return self.statics.influence_at(x, s, derivative)
+
+    @property
+    def modal_flexibility(self) -> Array:
+        """(N,) 1/omega^2, the static answer to a modal force, kg-normalised; 0 for rigid-body modes."""
+        return np.divide(1.0, self.omega**2, out=np.zeros_like(self.omega), where=self.omega > 0.0)
+
+    def flexibility_between(self, one: Array | str, other: Array | str) -> Array:
+        """Deflection at one place per unit force at another one, m/N: places (S,) of the track, broadcast against each
+        other, or a point's name."""
+        if not isinstance(one, str) and not isinstance(other, str):
+            return self.influence_at(one, other)
+        assert self.points is not None
+        if isinstance(one, str) and isinstance(other, str):
+            return np.array([self.points.between(one, other)])
+        name, track = (one, other) if isinstance(one, str) else (other, one)
+        return self.points.influence(str(name), np.asarray(track))
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under own weight, per unit gravity; m^(1-j) / (m/s^2).

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from engine.bodies.body import Body
@@ -40,6 +41,13 @@ class Reduced(Body):
     def content(self) -> str:
         """SHA-256 of the file."""
         return hashlib.sha256(Path(self.file).read_bytes()).hexdigest()
+
+    @cached_property
+    def untold(self) -> tuple[str, ...]:
+        from results_schema.bodies import read_body
+
+        fibres = read_body(self.file).arrays["fibre_distance"][:, 1]
+        return () if np.isfinite(fibres).all() else ("stress", "strain")
 
     @model_validator(mode="after")
     def _readable(self) -> Reduced:

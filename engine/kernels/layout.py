@@ -31,6 +31,10 @@ class Ties(NamedTuple):
     level: (stations, ties): likewise its gap.
     reacting, given: numbers of the ties whose force depends on the motion, and of those that are dead loads.
     moves, springs (ties): whether a tie's force depends on its kinematics, and whether on its gap.
+    residual: (stations, ties, ties), m/N: what the kept modes miss of the gap of a spring (row) per unit force of any
+           tie (column); (0, 0, 0) where they miss nothing.
+    unity: (ties): 1, or 0 for a rigid tie, whose force is what makes its kinematics and drive add up to zero.
+    reaches: (modes, ties): whether the rows of a mode and a tie are other than zero anywhere.
     """
 
     rows: FloatArray
@@ -40,6 +44,9 @@ class Ties(NamedTuple):
     given: IntArray
     moves: BoolArray
     springs: BoolArray
+    residual: FloatArray
+    unity: FloatArray
+    reaches: BoolArray
 
 
 class Lanes(NamedTuple):

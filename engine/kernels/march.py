@@ -9,8 +9,9 @@ F = load - gain (G + drive):
 
 A spring reads its gap  p.u = beta p.(D p) F - p.(beta c* - u*)  in the same way (section 4):
 
-    F = load - gain (G + drive) - stiff (p.u + level)
+    F = load - gain (G + drive) - stiff (p.u + level + residual F/h^2)
 
+A rigid tie has 0 in place of F on the left. Where there are several ties, what dead loads give is taken from c* first.
 ``mobility`` multiplies D where it meets a force. The pass over the modes corrects step n, observes it, predicts step
 n + 1 and gathers the sums of its tie equation.
 """
@@ -47,7 +48,22 @@ from engine.kernels.record import (
     observe,
 )
 from engine.kernels.stepping import advance, corrected, fields_of, first_predictors, remember
-from engine.kernels.ties import Sums, gather_ties, push_four, push_on_mode, set_ties, solve_ties
+from engine.kernels.ties import (
+    Twos,
+    couple_gaps,
+    couple_motions,
+    load_dead,
+    load_own,
+    load_ties,
+    miss,
+    note_members,
+    note_pushing,
+    note_shared,
+    push_ties,
+    pushed,
+    solve_ties,
+)
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 
 
 @piece
@@ -123,57 +139,43 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
                 b[SUM, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
                 b[FACTOR, j] += w * p * work[k, D, j]
         for n in range(1, stations):
-            drive = ties.drive[n, 0]
-            for j in range(LANES):
-                b[TIE, j] = (b[LOAD, j] + b[GAIN, j] * (b[SUM, j] - drive * b[GRAVITY, j])) / (
-                    1.0 + b[GAIN, j] * b[FACTOR, j]
-                )
-                b[SUM, j] = 0.0
-                b[FACTOR, j] = 0.0
-                b[LEAD, j] = 0.0
-                b[SECOND, j] = 0.0
+            driven = lanes_at(b, (SUM,)) - ties.drive[n, 0] * lanes_at(b, (GRAVITY,))
+            force = (lanes_at(b, (LOAD,)) + lanes_at(b, (GAIN,)) * driven) / (
+                1.0 + lanes_at(b, (GAIN,)) * lanes_at(b, (FACTOR,))
+            )
+            put_lanes(b, (TIE,), force)
             if n == stations - 1:
                 for k in range(modes):
-                    for j in range(LANES):
-                        b[PUSH, j] = rows[n, k, 0, FORCE] * b[TIE, j]
+                    put_lanes(b, (PUSH,), rows[n, k, 0, FORCE] * force)
                     store_mode(work, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             at = lead_moves * n
+            motion, factor, first, second = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
             for k in range(modes):
-                p_now = rows[n, k, 0, FORCE]
                 p, w, rate, curve = (
                     rows[m, k, 0, FORCE],
                     rows[m, k, 0, CLOSED],
                     rows[m, k, 0, RATE],
                     rows[m, k, 0, CURVE],
                 )
-                wp = w * p
+                d = lanes_at(work, (k, D))
+                a = rows[n, k, 0, FORCE] * (d * force) - lanes_at(work, (k, C))
+                q, v, u_next, v_next, c = advance(scheme, work, k, a)
+                motion = motion + (w * c - (rate * v_next + curve * u_next))
+                factor = factor + (w * p) * d
                 if leads == 2:
-                    row, second = watch.on_q[at, 0, k], watch.on_q[at, 1, k]
-                    for j in range(LANES):
-                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
-                        b[LEAD, j] += row * q
-                        b[SECOND, j] += second * q
-                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
-                        b[FACTOR, j] += wp * work[k, D, j]
+                    first = first + watch.on_q[at, 0, k] * q
+                    second = second + watch.on_q[at, 1, k] * q
                 elif leads == 1:
-                    row = watch.on_q[at, 0, k]
-                    for j in range(LANES):
-                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
-                        b[LEAD, j] += row * q
-                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
-                        b[FACTOR, j] += wp * work[k, D, j]
+                    first = first + watch.on_q[at, 0, k] * q
                 else:
-                    for j in range(LANES):
-                        a = p_now * (work[k, D, j] * b[TIE, j]) - work[k, C, j]
-                        q, v, q_next, v_next, c = advance(scheme, work, k, j, a)
-                        now[k, Q_NOW, j] = q
-                        now[k, V_NOW, j] = v
-                        now[k, A_NOW, j] = a
-                        b[SUM, j] += w * c - (rate * v_next + curve * q_next)
-                        b[FACTOR, j] += wp * work[k, D, j]
+                    put_lanes(now, (k, Q_NOW), q)
+                    put_lanes(now, (k, V_NOW), v)
+                    put_lanes(now, (k, A_NOW), a)
+            put_lanes(b, (SUM,), motion)
+            put_lanes(b, (FACTOR,), factor)
+            put_lanes(b, (LEAD,), first)
+            put_lanes(b, (SECOND,), second)
             observe(marks, now, b, watch, n, leads)
             keep(marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)
@@ -182,54 +184,51 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
 @kernel
 def march_many(ties, lanes, state, watch, record, scheme, count):
     """March one segment with any number of ties; otherwise as ``march_one``."""
-    rows = ties.rows
+    rows, reacting, given, reaches = ties.rows, ties.reacting, ties.given, ties.reaches
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
-    reacting = ties.reacting.shape[0]
+    half = (reacting.shape[0] + 1) // 2
     still = watch.on_q.shape[1] == watch.signal.shape[0]  # only displacements are observed
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
-    b = np.zeros((TIE + many + 4, LANES))  # ties are pushed in fours
+    b = np.zeros((TIE + many, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
-    pairs = 2 * ((many + 1) // 2)
-    sums = Sums(
-        np.zeros((reacting, LANES)),
-        np.zeros((reacting, LANES)),
-        np.zeros((reacting, pairs, LANES)),
-        np.zeros((reacting, pairs, LANES)),
-    )
+    own = np.zeros((many, 4, LANES))
+    matrix = np.zeros((2 * half, 2 * half, LANES))
+    # filled before they are put together: the compiler drops what is written into a local tuple's arrays where it is
+    # not read again under that name
+    member, moves, springs = np.zeros(2 * half, np.int64), np.zeros(half, np.bool_), np.zeros(half, np.bool_)
+    shared, shares = np.zeros((half, half, modes), np.int64), np.zeros((half, half), np.int64)
+    pushing, pushes = np.zeros((modes, reacting.shape[0]), np.int64), np.zeros(modes, np.int64)
+    note_members(member, moves, springs, ties)
+    note_shared(shared, shares, member, reaches)
+    note_pushing(pushing, pushes, reacting, reaches)
+    twos = Twos(member, moves, springs, shared, shares, pushing, pushes)
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
+        load_own(own, b, ties, lanes, block)
         copy_marks(marks, record.marks[block])
         history = record.history[block]
-        for n in range(stations):
-            if n > 0:
-                set_ties(b, sums, ties, lanes, scheme.beta, block, n)
-                solve_ties(b, sums.factor, ties, lanes, block)
-                if n == stations - 1:
-                    for k in range(modes):
-                        push_on_mode(b, rows, n, k, 0)
-                        store_mode(work, b, state, scheme, block, k)
+        for n in range(1, stations):
+            load_dead(work, b, rows, given, reaches, n)
+            load_ties(b, own, reacting, ties.drive[n], ties.level[n])
+            push_ties(b, work, rows, own, twos, n, scheme.beta)
+            couple_motions(matrix, work, rows, own, twos, n)
+            couple_gaps(matrix, work, rows, own, twos, n, scheme.beta)
+            if ties.residual.shape[0] > 0:
+                miss(matrix, b, ties, own, n)
+            solve_ties(b, matrix, reacting)
+            if n == stations - 1:
                 for k in range(modes):
-                    p0, p1, p2, p3 = push_four(rows, n, k, 0)
-                    if many > 4 or n == stations - 1:
-                        push_on_mode(b, rows, n, k, 4)
-                    if still:
-                        for j in range(LANES):
-                            push = (p0 * b[TIE, j] + p1 * b[TIE + 1, j]) + (p2 * b[TIE + 2, j] + p3 * b[TIE + 3, j])
-                            a = work[k, D, j] * (push + b[PUSH, j]) - work[k, C, j]
-                            q, _, _, _, _ = advance(scheme, work, k, j, a)
-                            now[k, Q_NOW, j] = q
-                    else:
-                        for j in range(LANES):
-                            push = (p0 * b[TIE, j] + p1 * b[TIE + 1, j]) + (p2 * b[TIE + 2, j] + p3 * b[TIE + 3, j])
-                            a = work[k, D, j] * (push + b[PUSH, j]) - work[k, C, j]
-                            q, v, _, _, _ = advance(scheme, work, k, j, a)
-                            now[k, Q_NOW, j] = q
-                            now[k, V_NOW, j] = v
-                            now[k, A_NOW, j] = a
-                observe(marks, now, b, watch, n, 0)
-                keep(marks, history, watch, record.sample[n], n, float(count + n))
-            if n < stations - 1:
-                gather_ties(sums, work, ties, scheme.beta, n + 1)
+                    put_lanes(b, (PUSH,), pushed(b, rows, twos, n, k))
+                    store_mode(work, b, state, scheme, block, k)
+            for k in range(modes):
+                a = lanes_at(work, (k, D)) * pushed(b, rows, twos, n, k) - lanes_at(work, (k, C))
+                q, v, _, _, _ = advance(scheme, work, k, a)
+                put_lanes(now, (k, Q_NOW), q)
+                if not still:
+                    put_lanes(now, (k, V_NOW), v)
+                    put_lanes(now, (k, A_NOW), a)
+            observe(marks, now, b, watch, n, 0)
+            keep(marks, history, watch, record.sample[n], n, float(count + n))
         copy_marks(record.marks[block], marks)

@@ -18,6 +18,7 @@ from engine.kernels.layout import (
     SMALLEST_AT,
     SQUARES,
 )
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 
 # rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
 SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, PUSH, TIE = range(12)
@@ -33,13 +34,12 @@ Q_NOW, V_NOW, A_NOW = range(3)
 @piece
 def add_modes(marks, i, now, b, row, field, order):
     """Signal i += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours."""
+    total = all_lanes(0.0)
     for k in range(0, now.shape[0], 4):
-        r0, r1, r2, r3 = row[k], row[k + 1], row[k + 2], row[k + 3]
-        for j in range(LANES):
-            marks[i, VALUE, j] += b[RATE_0 + order, j] * (
-                (r0 * now[k, field, j] + r1 * now[k + 1, field, j])
-                + (r2 * now[k + 2, field, j] + r3 * now[k + 3, field, j])
-            )
+        first = row[k] * lanes_at(now, (k, field)) + row[k + 1] * lanes_at(now, (k + 1, field))
+        second = row[k + 2] * lanes_at(now, (k + 2, field)) + row[k + 3] * lanes_at(now, (k + 3, field))
+        total = total + (first + second)
+    put_lanes(marks, (i, VALUE), lanes_at(marks, (i, VALUE)) + lanes_at(b, (RATE_0 + order,)) * total)
 
 
 @piece

@@ -52,45 +52,63 @@ def tie_row(rows, k, r):
     return rows[0, k, r, 1], rows[0, k, r, RATE], rows[0, k, r, CURVE]
 
 
+@piece
+def yield_to(force, matrix, unknown, i, ties, stiffness):
+    """Add the residual's part of the gap of reacting tie i to its equation; stiffness: k of its spring."""
+    r = ties.reacting[i]
+    for t in range(ties.reacting.shape[0]):
+        matrix[i, t] += stiffness * ties.residual[0, r, ties.reacting[t]]
+    for s in ties.given:
+        unknown[i] -= stiffness * ties.residual[0, r, s] * force[s]
+
+
+@piece
+def forces_at_start(force, matrix, unknown, ties, lanes, state, at):
+    """Forces of all ties of one lane at station 0, in step units, for the given displacements and velocities; at: its
+    block and lane. matrix, unknown: room for the system of the ties that react.
+
+    The row w of station 0 holds P alone. unity F = load - gain (P.a + A.v + B.u + drive) - stiff (p.u + level +
+    residual F/h^2),  a = mobility p F - c v - k u.
+    """
+    rows, reacting, (block, j) = ties.rows, ties.reacting.shape[0], at
+    h, gravity = lanes.step[block, j], lanes.gravity[block, j]
+    for r in range(rows.shape[2]):
+        force[r] = lanes.load[block, r, j]
+    for i in range(reacting):
+        r = ties.reacting[i]
+        gain = lanes.gain[block, r, j]
+        total, gap = -ties.drive[0, r] * gravity, ties.level[0, r] * gravity
+        for t in range(reacting):
+            matrix[i, t] = ties.unity[r] if i == t else 0.0
+        for k in range(rows.shape[1]):
+            inertial, rate, curve = tie_row(rows, k, r)
+            u, v = state.q[block, k, j], state.v[block, k, j] * h
+            elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
+            mobile = lanes.mobility[block, k, j]
+            for s in ties.given:
+                elastic -= mobile * rows[0, k, s, FORCE] * force[s]
+            total += inertial * elastic - rate * v - curve * u
+            gap += rows[0, k, r, FORCE] * u
+            for t in range(reacting):
+                matrix[i, t] += gain * inertial * mobile * rows[0, k, ties.reacting[t], FORCE]
+        unknown[i] = lanes.load[block, r, j] + gain * total - lanes.stiff[block, r, j] * gap
+        if ties.residual.shape[0] > 0:
+            yield_to(force, matrix, unknown, i, ties, lanes.stiff[block, r, j] / (h * h))
+    solve_in_place(matrix, unknown)
+    for i in range(reacting):
+        force[ties.reacting[i]] = unknown[i]
+
+
 @kernel
 def settle(ties, lanes, state):
-    """Accelerations that satisfy the equations of motion at station 0, for the given displacements and velocities.
-
-    The row w of station 0 holds P alone. F = load - gain (P.a + A.v + B.u + drive) - stiff (p.u + level),
-    a = mobility p F - c v - k u.
-    """
+    """Accelerations that satisfy the equations of motion at station 0, for the given displacements and velocities."""
     rows = ties.rows
     modes, many, reacting = rows.shape[1], rows.shape[2], ties.reacting.shape[0]
-    matrix = np.empty((reacting, reacting))
-    unknown = np.empty(reacting)
-    force = np.empty(many)
+    force, matrix, unknown = np.empty(many), np.empty((reacting, reacting)), np.empty(reacting)
     for block in range(lanes.step.shape[0]):
         for j in range(LANES):
             h = lanes.step[block, j]
-            for r in range(many):
-                force[r] = lanes.load[block, r, j]
-            for i in range(reacting):
-                r = ties.reacting[i]
-                gain = lanes.gain[block, r, j]
-                total = -ties.drive[0, r] * lanes.gravity[block, j]
-                gap = ties.level[0, r] * lanes.gravity[block, j]
-                for t in range(reacting):
-                    matrix[i, t] = 1.0 if i == t else 0.0
-                for k in range(modes):
-                    inertial, rate, curve = tie_row(rows, k, r)
-                    u, v = state.q[block, k, j], state.v[block, k, j] * h
-                    elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
-                    mobile = lanes.mobility[block, k, j]
-                    for s in ties.given:
-                        elastic -= mobile * rows[0, k, s, FORCE] * force[s]
-                    total += inertial * elastic - rate * v - curve * u
-                    gap += rows[0, k, r, FORCE] * u
-                    for t in range(reacting):
-                        matrix[i, t] += gain * inertial * mobile * rows[0, k, ties.reacting[t], FORCE]
-                unknown[i] = lanes.load[block, r, j] + gain * total - lanes.stiff[block, r, j] * gap
-            solve_in_place(matrix, unknown)
-            for i in range(reacting):
-                force[ties.reacting[i]] = unknown[i]
+            forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for k in range(modes):
                 u, v = state.q[block, k, j], state.v[block, k, j] * h
                 a = -lanes.damping[block, k, j] * v - lanes.stiffness[block, k, j] * u
@@ -132,8 +150,8 @@ def strike(blow, gravity, state):
 @kernel
 def watch_start(ties, lanes, state, watch, record, count):
     """Observe station 0 of a segment: extremes and samples, but not the sums of squares."""
-    rows = ties.rows
-    modes, many = rows.shape[1], rows.shape[2]
+    modes, many, reacting = ties.rows.shape[1], ties.rows.shape[2], ties.reacting.shape[0]
+    force, matrix, unknown = np.empty(many), np.empty((reacting, reacting)), np.empty(reacting)
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
     marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
@@ -149,15 +167,9 @@ def watch_start(ties, lanes, state, watch, record, count):
                 now[k, Q_NOW, j] = state.q[block, k, j]
                 now[k, V_NOW, j] = state.v[block, k, j] * h
                 now[k, A_NOW, j] = state.a[block, k, j] * h * h
+            forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for r in range(many):
-                motion = ties.drive[0, r] * lanes.gravity[block, j]
-                gap = ties.level[0, r] * lanes.gravity[block, j]
-                for k in range(modes):
-                    inertial, rate, curve = tie_row(rows, k, r)
-                    gap += rows[0, k, r, FORCE] * now[k, Q_NOW, j]
-                    motion += inertial * now[k, A_NOW, j] + rate * now[k, V_NOW, j] + curve * now[k, Q_NOW, j]
-                force = lanes.load[block, r, j] - lanes.gain[block, r, j] * motion
-                b[TIE + r, j] = force - lanes.stiff[block, r, j] * gap
+                b[TIE + r, j] = force[r]
         observe(marks, now, b, watch, 0, 0)
         keep(marks, record.history[block], watch, record.sample[0], 0, float(count))
         for i in range(marks.shape[0]):

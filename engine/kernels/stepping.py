@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from engine.kernels.jit import chosen_for
 from engine.kernels.layout import Alpha
 from engine.kernels.record import CD, FIELDS, KD, RATE_1, RATE_2, C, E, U, V
+from engine.kernels.vector import lanes_at, put_lanes
 
 
 def fields_of(scheme):
@@ -27,9 +28,9 @@ def first_predictors(scheme, q, v, a, memory):
     return _family(type(scheme)).first(scheme, q, v, a, memory)
 
 
-def advance(scheme, work, k, j, x):
-    """Correct mode k of lane j with its acceleration x and predict the next step; returns q, v, u*, v*, c*."""
-    return _family(type(scheme)).advance(scheme, work, k, j, x)
+def advance(scheme, work, k, x):
+    """Correct all lanes of mode k with their accelerations x and predict the next step; returns q, v, u*, v*, c*."""
+    return _family(type(scheme)).advance(scheme, work, k, x)
 
 
 def corrected(scheme, work, b, k, j, x):
@@ -51,29 +52,29 @@ def _first_alpha(scheme, q, v, a, memory):
     )
 
 
-def _advance_newmark(scheme, work, k, j, x):
-    q = work[k, U, j] + scheme.beta * x
-    v = work[k, V, j] + scheme.gamma * x
+def _advance_newmark(scheme, work, k, x):
+    q = lanes_at(work, (k, U)) + scheme.beta * x
+    v = lanes_at(work, (k, V)) + scheme.gamma * x
     v_next = v + (1.0 - scheme.gamma) * x
     q_next = q + v + (0.5 - scheme.beta) * x
-    c = work[k, CD, j] * v_next + work[k, KD, j] * q_next
-    work[k, U, j] = q_next
-    work[k, V, j] = v_next
-    work[k, C, j] = c
+    c = lanes_at(work, (k, CD)) * v_next + lanes_at(work, (k, KD)) * q_next
+    put_lanes(work, (k, U), q_next)
+    put_lanes(work, (k, V), v_next)
+    put_lanes(work, (k, C), c)
     return q, v, q_next, v_next, c
 
 
-def _advance_alpha(scheme, work, k, j, x):
-    e = work[k, E, j]
-    q = work[k, U, j] + scheme.beta * x
-    v = work[k, V, j] + scheme.gamma * x
+def _advance_alpha(scheme, work, k, x):
+    e = lanes_at(work, (k, E))
+    q = lanes_at(work, (k, U)) + scheme.beta * x
+    v = lanes_at(work, (k, V)) + scheme.gamma * x
     v_next = v + (scheme.velocity_x * x + scheme.velocity_e * e)
     q_next = q + v + (scheme.displacement_x * x + scheme.displacement_e * e)
-    c = work[k, CD, j] * v_next + work[k, KD, j] * q_next
-    work[k, U, j] = q_next
-    work[k, V, j] = v_next
-    work[k, C, j] = c
-    work[k, E, j] = scheme.next_x * x + scheme.next_e * e
+    c = lanes_at(work, (k, CD)) * v_next + lanes_at(work, (k, KD)) * q_next
+    put_lanes(work, (k, U), q_next)
+    put_lanes(work, (k, V), v_next)
+    put_lanes(work, (k, C), c)
+    put_lanes(work, (k, E), scheme.next_x * x + scheme.next_e * e)
     return q, v, q_next, v_next, c
 
 
@@ -140,7 +141,7 @@ def _choose_first(scheme, q, v, a, memory):
 
 
 @chosen_for(advance)
-def _choose_advance(scheme, work, k, j, x):
+def _choose_advance(scheme, work, k, x):
     return _family(scheme.instance_class).advance
 
 

@@ -1,6 +1,8 @@
-"""The equations of several ties at one station: their sums over the modes, four a pass, and the small dense system.
+"""The equations of several ties at one station: their sums over the modes, and the small dense system.
 
-See ``march`` for the equations. Loops over lanes stand inside, so that every sum is a row of lanes.
+See ``march`` for the equations. Ties are taken in twos, so that a row of lanes that is read is used four times; where
+their number is odd the last one is taken twice, and its second copy goes unread. Modes that two ties do not share are
+left out. Pieces take arrays and not the whole of ``Ties``, whose references would be counted at every step.
 """
 
 from typing import NamedTuple
@@ -8,243 +10,238 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.kernels.jit import piece
-from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE, FloatArray
-from engine.kernels.record import GRAVITY, PUSH, TIE, C, D, U, V
+from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, BoolArray, IntArray
+from engine.kernels.record import GRAVITY, RATE_2, TIE, C, D, U, V
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes
+
+FORCES = np.uint64(TIE)  # a signed and an unsigned number would add up to a float
+
+# what a tie has to itself in a block of lanes: as in layout.Lanes, and unity
+GAINS, STIFFS, LOADS, UNITY = range(4)
 
 
-class Sums(NamedTuple):
-    """Sums over the modes at one station.
+class Twos(NamedTuple):
+    """The reacting ties two by two, and which modes meet in them, by number.
 
-    motion, gap (reacting, LANES): w.c* - A.v* - B.u*  and  p.(beta c* - u*) of every reacting tie;  factor, soft
-    (reacting, ties in pairs, LANES): w.(D p) and p.(D p), the p being that of the other tie.
+    member (2 twos): the ties, a last one without another twice;  moves, springs (twos): whether one of the two does;
+    shared (twos, twos, modes), shares (twos, twos): the modes that reach both a tie of the one and a tie of the other
+    two, and how many there are;  pushing (modes, reacting), pushes (modes): the reacting ties of a mode, and how many.
     """
 
-    motion: FloatArray
-    gap: FloatArray
-    factor: FloatArray
-    soft: FloatArray
+    member: IntArray
+    moves: BoolArray
+    springs: BoolArray
+    shared: IntArray
+    shares: IntArray
+    pushing: IntArray
+    pushes: IntArray
 
 
 @piece
-def four(k):
-    """Numbers of four modes from k on; without a sign, so that no index is taken from the end."""
-    return np.uint64(k), np.uint64(k + 1), np.uint64(k + 2), np.uint64(k + 3)
+def note_members(member, moves, springs, ties):
+    """Take the reacting ties two by two."""
+    for i in range(member.shape[0]):
+        r = ties.reacting[min(i, ties.reacting.shape[0] - 1)]
+        member[i] = r
+        moves[i // 2] = moves[i // 2] or ties.moves[r]
+        springs[i // 2] = springs[i // 2] or ties.springs[r]
 
 
 @piece
-def pair(ties, s):
-    """Numbers of the ties s and s + 1, and 0.0 in place of 1.0 where there is no second one."""
-    last = ties.rows.shape[2] - 1
-    return np.uint64(s), np.uint64(min(s + 1, last)), 1.0 if s < last else 0.0
+def note_shared(shared, shares, member, reaches):
+    """List the modes that reach a tie of each of two twos."""
+    for one in range(shares.shape[0]):
+        for other in range(shares.shape[0]):
+            for k in range(reaches.shape[0]):
+                here = reaches[k, member[2 * one]] or reaches[k, member[2 * one + 1]]
+                if here and (reaches[k, member[2 * other]] or reaches[k, member[2 * other + 1]]):
+                    shared[one, other, shares[one, other]] = k
+                    shares[one, other] += 1
 
 
 @piece
-def sum_motion(sums, i, work, ties, n):
-    """Kinematic sums of reacting tie i at station n, with the products with the first two ties."""
-    motion, factor, rows, r = sums.motion, sums.factor, ties.rows, np.uint64(ties.reacting[i])
-    modes, (s, t, second) = rows.shape[1], pair(ties, 0)
-    for k in range(0, modes - 3, 4):
-        k0, k1, k2, k3 = four(k)
-        w0, a0, b0 = rows[n, k0, r, CLOSED], rows[n, k0, r, RATE], rows[n, k0, r, CURVE]
-        w1, a1, b1 = rows[n, k1, r, CLOSED], rows[n, k1, r, RATE], rows[n, k1, r, CURVE]
-        w2, a2, b2 = rows[n, k2, r, CLOSED], rows[n, k2, r, RATE], rows[n, k2, r, CURVE]
-        w3, a3, b3 = rows[n, k3, r, CLOSED], rows[n, k3, r, RATE], rows[n, k3, r, CURVE]
-        s0, s1, s2, s3 = (
-            w0 * rows[n, k0, s, FORCE],
-            w1 * rows[n, k1, s, FORCE],
-            w2 * rows[n, k2, s, FORCE],
-            w3 * rows[n, k3, s, FORCE],
-        )
-        t0, t1, t2, t3 = (
-            second * w0 * rows[n, k0, t, FORCE],
-            second * w1 * rows[n, k1, t, FORCE],
-            second * w2 * rows[n, k2, t, FORCE],
-            second * w3 * rows[n, k3, t, FORCE],
-        )
-        for j in range(LANES):
-            motion[i, j] += (
-                (w0 * work[k0, C, j] - (a0 * work[k0, V, j] + b0 * work[k0, U, j]))
-                + (w1 * work[k1, C, j] - (a1 * work[k1, V, j] + b1 * work[k1, U, j]))
-            ) + (
-                (w2 * work[k2, C, j] - (a2 * work[k2, V, j] + b2 * work[k2, U, j]))
-                + (w3 * work[k3, C, j] - (a3 * work[k3, V, j] + b3 * work[k3, U, j]))
-            )
-            d0, d1, d2, d3 = work[k0, D, j], work[k1, D, j], work[k2, D, j], work[k3, D, j]
-            factor[i, 0, j] += (s0 * d0 + s1 * d1) + (s2 * d2 + s3 * d3)
-            factor[i, 1, j] += (t0 * d0 + t1 * d1) + (t2 * d2 + t3 * d3)
-    for k in range(modes - modes % 4, modes):
-        w, a, b = rows[n, k, r, CLOSED], rows[n, k, r, RATE], rows[n, k, r, CURVE]
-        ws, wt = w * rows[n, k, s, FORCE], second * w * rows[n, k, t, FORCE]
-        for j in range(LANES):
-            motion[i, j] += w * work[k, C, j] - (a * work[k, V, j] + b * work[k, U, j])
-            factor[i, 0, j] += ws * work[k, D, j]
-            factor[i, 1, j] += wt * work[k, D, j]
+def note_pushing(pushing, pushes, reacting, reaches):
+    """List the reacting ties that reach a mode."""
+    for k in range(reaches.shape[0]):
+        for r in reacting:
+            if reaches[k, r]:
+                pushing[k, pushes[k]] = r
+                pushes[k] += 1
 
 
 @piece
-def sum_gap(sums, i, work, ties, n, beta):
-    """Sums of the gap of reacting tie i at station n, with the products with the first two ties."""
-    gap, soft, rows, r = sums.gap, sums.soft, ties.rows, np.uint64(ties.reacting[i])
-    modes, (s, t, second) = rows.shape[1], pair(ties, 0)
-    for k in range(0, modes - 3, 4):
-        k0, k1, k2, k3 = four(k)
-        p0, p1, p2, p3 = rows[n, k0, r, FORCE], rows[n, k1, r, FORCE], rows[n, k2, r, FORCE], rows[n, k3, r, FORCE]
-        s0, s1, s2, s3 = (
-            p0 * rows[n, k0, s, FORCE],
-            p1 * rows[n, k1, s, FORCE],
-            p2 * rows[n, k2, s, FORCE],
-            p3 * rows[n, k3, s, FORCE],
-        )
-        t0, t1, t2, t3 = (
-            second * p0 * rows[n, k0, t, FORCE],
-            second * p1 * rows[n, k1, t, FORCE],
-            second * p2 * rows[n, k2, t, FORCE],
-            second * p3 * rows[n, k3, t, FORCE],
-        )
-        for j in range(LANES):
-            gap[i, j] += (
-                p0 * (beta * work[k0, C, j] - work[k0, U, j]) + p1 * (beta * work[k1, C, j] - work[k1, U, j])
-            ) + (p2 * (beta * work[k2, C, j] - work[k2, U, j]) + p3 * (beta * work[k3, C, j] - work[k3, U, j]))
-            d0, d1, d2, d3 = work[k0, D, j], work[k1, D, j], work[k2, D, j], work[k3, D, j]
-            soft[i, 0, j] += (s0 * d0 + s1 * d1) + (s2 * d2 + s3 * d3)
-            soft[i, 1, j] += (t0 * d0 + t1 * d1) + (t2 * d2 + t3 * d3)
-    for k in range(modes - modes % 4, modes):
-        p = rows[n, k, r, FORCE]
-        ps, pt = p * rows[n, k, s, FORCE], second * p * rows[n, k, t, FORCE]
-        for j in range(LANES):
-            gap[i, j] += p * (beta * work[k, C, j] - work[k, U, j])
-            soft[i, 0, j] += ps * work[k, D, j]
-            soft[i, 1, j] += pt * work[k, D, j]
+def load_own(own, b, ties, lanes, block):
+    """What all ties have to themselves in a block of lanes; and the forces of the dead loads, which stay."""
+    for r in range(own.shape[0]):
+        put_lanes(own, (r, GAINS), lanes_at(lanes.gain, (block, r)))
+        put_lanes(own, (r, STIFFS), lanes_at(lanes.stiff, (block, r)))
+        put_lanes(own, (r, LOADS), lanes_at(lanes.load, (block, r)))
+        put_lanes(own, (r, UNITY), all_lanes(ties.unity[r]))
+    for s in ties.given:
+        put_lanes(b, (TIE + s,), lanes_at(lanes.load, (block, s)))
 
 
 @piece
-def sum_pair(matrix, i, s, work, ties, n, column):
-    """matrix[i, s] and the next += (column of reacting tie i).(D p of ties s and s + 1) at station n."""
-    rows, r = ties.rows, np.uint64(ties.reacting[i])
-    modes, (one, other, second) = rows.shape[1], pair(ties, s)
-    for k in range(0, modes - 3, 4):
-        k0, k1, k2, k3 = four(k)
-        w0, w1, w2, w3 = rows[n, k0, r, column], rows[n, k1, r, column], rows[n, k2, r, column], rows[n, k3, r, column]
-        s0, s1, s2, s3 = (
-            w0 * rows[n, k0, one, FORCE],
-            w1 * rows[n, k1, one, FORCE],
-            w2 * rows[n, k2, one, FORCE],
-            w3 * rows[n, k3, one, FORCE],
-        )
-        t0, t1, t2, t3 = (
-            second * w0 * rows[n, k0, other, FORCE],
-            second * w1 * rows[n, k1, other, FORCE],
-            second * w2 * rows[n, k2, other, FORCE],
-            second * w3 * rows[n, k3, other, FORCE],
-        )
-        for j in range(LANES):
-            d0, d1, d2, d3 = work[k0, D, j], work[k1, D, j], work[k2, D, j], work[k3, D, j]
-            matrix[i, s, j] += (s0 * d0 + s1 * d1) + (s2 * d2 + s3 * d3)
-            matrix[i, s + 1, j] += (t0 * d0 + t1 * d1) + (t2 * d2 + t3 * d3)
-    for k in range(modes - modes % 4, modes):
-        w = rows[n, k, r, column]
-        ws, wt = w * rows[n, k, one, FORCE], second * w * rows[n, k, other, FORCE]
-        for j in range(LANES):
-            matrix[i, s, j] += ws * work[k, D, j]
-            matrix[i, s + 1, j] += wt * work[k, D, j]
+def load_dead(work, b, rows, given, reaches, n):
+    """Take what the dead loads give at station n from c* of the modes, so that it need not be told apart any more."""
+    for i in range(given.shape[0]):
+        r = np.uint64(given[i])
+        force = lanes_at(b, (FORCES + r,))
+        for k in range(work.shape[0]):
+            if reaches[k, r]:
+                part = rows[n, k, r, FORCE] * lanes_at(work, (k, D))
+                put_lanes(work, (k, C), lanes_at(work, (k, C)) - part * force)
 
 
 @piece
-def gather_ties(sums, work, ties, beta, n):
-    """Add all modes to the sums of every reacting tie at station n."""
+def two(twos, one):
+    """Numbers of the two ties; without a sign, so that no index is taken from the end."""
+    return np.uint64(twos.member[2 * one]), np.uint64(twos.member[2 * one + 1])
+
+
+@piece
+def push_ties(b, work, rows, own, twos, n, beta):
+    """b[TIE] += gain (w.c* - A.v* - B.u*) + stiff p.(beta c* - u*) of every reacting tie."""
+    for one in range(twos.shares.shape[0]):
+        i, j = two(twos, one)
+        motion_i, motion_j, gap_i, gap_j = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+        if twos.moves[one]:
+            for m in range(twos.shares[one, one]):
+                k = np.uint64(twos.shared[one, one, m])
+                c, v, u = lanes_at(work, (k, C)), lanes_at(work, (k, V)), lanes_at(work, (k, U))
+                motion_i = motion_i + (rows[n, k, i, CLOSED] * c - (rows[n, k, i, RATE] * v + rows[n, k, i, CURVE] * u))
+                motion_j = motion_j + (rows[n, k, j, CLOSED] * c - (rows[n, k, j, RATE] * v + rows[n, k, j, CURVE] * u))
+        if twos.springs[one]:
+            for m in range(twos.shares[one, one]):
+                k = np.uint64(twos.shared[one, one, m])
+                back = beta * lanes_at(work, (k, C)) - lanes_at(work, (k, U))
+                gap_i, gap_j = gap_i + rows[n, k, i, FORCE] * back, gap_j + rows[n, k, j, FORCE] * back
+        # both are read before either is stored, for they may be one
+        force_i = lanes_at(b, (FORCES + i,)) + lanes_at(own, (i, GAINS)) * motion_i + lanes_at(own, (i, STIFFS)) * gap_i
+        force_j = lanes_at(b, (FORCES + j,)) + lanes_at(own, (j, GAINS)) * motion_j + lanes_at(own, (j, STIFFS)) * gap_j
+        put_lanes(b, (FORCES + i,), force_i)
+        put_lanes(b, (FORCES + j,), force_j)
+
+
+@piece
+def load_ties(b, own, reacting, drive, level):
+    """b[TIE] = load - gain drive - stiff level of every reacting tie; drive, level: those of the station."""
+    gravity = lanes_at(b, (GRAVITY,))
+    for r in reacting:
+        track = lanes_at(own, (r, GAINS)) * (drive[r] * gravity) + lanes_at(own, (r, STIFFS)) * (level[r] * gravity)
+        put_lanes(b, (TIE + r,), lanes_at(own, (r, LOADS)) - track)
+
+
+@piece
+def products(work, rows, twos, n, one, other, column):
+    """The column of two ties times D p of two others, summed over the modes: four rows of lanes."""
+    (i, j), (s, t) = two(twos, one), two(twos, other)
+    i_s, i_t, j_s, j_t = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    for m in range(twos.shares[one, other]):
+        k = np.uint64(twos.shared[one, other, m])
+        d = lanes_at(work, (k, D))
+        of_i, of_j = rows[n, k, i, column] * d, rows[n, k, j, column] * d
+        ps, pt = rows[n, k, s, FORCE], rows[n, k, t, FORCE]
+        i_s, i_t = i_s + ps * of_i, i_t + pt * of_i
+        j_s, j_t = j_s + ps * of_j, j_t + pt * of_j
+    return i_s, i_t, j_s, j_t
+
+
+@piece
+def add_lanes(matrix, i, s, row):
+    """matrix[i, s] += a row of lanes."""
+    put_lanes(matrix, (i, s), lanes_at(matrix, (i, s)) + row)
+
+
+@piece
+def couple_motions(matrix, work, rows, own, twos, n):
+    """matrix = unity + gain w.(D p) of the reacting ties."""
+    for one in range(twos.shares.shape[0]):
+        i, j = two(twos, one)
+        gain_i, gain_j = lanes_at(own, (i, GAINS)), lanes_at(own, (j, GAINS))
+        for other in range(twos.shares.shape[0]):
+            i_s, i_t, j_s, j_t = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+            if twos.moves[one]:
+                i_s, i_t, j_s, j_t = products(work, rows, twos, n, one, other, CLOSED)
+            put_lanes(matrix, (2 * one, 2 * other), gain_i * i_s)
+            put_lanes(matrix, (2 * one, 2 * other + 1), gain_i * i_t)
+            put_lanes(matrix, (2 * one + 1, 2 * other), gain_j * j_s)
+            put_lanes(matrix, (2 * one + 1, 2 * other + 1), gain_j * j_t)
+        add_lanes(matrix, 2 * one, 2 * one, lanes_at(own, (i, UNITY)))
+        add_lanes(matrix, 2 * one + 1, 2 * one + 1, lanes_at(own, (j, UNITY)))
+
+
+@piece
+def couple_gaps(matrix, work, rows, own, twos, n, beta):
+    """matrix += stiff beta p.(D p) of the reacting ties; the product is symmetric, so half of them do."""
+    for one in range(twos.shares.shape[0]):
+        i, j = two(twos, one)
+        stiff_i, stiff_j = beta * lanes_at(own, (i, STIFFS)), beta * lanes_at(own, (j, STIFFS))
+        for other in range(one + 1):
+            if twos.springs[one] or twos.springs[other]:
+                i_s, i_t, j_s, j_t = products(work, rows, twos, n, one, other, FORCE)
+                add_lanes(matrix, 2 * one, 2 * other, stiff_i * i_s)
+                add_lanes(matrix, 2 * one, 2 * other + 1, stiff_i * i_t)
+                add_lanes(matrix, 2 * one + 1, 2 * other, stiff_j * j_s)
+                add_lanes(matrix, 2 * one + 1, 2 * other + 1, stiff_j * j_t)
+                if other < one:
+                    s, t = two(twos, other)
+                    stiff_s, stiff_t = beta * lanes_at(own, (s, STIFFS)), beta * lanes_at(own, (t, STIFFS))
+                    add_lanes(matrix, 2 * other, 2 * one, stiff_s * i_s)
+                    add_lanes(matrix, 2 * other, 2 * one + 1, stiff_s * j_s)
+                    add_lanes(matrix, 2 * other + 1, 2 * one, stiff_t * i_t)
+                    add_lanes(matrix, 2 * other + 1, 2 * one + 1, stiff_t * j_t)
+
+
+@piece
+def miss(matrix, b, ties, own, n):
+    """Add what the kept modes miss of the gaps: stiff residual/h^2, of the dead loads on the right-hand side."""
+    rate = lanes_at(b, (RATE_2,))
     for i in range(ties.reacting.shape[0]):
         r = ties.reacting[i]
-        if ties.moves[r]:
-            sum_motion(sums, i, work, ties, n)
-            for s in range(2, ties.rows.shape[2], 2):
-                sum_pair(sums.factor, i, s, work, ties, n, CLOSED)
         if ties.springs[r]:
-            sum_gap(sums, i, work, ties, n, beta)
-            for s in range(2, ties.rows.shape[2], 2):
-                sum_pair(sums.soft, i, s, work, ties, n, FORCE)
+            stiff = lanes_at(own, (r, STIFFS)) * rate
+            for t in range(ties.reacting.shape[0]):
+                add_lanes(matrix, i, t, ties.residual[n, r, ties.reacting[t]] * stiff)
+            for s in ties.given:
+                dead = ties.residual[n, r, s] * (stiff * lanes_at(b, (TIE + s,)))
+                put_lanes(b, (TIE + r,), lanes_at(b, (TIE + r,)) - dead)
 
 
 @piece
-def set_ties(b, sums, ties, lanes, beta, block, n):
-    """Right-hand sides of one block at station n in b, and the matrix I + gain w.(D p) + stiff beta p.(D p) in
-    ``factor``; the other sums are cleared."""
-    motion, gap, factor, soft = sums.motion, sums.gap, sums.factor, sums.soft
-    for i in range(ties.reacting.shape[0]):
-        r = ties.reacting[i]
-        drive, level = ties.drive[n, r], ties.level[n, r]
-        for j in range(LANES):
-            gain, stiff = lanes.gain[block, r, j], lanes.stiff[block, r, j]
-            b[TIE + r, j] = lanes.load[block, r, j] + (
-                gain * (motion[i, j] - drive * b[GRAVITY, j]) + stiff * (gap[i, j] - level * b[GRAVITY, j])
-            )
-            motion[i, j] = 0.0
-            gap[i, j] = 0.0
-        for s in range(lanes.gain.shape[1]):
-            one = 1.0 if r == s else 0.0
-            for j in range(LANES):
-                factor[i, s, j] = one + (
-                    lanes.gain[block, r, j] * factor[i, s, j] + lanes.stiff[block, r, j] * beta * soft[i, s, j]
-                )
-                soft[i, s, j] = 0.0
+def solve_ties(b, matrix, reacting):
+    """Solve for the forces, in b from TIE on; the matrix is used up.
 
-
-@piece
-def solve_ties(b, factor, ties, lanes, block):
-    """Solve for the forces of one block and clear the matrix.
-
-    Dead loads go to the right-hand side. Gauss without pivoting: the matrix is the identity plus a product that is
-    positive wherever the march is stable.
+    Without pivoting: the matrix is unity on the diagonal, or zero for rigid ties, plus a product that is positive
+    wherever the march is stable. Its lower and upper part take its place, the diagonal inverted.
     """
-    count = ties.reacting.shape[0]
-    for s in range(ties.given.shape[0]):
-        for j in range(LANES):
-            b[TIE + ties.given[s], j] = lanes.load[block, ties.given[s], j]
-        for i in range(count):
-            for j in range(LANES):
-                b[TIE + ties.reacting[i], j] -= factor[i, ties.given[s], j] * b[TIE + ties.given[s], j]
+    count = reacting.shape[0]
     for i in range(count):
-        r = ties.reacting[i]
-        for j in range(LANES):
-            factor[i, r, j] = 1.0 / factor[i, r, j]
-        for m in range(i + 1, count):
-            row = TIE + ties.reacting[m]
-            for j in range(LANES):
-                factor[m, r, j] *= factor[i, r, j]
-            for j in range(LANES):
-                b[row, j] -= factor[m, r, j] * b[TIE + r, j]
-            for t in range(i + 1, count):
-                for j in range(LANES):
-                    factor[m, ties.reacting[t], j] -= factor[m, r, j] * factor[i, ties.reacting[t], j]
+        for t in range(count):
+            x = lanes_at(matrix, (i, t))
+            for m in range(min(i, t)):
+                x = x - lanes_at(matrix, (i, m)) * lanes_at(matrix, (m, t))
+            if t < i:
+                x = x * lanes_at(matrix, (t, t))
+            if t == i:
+                x = 1.0 / x
+            put_lanes(matrix, (i, t), x)
+        x = lanes_at(b, (TIE + reacting[i],))
+        for m in range(i):
+            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reacting[m],))
+        put_lanes(b, (TIE + reacting[i],), x)
     for i in range(count - 1, -1, -1):
-        r = ties.reacting[i]
+        x = lanes_at(b, (TIE + reacting[i],))
         for m in range(i + 1, count):
-            for j in range(LANES):
-                b[TIE + r, j] -= factor[i, ties.reacting[m], j] * b[TIE + ties.reacting[m], j]
-        for j in range(LANES):
-            b[TIE + r, j] *= factor[i, r, j]
-    factor[:] = 0.0
+            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reacting[m],))
+        put_lanes(b, (TIE + reacting[i],), x * lanes_at(matrix, (i, i)))
 
 
 @piece
-def push_four(rows, n, k, r):
-    """p of mode k at station n in the four ties from r on, 0 where there are fewer."""
-    many = rows.shape[2]
-    return (
-        rows[n, k, r, FORCE],
-        rows[n, k, r + 1, FORCE] if r + 1 < many else 0.0,
-        rows[n, k, r + 2, FORCE] if r + 2 < many else 0.0,
-        rows[n, k, r + 3, FORCE] if r + 3 < many else 0.0,
-    )
-
-
-@piece
-def push_on_mode(b, rows, n, k, first):
-    """b[PUSH] = sum over the ties from ``first`` on of p F of mode k at station n; b ends with rows of zeros."""
-    for j in range(LANES):
-        b[PUSH, j] = 0.0
-    for r in range(first, rows.shape[2], 4):
-        p0, p1, p2, p3 = push_four(rows, n, k, r)
-        for j in range(LANES):
-            b[PUSH, j] += (p0 * b[TIE + r, j] + p1 * b[TIE + r + 1, j]) + (
-                p2 * b[TIE + r + 2, j] + p3 * b[TIE + r + 3, j]
-            )
+def pushed(b, rows, twos, n, k):
+    """Sum over the reacting ties of p F of mode k at station n."""
+    push = all_lanes(0.0)
+    for i in range(twos.pushes[k]):
+        r = np.uint64(twos.pushing[k, i])
+        push = push + rows[n, k, r, FORCE] * lanes_at(b, (FORCES + r,))
+    return push

@@ -36,6 +36,7 @@ class Stability:
     summary = "where schemes and couplings grow without reason: limits, thresholds and maps, with the theory beside"
     question = "With which step, mass and speed does a method of time integration stop telling the truth?"
     settings = Asked
+    sweeps = False
 
     def check(self, study: Study) -> None:
         """One mass that crosses one held body, and maps that exist."""

@@ -105,6 +105,7 @@ class WorkPrecision:
     summary = "error against cost of schemes, steps, modes and static correction; what to take for which accuracy"
     question = "Which scheme, how many steps and how many modes give which accuracy at the least cost?"
     settings: type[Spec] = Question
+    sweeps = False
 
     def check(self, study: Study) -> None:
         """One mass on one smooth way in every scene, and sensors with a static value."""

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from engine.bodies.build import build_body
+from engine.carriages import BodyCarriage
 from studies.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.traces import over_position, picked
 from studies.results import Index, Results, chosen, extreme
@@ -125,9 +127,12 @@ def _contact(seen: View, carriage: str) -> Figure:
 
 
 def _relative_force(seen: View, carriage: str) -> Any:
-    """Smallest contact force over the weight."""
-    weight = seen.results.parameter(f"carriage.{carriage}.mass") * seen.results.parameter("gravity")
-    return seen.results.dataset[f"{carriage}_contact_force_min"] / weight
+    """Smallest contact force over the weight; of a body that rides, over its weight without sweep."""
+    spec = seen.results.study.carriage[carriage]
+    mass = sum(seen.results.parameter(f"carriage.{carriage}.{key}") for key in spec.masses)
+    if isinstance(spec, BodyCarriage):
+        mass = build_body(seen.results.study.body[spec.body]).modal.mass
+    return seen.results.dataset[f"{carriage}_contact_force_min"] / (mass * seen.results.parameter("gravity"))
 
 
 def _has_line(seen: View, force: Any) -> bool:

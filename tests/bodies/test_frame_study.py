@@ -270,13 +270,16 @@ def test_sensors_of_section_forces_are_those_of_the_beam() -> None:
             assert one == pytest.approx(other, rel=2e-3, abs=1e-6 * scale), (name, end)
 
 
-def test_a_mass_does_not_weigh_sideways() -> None:
-    aside = write_copy(BRIDGE)
-    aside["track"] = {"members": ["left", "right"], "direction": [0.0, 1.0, 0.0]}
-    study = STUDY | {"body": {"bridge": aside}}
-    with pytest.raises(BadInput, match=r"carriage\.trolley\.kind: the weight of this mass does not act"):
-        engine.run(load(write_document(study)))
-    engine.run(load(write_document(study | {"gravity": 0.0, "sweep": {}})))
+def test_a_mass_weighs_by_its_share_of_gravity() -> None:
+    """Along w acts what gravity has of that direction: nothing sideways, the cosine on a slope."""
+    found = {}
+    for name, direction in {"down": [0, 0, -1.0], "aside": [0, 1.0, 0], "oblique": [0, 0.6, -0.8]}.items():
+        track = {"members": ["left", "right"], "direction": direction}
+        study = STUDY | {"body": {"bridge": write_copy(BRIDGE) | {"track": track}}, "sweep": {}}
+        found[name] = engine.run(load(write_document(study)))
+    weight = float(found["down"].trolley_contact_force_max)
+    assert float(np.abs(found["aside"].trolley_contact_force_max)) <= 1e-12 * weight
+    assert 0.75 < float(found["oblique"].trolley_contact_force_max) / weight < 0.85
 
 
 def test_plane_frames_take_two_coordinates() -> None:

@@ -132,3 +132,13 @@ def test_parts_belong_to_the_content_of_the_file(tmp_path: Path) -> None:
         text = write_document(base | {"body": reduced, "sensor": sensors, "gravity": gravity})
         keys.append(engine.make_plan(load(text)).key)
     assert keys[0] != keys[1]
+
+
+def test_stress_needs_fibre_distances_in_the_file(tmp_path: Path) -> None:
+    table = straight({"a": "pinned", "b": ["z"]}, plane="xz")
+    section = {key: value for key, value in table["section"]["rail"].items() if not key.startswith("fibre")}
+    save_body(body(table | {"section": {"rail": section}}), tmp_path / "plain.nc")
+    sensor = {"body": "bridge", "at": 1.0, "quantity": "stress"}
+    changed = STUDY | {"body": {"bridge": {"kind": "reduced", "file": str(tmp_path / "plain.nc")}}, "sweep": {}}
+    with pytest.raises(BadInput, match=r"sensor\.tension\.quantity"):
+        load(write_document(changed | {"sensor": {"tension": sensor}}))

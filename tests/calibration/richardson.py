@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.fidelity import allow_any_steps
-from engine.lanes import LaneValues
+from engine.lanes import LaneValues, weight
 from engine.march import march
 from engine.plan import Bucket, make_plan
 from engine.resolution import RESOLVED, phase_errors
@@ -106,7 +106,7 @@ def steps_for(bucket: Bucket, values: LaneValues, wanted: float) -> int:
 
 def statics_of(tables: SceneTables, values: LaneValues) -> Array:
     """(sensors, V) largest static values, the bed being weightless."""
-    weights = np.stack([values.weight(carriage.name) for carriage in tables.model.carriages])
+    weights = np.stack([weight(tables.model, values, c) for c in range(len(tables.model.carriages))])
     return np.abs(np.einsum("hjr,rv->hjv", tables.static_over_window.force, weights)).max(axis=0)
 
 

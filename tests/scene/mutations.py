@@ -15,7 +15,7 @@ from results_schema.errors import BadInput
 
 How = Literal["drop", "misspell", "retype", "text", "nan"]
 # tables whose keys are the user's own names
-OWN_NAMES = (("body",), ("carriage",), ("sensor",), ("sweep",), ("question", "scenes"))
+OWN_NAMES = (("body",), ("carriage",), ("sensor",), ("envelope",), ("sweep",), ("question", "scenes"))
 OWN_NAMES_OF_FRAMES = ("node", "section", "member", "point", "point_mass", "spring")
 
 
@@ -33,8 +33,9 @@ class Mutation:
     @property
     def must_fail(self) -> bool:
         """Dropping an optional key and renaming a thing nobody refers to leave a valid study."""
-        of_frame = len(self.path) == 4 and self.path[0] == "body" and self.path[2] in OWN_NAMES_OF_FRAMES
-        own_name = of_frame or self.path[:-1] in OWN_NAMES
+        inner = (self.path[0], self.path[2]) if len(self.path) == 4 else ("", "")
+        own = inner == ("carriage", "contacts") or (inner[0] == "body" and inner[1] in OWN_NAMES_OF_FRAMES)
+        own_name = own or self.path[:-1] in OWN_NAMES
         return self.how not in ("drop", "misspell") or (self.how == "misspell" and not own_name)
 
 

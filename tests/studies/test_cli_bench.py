@@ -17,9 +17,9 @@ from tests.naive import motions, newmark, scene
 from tests.reference.closed_forms import PinnedBeam
 
 
-@pytest.mark.parametrize("modes", [1, 10])
-def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
-    size = Scene(modes=modes, steps=300, variants=40)
+@pytest.mark.parametrize(("modes", "ties"), [(1, 1), (10, 1), (4, 2), (5, 3)])
+def test_its_numbers_are_those_of_the_naive_march(modes: int, ties: int) -> None:
+    size = Scene(modes=modes, steps=300, variants=40, ties=ties)
     found = bench.largest_deflections(size)
     random = np.random.default_rng(0)
     speed, mass = random.uniform(1.0, 20.0, 40), random.uniform(10.0, 500.0, 40)
@@ -27,9 +27,11 @@ def test_its_numbers_are_those_of_the_naive_march(modes: int) -> None:
     beam = PinnedBeam(modes, 15.0, 2.1e11 * 8.33e-6, 78.5)
     expected = []
     for variant in (0, 17, 39):
-        load = scene.moving_mass(mass[variant], 9.81, motions.cruise(0.0, 15.0, speed[variant]))
-        case = scene.Scene(beam.phi, beam.omega, np.full(modes, zeta[variant]), (load,))
-        times = newmark.grid(case, 0.0, load.leave, size.steps)
+        apart = 15.0 / (ties + 1)
+        ways = [motions.cruise(i * apart, (i + 2) * apart, speed[variant]) for i in range(ties)]
+        loads = tuple(scene.moving_mass(mass[variant] / ties, 9.81, way) for way in ways)
+        case = scene.Scene(beam.phi, beam.omega, np.full(modes, zeta[variant]), loads)
+        times = newmark.grid(case, 0.0, loads[0].leave, size.steps)
         history = newmark.march(case, times, scene.rest(case))
         expected.append(np.abs(history.displacement(beam.phi(7.5, 0))).max())
     np.testing.assert_allclose(found[[0, 17, 39]], expected, rtol=1e-9)
@@ -56,9 +58,13 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(capsys.readouterr().out)
     assert set(found) == set(Throughput.__dataclass_fields__)
     assert (found["modes"], found["steps"], found["variants"], found["threads"]) == (3, 50, 32, 1)
+    assert found["ties"] == 1
     assert found["best_of"] >= 3 and found["case_mode_steps_per_second"] > 0
     assert main(["bench", "--modes", "3", "--steps", "50", "--variants", "32"]) == 0
     assert "per second" in capsys.readouterr().out
+    assert main(["bench", "--modes", "3", "--steps", "50", "--variants", "32", "--ties", "2"]) == 0
+    assert "2 ties" in capsys.readouterr().out
+    assert main(["bench", "--ties", "0"]) == 2
 
 
 def test_every_scheme_stays_finite(capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ from tests.studies import scenes
 KINDS = tuple(scenes.MOTIONS)
 
 
-MEASURING = ("stability", "work-precision")
+MEASURING = ("eigenfrequencies", "influence", "stability", "work-precision")
 
 
 def test_all_kinds_are_found_by_their_files() -> None:

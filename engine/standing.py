@@ -1,0 +1,177 @@
+"""How a body that rides stands on its contacts: where they are, and what each carries at rest on level rigid ground."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.modal import ModalBody
+from engine.carriages import BodyCarriage, Contact
+from engine.scene import Study
+from engine.ties import CarriageTie, Grip, SpringTie
+from engine.timeline import Rider
+from results_schema.errors import BadInput
+
+Array = NDArray[np.float64]
+
+LIFTS = 1e-9  # of its weight: a contact that pulls more at rest would lift
+HELD = 1e-6  # part of a body's mass that its elastic modes may take of a uniform acceleration
+
+
+class Place(NamedTuple):
+    """Whose contacts: the carriage's number and tie, the number of the body that rides, and of its first contact among
+    all riders."""
+
+    number: int
+    tie: CarriageTie
+    rides: int
+    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and the shares of its
+    weight that they carry."""
+
+    rides: int
+    mass: float
+    reference: float
+    first: int
+    riders: tuple[Rider, ...]
+    springs: tuple[SpringTie, ...]
+    shares: tuple[float, ...]
+
+    def carried(self, tie: CarriageTie) -> CarriageTie:
+        """The carriage with its weight on the contacts."""
+        loads = tuple((self.first + number, share) for number, share in enumerate(self.shares))
+        return replace(tie, loads=loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
+
+
+def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) -> Standing:
+    """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
+    name = place.tie.name
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
+    _check_fidelity(study, name)
+    _check_points(study, name, carriage, modal)
+    reference = 0.5 * modal.length if carriage.reference is None else carriage.reference
+    riders = tuple(replace(place.tie.rider, offset=_offset(c, reference)) for c in carriage.contacts.values())
+    _check_ways(study, name, carriage, riders)
+    shares = _shares(study, name, carriage, modal)
+    springs = []
+    for number, (word, contact) in enumerate(carriage.contacts.items()):
+        key = f"carriage.{name}.contacts.{word}"
+        held = Grip(-1.0, place.rides, None, _held_at(contact))
+        damped = contact.damping > 0.0 or f"{key}.damping" in swept
+        rigid = contact.stiffness == "rigid"
+        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid, shares[number]))
+    acting = tuple(springs) if study.solver.fidelity == "auto" else ()
+    return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
+
+
+def _held_at(contact: Contact) -> float | str:
+    """Where it holds the body that rides: m along its track, or a point's name."""
+    return contact.at if contact.at is not None else f"point.{contact.point}"
+
+
+def _offset(contact: Contact, reference: float) -> float:
+    """m ahead of the carriage's reference."""
+    return contact.at - reference if contact.at is not None else float(contact.offset or 0.0)
+
+
+def _shares(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -> tuple[float, ...]:
+    """Parts of the weight at rest on level rigid ground.
+
+    N/k + C N = rigid-body motion at the contacts, and N balances the weight; C is the body's flexibility between its
+    contacts. Its own weight bends it only through the contacts: a uniform acceleration moves rigid-body modes alone.
+    """
+    grips = [Grip(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
+    places = [grip.at if isinstance(grip.at, str) else np.array([grip.at]) for grip in grips]
+    shapes = np.stack([grip.fixed_row(modal) for grip in grips])
+    rigid = modal.omega == 0.0
+    pull = modal.participation / modal.mass
+    if not float(np.sum(pull[rigid] ** 2) * modal.mass) > 1.0 - HELD:
+        raise BadInput(
+            "something holds this body: it cannot ride",
+            where=study.source.where(f"carriage.{name}.body"),
+            expected="a body that is free to move along gravity",
+            remedy="no supports, or only such as leave it free along gravity, and rigid-body modes kept",
+        )
+    soft = (shapes * modal.modal_flexibility) @ shapes.T
+    if study.solver.static_correction:
+        soft = np.array([[modal.flexibility_between(one, other)[0] for other in places] for one in places])
+    own = [0.0 if c.stiffness == "rigid" else 1.0 / float(c.stiffness) for c in carriage.contacts.values()]
+    soft = soft + np.diag(own)
+    unit = max(float(np.trace(soft)), 1e-30)
+    free = shapes[:, rigid] / np.abs(shapes[:, rigid]).max()
+    count = len(places)
+    matrix = np.block([[soft / unit, -free], [free.T, np.zeros((free.shape[1],) * 2)]])
+    wanted = np.concatenate([np.zeros(count), pull[rigid] / np.abs(shapes[:, rigid]).max()])
+    found = np.linalg.lstsq(matrix, wanted, rcond=1e-12)[0]
+    _check_stands(study, name, (free, wanted[count:]), found[:count])
+    return tuple(float(share) for share in found[:count])
+
+
+def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares: Array) -> None:
+    """Refuse contacts that cannot carry the body at rest."""
+    free, pull = balance
+    tips = np.abs(free.T @ shares - pull).max() > 1e-9 * np.abs(pull).max()
+    if tips or shares.min() < -LIFTS:
+        raise BadInput(
+            "this body would tip over: its contacts cannot carry its weight at rest",
+            where=study.source.where(f"carriage.{name}.contacts"),
+            expected="contacts on both sides of its centre of mass",
+            received=", ".join(f"{share:.4g} of the weight" for share in shares),
+        )
+
+
+def _check_fidelity(study: Study, name: str) -> None:
+    if study.solver.fidelity in ("mass", "mass-without-convective"):
+        raise BadInput(
+            f'carriage {name} is a body on contacts, for which fidelity = "{study.solver.fidelity}" has no meaning',
+            where=study.source.where("solver.fidelity"),
+            expected='"auto", or "force" for its weight alone',
+        )
+
+
+def _check_points(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -> None:
+    known = (
+        [] if modal.points is None else [p.partition(".")[2] for p in modal.points.numbers if p.startswith("point.")]
+    )
+    for word, contact in carriage.contacts.items():
+        if contact.point is not None and contact.point not in known:
+            raise BadInput(
+                f"body {carriage.body} has no such point",
+                where=study.source.where(f"carriage.{name}.contacts.{word}.point"),
+                expected=f"one of {', '.join(known)}" if known else "at = metres along its track: it has no points",
+                received=contact.point,
+            )
+
+
+def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[Rider, ...]) -> None:
+    """Contacts stay on what they ride unless the carriage only passes; rigid ones never meet a shock."""
+    low, high = carriage.motion.range()
+    for rider, (word, contact) in zip(riders, carriage.contacts.items(), strict=True):
+        where = study.source.where(f"carriage.{name}.contacts.{word}")
+        stays = low + rider.offset >= -1e-9 * rider.length and high + rider.offset <= rider.length * (1.0 + 1e-9)
+        if rider.stays and not stays:
+            raise BadInput(
+                "this contact leaves the body that it rides",
+                where=where,
+                expected=f"a way within 0 to {rider.length:.6g} m",
+                received=f"{low + rider.offset:.6g} to {high + rider.offset:.6g} m",
+            )
+        alone = len(study.carriage) == 1  # then the scene ends where its motion does
+        jumps = [t for t in rider.speed_jumps[0] if 0.0 < t < rider.end or not (alone or t == 0.0)]
+        shocks = bool(jumps) or rider.delay > 0.0 or getattr(rider.motion, "after", 0.0) > 0.0
+        if contact.stiffness == "rigid" and (not stays or shocks):
+            raise BadInput(
+                "a rigid contact would meet a shock",
+                where=f"{where}.stiffness",
+                expected="a way that stays on the body, without jumps of speed, delay or free vibration afterwards",
+                remedy="a stiffness in N/m",
+            )

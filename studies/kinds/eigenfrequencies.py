@@ -1,0 +1,300 @@
+"""How do the natural frequencies of the whole scene change with the place of the carriage? At rest, without a march."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from engine.spec import Spec
+from results_schema.errors import BadInput
+from results_schema.variables import Variable, declare
+from studies.at_rest import pieces_of
+from studies.labelling import BODY_PLACES, COORDINATES, gathered
+from studies.measuring import Piece, question_of
+from studies.positions import Asked, all_positions, check_mode_counts, positions_of
+from studies.resting import FREQUENCY_WANTED, enough_modes, frequency_errors
+from studies.results import Results, extreme
+from studies.telling import first_carriage, in_words
+from studies.words import counted, listed, number, percent, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.lanes import LaneValues
+    from engine.model import SceneModel
+    from engine.scene import Study
+    from engine.ways import Way
+    from results_schema.status import Fidelity
+    from studies.figures import Figure
+
+Array = NDArray[np.float64]
+
+SHOWN = 3  # frequencies that a sentence lists
+STILL = 1e-3  # relative change along the way below which a frequency counts as constant
+
+
+class Question(Asked):
+    """The table [question]. modes: how many of the lowest frequencies."""
+
+    modes: int = Field(default=8, ge=1, le=64)
+
+
+_COUPLED = "bodies and carriages together, undamped, the carriages at rest"
+RESULTS = (
+    Variable(
+        "frequency",
+        ("position", "mode"),
+        units="Hz",
+        long_name="natural frequency of the coupled system",
+        meaning=f"{_COUPLED}; motions that nothing resists are left out; NaN where there is none, or a contact is off "
+        "the body",
+        nan_allowed=True,
+    ),
+    Variable(
+        "base_frequency",
+        ("position", "mode"),
+        units="Hz",
+        long_name="the same of the scene without sweep",
+        lead="none",
+        nan_allowed=True,
+    ),
+    Variable(
+        "mode_shape",
+        ("on_body", "position", "mode", "body_place"),
+        units="kg-0.5",
+        long_name="coupled mode shape along every body, of the scene without sweep",
+        meaning="unit modal mass of the whole system; of the kept modes",
+        lead="none",
+        nan_allowed=True,
+    ),
+    Variable(
+        "frequency_by_mode_count",
+        ("correction", "mode_count", "checked_position", "mode"),
+        units="Hz",
+        long_name="natural frequency with other numbers of modes of every body",
+        meaning="of the scene without sweep",
+        required=False,
+        lead="none",
+        nan_allowed=True,
+    ),
+    Variable(
+        "frequency_unreduced",
+        ("unreduced_position", "mode"),
+        units="Hz",
+        long_name="natural frequency of the unreduced finite-element model",
+        meaning="of the scene without sweep",
+        required=False,
+        lead="none",
+        nan_allowed=True,
+    ),
+    Variable(
+        "frequency_difference",
+        ("unreduced_position", "mode"),
+        long_name="relative difference of the natural frequency from that of the unreduced model",
+        required=False,
+        lead="none",
+        nan_allowed=True,
+    ),
+)
+declare("eigenfrequencies", *RESULTS, *COORDINATES)
+
+
+class Eigenfrequencies:
+    """The kind "eigenfrequencies"."""
+
+    name = "eigenfrequencies"
+    summary = "natural frequencies and shapes of the coupled system against the carriage's position"
+    question = "How do the natural frequencies change with the place of the carriage?"
+    settings: type[Spec] = Question
+    sweeps = True
+
+    def check(self, study: Study) -> None:
+        """Something moves that has inertia, and positions exist."""
+        first_carriage(study)
+        if study.solver.fidelity == "force" or not any(c.inertial for c in study.carriage.values()):
+            forced = study.solver.fidelity == "force"
+            raise BadInput(
+                "forces have no inertia: frequencies do not depend on where they stand",
+                where=study.source.where("solver.fidelity" if forced else "carriage"),
+                expected='"auto"' if forced else 'a carriage of the kind "mass", "oscillator" or "body"',
+            )
+        asked = question_of(study, Question)
+        positions_of(study, asked)
+        check_mode_counts(study, asked)
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        asked = question_of(study, Question)
+        return pieces_of(_Coupled(asked.modes), study, asked)
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        asked = question_of(study, Question)
+        return gathered(_Coupled(asked.modes), pieces, study, asked)
+
+    def findings(self, results: Results) -> list[str]:
+        said = [_along(results), *_together(results), *_sweep(results)]
+        return [*said, *_unreduced(results), *_mode_counts(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import eigenfrequencies
+
+        return eigenfrequencies.pictures(results)
+
+
+KIND = Eigenfrequencies()
+
+
+class _Coupled:
+    """What is computed of a scene at rest: `studies.at_rest.AtRest`."""
+
+    name = "eigenfrequencies"
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+        from engine.coupled import coupled_frequencies
+
+        return {"frequency": coupled_frequencies(model, values, along, self.count) / (2.0 * np.pi)}
+
+    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+        from engine.coupled import coupled_modes
+        from engine.lanes import LaneValues
+
+        found = coupled_modes(model, LaneValues(model.study, {}, 1), along, self.count)
+        lines = []
+        for part in model.bodies:
+            rows = part.modal.shape(np.linspace(0.0, part.modal.length, BODY_PLACES))
+            lines.append(np.einsum("xn,snk->skx", rows, found.shapes[0, :, part.modes]))
+        return {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
+
+    def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
+        from engine.unreduced import unreduced_model
+        from engine.unreduced_statics import unreduced_frequencies
+
+        found = unreduced_frequencies(unreduced_model(study), all_positions(model, positions), self.count)
+        return {"frequency": found}
+
+    def check_model(self, model: SceneModel) -> None:
+        """Nothing more: a body that nothing holds has frequencies too."""
+
+    def fidelity(self, model: SceneModel) -> Fidelity:
+        return model.fidelity
+
+    def inner(self, study: Study, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
+        mode = ("mode", np.arange(1, self.count + 1))
+        return {"frequency": mode, "base_frequency": mode, "mode_shape": mode}
+
+
+def _signed(shapes: Array) -> Array:
+    """(B, S, K, X) shapes with signs that do not jump along the way: like those at the position before, and at the
+    first one positive where any body moves most."""
+    found = shapes.copy()
+    flat = np.moveaxis(found, 0, 2).reshape(*shapes.shape[1:3], -1)
+    most = np.take_along_axis(flat[0], np.nanargmax(np.abs(np.nan_to_num(flat[0])), axis=1)[:, None], axis=1)[:, 0]
+    sign = np.where(most < 0.0, -1.0, 1.0)
+    found[:, 0] *= sign[:, None]
+    for place in range(1, shapes.shape[1]):
+        same = np.sum(flat[place] * flat[place - 1], axis=1)
+        sign = np.where(same < 0.0, -sign, sign)
+        found[:, place] *= sign[:, None]
+    return found
+
+
+def _along(results: Results) -> str:
+    """The lowest frequency with the carriage in the middle and at the end of its way."""
+    base, name = results.dataset["base_frequency"], results.carriage_name
+    middle, last = base.isel(position=base.sizes["position"] // 2), base.isel(position=-1)
+    shown = min(SHOWN, base.sizes["mode"])
+    parts = [
+        f"{listed([number(float(value), 4) for value in here.values[:shown]])} Hz with {name} at "
+        f"{quantity(float(here.position), 'm')}"
+        for here in (middle, last)
+    ]
+    many = "lowest natural frequency is" if shown == 1 else f"{_WORDS[shown]} lowest natural frequencies are"
+    return f"The {many} {listed(parts)}{_of_base(results)}."
+
+
+_WORDS = {2: "two", 3: "three"}
+
+
+def _of_base(results: Results) -> str:
+    return " in the scene without its sweep" if results.size > 1 else ""
+
+
+def _together(results: Results) -> list[str]:
+    """Which frequency changes most along the way, and where two come closest."""
+    base = np.asarray(results.dataset["base_frequency"].values)
+    places = results.dataset["position"].values
+    change = np.ptp(base, axis=0) / base.min(axis=0)
+    if not np.isfinite(change).any():
+        return []
+    most, still = int(np.nanargmax(change)), [k + 1 for k in range(change.size) if change[k] < STILL]
+    low, high = (float(np.nanmin(base[:, most])), float(np.nanmax(base[:, most])))
+    at = float(places[int(np.nanargmin(base[:, most]))]), float(places[int(np.nanargmax(base[:, most]))])
+    said = [
+        f"Along the way frequency {most + 1} changes most, by {percent(float(change[most]))}: from {number(low, 4)} Hz "
+        f"at {quantity(at[0], 'm')} to {number(high, 4)} Hz at {quantity(at[1], 'm')}."
+    ]
+    if still and len(still) < change.size:
+        names = listed([str(mode) for mode in still])
+        said.append(
+            f"Frequenc{'y' if len(still) == 1 else 'ies'} {names} stay{'s' if len(still) == 1 else ''} within "
+            f"{percent(STILL)}."
+        )
+    if base.shape[1] > 1:
+        gap = np.diff(base, axis=1) / base[:, :-1]
+        place = extreme(-gap)
+        if place is not None:
+            said.append(
+                f"Frequencies {place[1] + 1} and {place[1] + 2} come closest, {percent(float(gap[place]))} apart, at "
+                f"{quantity(float(places[place[0]]), 'm')}."
+            )
+    return said
+
+
+def _sweep(results: Results) -> list[str]:
+    """Between which values the lowest frequency moves over the sweep."""
+    if results.size == 1:
+        return []
+    first = np.asarray(results.dataset["frequency"].isel(mode=0).values)
+    ends = [extreme(sign * first) for sign in (-1.0, 1.0)]
+    if ends[0] is None or ends[1] is None:
+        return ["No variant has values."]
+    places = results.dataset["position"].values
+    texts = [
+        f"{number(float(first[end]), 4)} Hz{in_words(results, end[:-1])} with {results.carriage_name} at "
+        f"{quantity(float(places[end[-1]]), 'm')}"
+        for end in ends
+        if end is not None
+    ]
+    return [f"Over all {results.size:,} variants the lowest frequency lies between {' and '.join(texts)}."]
+
+
+def _unreduced(results: Results) -> list[str]:
+    """How far the frequencies are from those of the unreduced model."""
+    if "frequency_difference" not in results.dataset:
+        return []
+    found = results.dataset["frequency_difference"]
+    worst = extreme(np.abs(found.values))
+    if worst is None:
+        return []
+    positions, modes = found.sizes["unreduced_position"], found.sizes["mode"]
+    return [
+        f"Against the unreduced finite-element model at {counted(positions, 'position')}, the "
+        f"frequencies up to the {modes}th differ by at most {percent(abs(float(found.values[worst])))} (frequency "
+        f"{worst[1] + 1} with {results.carriage_name} at "
+        f"{quantity(float(found['unreduced_position'].values[worst[0]]), 'm')})."
+    ]
+
+
+def _mode_counts(results: Results) -> list[str]:
+    """From how many modes on the frequencies are right, with and without the static correction."""
+    if "frequency_by_mode_count" not in results.dataset:
+        return []
+    error, against = frequency_errors(results)
+    modes = results.dataset.sizes["mode"]
+    return [enough_modes(results, error, FREQUENCY_WANTED, f"frequencies up to the {modes}th are", against)]

@@ -1,0 +1,306 @@
+"""What do gravity and the weights do at rest, against the place of the carriage? Static readings, without a march."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.spec import Spec
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity
+from results_schema.variables import Variable, declare
+from studies.at_rest import check_held, pieces_of
+from studies.labelling import BODY_PLACES, COORDINATES, gathered
+from studies.measuring import Piece, question_of
+from studies.positions import Asked, all_positions, check_mode_counts, positions_of
+from studies.resting import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
+from studies.results import Index, Results, extreme
+from studies.telling import check_sensors, first_carriage, in_words, told_statuses
+from studies.words import counted, percent, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.lanes import LaneValues
+    from engine.model import SceneModel
+    from engine.scene import Study
+    from engine.ways import Way
+    from studies.figures import Figure
+
+Array = NDArray[np.float64]
+
+MOST_SENSORS = 6
+LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
+MOVING = ("velocity", "acceleration")
+
+_AT_REST = "at rest under gravity and the carriages' weights and forces"
+RESULTS = (
+    Variable(
+        "{sensor}",
+        ("position",),
+        units="{sensor}",
+        long_name="static reading of {sensor}",
+        meaning=f"{_AT_REST}, own weight of bodies included where it acts; NaN where a contact is off the body",
+        nan_allowed=True,
+    ),
+    Variable(
+        "{sensor}_influence",
+        ("position",),
+        units="{sensor} N-1",
+        long_name="influence line of {sensor}",
+        meaning="static reading per newton of the first carriage's weight alone, spread over its contacts as at rest",
+        nan_allowed=True,
+    ),
+    Variable(
+        "contact_force",
+        ("position", "contact"),
+        units="N",
+        long_name="static force at every contact",
+        meaning=f"{_AT_REST}; NaN where a contact of the first carriage is off the body",
+        nan_allowed=True,
+    ),
+    Variable(
+        "deflection",
+        ("on_body", "position", "body_place"),
+        units="m",
+        long_name="static deflection along every body, of the scene without sweep",
+        meaning=f"{_AT_REST}, as displacement sensors count it",
+        lead="none",
+    ),
+    Variable(
+        "{sensor}_by_mode_count",
+        ("correction", "mode_count", "checked_position"),
+        units="{sensor}",
+        long_name="static reading of {sensor} with other numbers of modes of every body",
+        meaning="of the scene without sweep",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "{sensor}_unreduced",
+        ("unreduced_position",),
+        units="{sensor}",
+        long_name="static reading of {sensor} by the unreduced finite-element model",
+        meaning="of the scene without sweep",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "{sensor}_difference",
+        ("unreduced_position",),
+        long_name="difference of {sensor} from the unreduced model",
+        meaning="over the largest reading at these positions",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "contact_force_unreduced",
+        ("unreduced_position", "contact"),
+        units="N",
+        long_name="static force at every contact by the unreduced finite-element model",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "contact_force_difference",
+        ("unreduced_position", "contact"),
+        long_name="difference of contact forces from the unreduced model",
+        meaning="over the largest force at these positions",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "contact", ("contact",), "str", long_name="carriage, or carriage and contact", required=False, lead="none"
+    ),
+)
+declare("influence", *RESULTS, *COORDINATES)
+
+
+class Influence:
+    """The kind "influence"."""
+
+    name = "influence"
+    summary = "static readings, contact forces and deflected shapes under gravity against the carriage's position"
+    question = "What do the weights do at rest, wherever the carriage stands?"
+    settings: type[Spec] = Asked
+    sweeps = True
+
+    def check(self, study: Study) -> None:
+        """Something stands on a body, something with a static reading is measured, and positions exist."""
+        first_carriage(study)
+        check_sensors(study)
+        for name, sensor in study.sensor.items():
+            if sensor.quantity in MOVING:
+                raise BadInput(
+                    "this quantity has no static reading",
+                    where=study.source.where(f"sensor.{name}.quantity"),
+                    expected="displacement, a section force, stress or contact_force",
+                    received=sensor.quantity,
+                )
+        asked = question_of(study, Asked)
+        positions_of(study, asked)
+        check_mode_counts(study, asked)
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        return pieces_of(_Static(), study, question_of(study, Asked))
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        return gathered(_Static(), pieces, study, question_of(study, Asked))
+
+    def findings(self, results: Results) -> list[str]:
+        said = [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        said += _contacts(results)
+        return [*said, *_unreduced(results), *_mode_counts(results), *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import influence
+
+        return influence.pictures(results)
+
+
+KIND = Influence()
+
+
+class _Static:
+    """What is computed of a scene at rest: `studies.at_rest.AtRest`."""
+
+    name = "influence"
+
+    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+        from engine.influence import static_values
+        from engine.signals import contact_forces
+
+        found = static_values(model, values, along)
+        named: dict[str, NDArray[Any]] = {}
+        for j, sensor in enumerate(model.study.sensor):
+            named[sensor] = found.sensors[:, :, j]
+            line = np.broadcast_to(found.influence[:, j], found.sensors.shape[:2])
+            named[f"{sensor}_influence"] = line.copy()
+        reacts = np.array([model.reacts(contact.carriage) for contact in contact_forces(model)])
+        size = np.abs(found.contacts).max(axis=(1, 2), keepdims=True, initial=0.0)
+        named["opened"] = ((found.contacts < -LIFTS * size) & reacts).any(axis=2)
+        return {**named, "contact_force": found.contacts}
+
+    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+        from engine.influence import static_shapes
+        from engine.lanes import LaneValues
+
+        values = LaneValues(model.study, {}, 1)
+        lines = [
+            static_shapes(model, values, along, body, np.linspace(0.0, part.modal.length, BODY_PLACES))[0]
+            for body, part in enumerate(model.bodies)
+        ]
+        return {"deflection": np.stack(lines)}
+
+    def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
+        from engine.influence import contact_names
+        from engine.unreduced import unreduced_model
+        from engine.unreduced_statics import unreduced_statics
+
+        full = unreduced_model(study)
+        sensors, forces = unreduced_statics(full, all_positions(model, positions))
+        found = {name: sensors[:, j] for j, name in enumerate(study.sensor)}
+        ties = [tie.name for tie in full.ties]
+        contacts = [name.replace(".", "_") for name in contact_names(model)]
+        parts = [sum(forces[:, r] for r, tie in enumerate(ties) if tie == name) for name in contacts]
+        return {**found, "contact_force": np.stack([np.broadcast_to(p, positions.shape) for p in parts], axis=1)}
+
+    def check_model(self, model: SceneModel) -> None:
+        """Refuse a body that nothing holds. Raises BadInput."""
+        check_held(model)
+
+    def fidelity(self, model: SceneModel) -> Fidelity:
+        return Fidelity.STATIC
+
+    def inner(self, study: Study, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
+        from engine.influence import contact_names
+
+        return {"contact_force": ("contact", np.array(contact_names(model)))}
+
+
+def _span(results: Results, sensor: str) -> str:
+    """Between which readings a sensor moves, and where."""
+    found = np.asarray(results.dataset[sensor].values)
+    ends = [extreme(sign * found) for sign in (-1.0, 1.0)]
+    if ends[0] is None or ends[1] is None:
+        return f"{sensor}: no variant has values."
+    places, units = results.dataset["position"].values, results.sensors[sensor]
+    largest = float(np.nanmax(np.abs(found)))
+    if largest == 0.0 or float(np.nanmax(found) - np.nanmin(found)) <= ROUNDING * largest:
+        at = quantity(float(found[ends[0]]), units, 4)
+        return f"{sensor}: {at} wherever {results.carriage_name} stands."
+    texts = [
+        f"{quantity(float(found[end]), units, 4, beside=largest)}{in_words(results, end[:-1])} with "
+        f"{results.carriage_name} at {quantity(float(places[end[-1]]), 'm')}"
+        for end in ends
+        if end is not None
+    ]
+    span = float(np.nanmax(found) - np.nanmin(found)) / largest
+    return (
+        f"{sensor}: from {texts[0]} to {texts[1]}{_own_weight(results, sensor, ends[1])}; the difference is "
+        f"{percent(span)} of the largest size."
+    )
+
+
+def _own_weight(results: Results, sensor: str, place: Index) -> str:
+    """Which part of a reading is there by the bodies' own weight; "" where that does not act, or others stand there."""
+    study, found = results.study, results.dataset
+    if len(study.carriage) > 1 or not any(body.own_weight for body in study.body.values()):
+        return ""
+    weight = float(found["contact_force"].values[place].sum())  # at rest all contacts together
+    whole = float(found[sensor].values[place])
+    part = 1.0 - weight * float(found[f"{sensor}_influence"].values[place]) / whole
+    return f" ({percent(part)} of that by own weight)" if whole > 0.0 and ROUNDING < part <= 1.0 else ""
+
+
+def _contacts(results: Results) -> list[str]:
+    """The largest and smallest contact force, and where."""
+    if not contacts_vary(results):
+        return []
+    found = results.dataset["contact_force"]
+    values, places = np.asarray(found.values), results.dataset["position"].values
+    ends = [extreme(sign * values) for sign in (-1.0, 1.0)]
+    if ends[0] is None or ends[1] is None:
+        return []
+    texts = [
+        f"{quantity(float(values[end]), 'N', 4)} ({found['contact'].values[end[-1]]}{in_words(results, end[:-2])}, at "
+        f"{quantity(float(places[end[-2]]), 'm')})"
+        for end in ends
+        if end is not None
+    ]
+    return [f"Contact forces lie between {' and '.join(texts)}."]
+
+
+def _unreduced(results: Results) -> list[str]:
+    """How far the readings are from those of the unreduced model."""
+    found = {name: results.dataset.get(f"{name}_difference") for name in results.sensors}
+    known = {name: float(np.abs(one.values).max()) for name, one in found.items() if one is not None}
+    if not known:
+        return []
+    worst = max(known, key=lambda name: known[name])
+    moved = [name for name in known if results.sensors[name] == "m"]
+    positions = results.dataset.sizes["unreduced_position"]
+    said = (
+        f"Against the unreduced finite-element model at {counted(positions, 'position')}, readings differ by at most "
+        f"{_part(known[worst])} of the sensor's largest ({worst})"
+    )
+    if not moved or worst in moved:
+        return [f"{said}."]
+    return [f"{said}, displacements by at most {_part(max(known[name] for name in moved))}."]
+
+
+def _part(error: float) -> str:
+    """A part in percent, or that it is rounding."""
+    return percent(error) if error > ROUNDING else f"less than {percent(ROUNDING)}"
+
+
+def _mode_counts(results: Results) -> list[str]:
+    """From how many modes on the readings are right, with and without the static correction."""
+    if "mode_count" not in results.dataset.dims:
+        return []
+    errors = [reading_errors(results, sensor) for sensor in results.sensors]
+    worst = np.max([error for error, _ in errors], axis=0)
+    return [enough_modes(results, worst, READING_WANTED, "all readings are", errors[0][1])]

@@ -1,0 +1,148 @@
+"""Figures of coupled natural frequencies: over the position, over the sweep, shapes, and how many modes they take."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+
+from studies.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
+from studies.pictures.at_rest import (
+    Errors,
+    carriage_marks,
+    error_figure,
+    held_words,
+    places,
+    position_title,
+    sweep_curves,
+    swept,
+)
+from studies.resting import FREQUENCY_WANTED, frequency_errors
+from studies.results import Results
+from studies.views import View
+from studies.words import number, quantity
+
+Array = NDArray[np.float64]
+
+SWEPT_MODES = 3  # with a panel over the sweep
+SHAPES = 4  # modes whose shapes are drawn
+GAP = 1.3  # of the largest amplitude, between a body that rides and what it rides
+
+
+def pictures(results: Results) -> list[Figure]:
+    """All figures that the dataset allows."""
+    found = [_over_position(results)]
+    seen = swept(results)
+    if seen is not None and not seen.is_sampled:
+        found.append(_over_sweep(seen))
+    found.append(_shapes(results))
+    if "frequency_by_mode_count" in results.dataset:
+        error, against = frequency_errors(results)
+        counts = [int(count) for count in results.dataset["mode_count"].values]
+        modes = results.dataset.sizes["mode"]
+        words = f"Largest relative error of the frequencies up to the {modes}th, against {against}."
+        if np.isnan(error).any():
+            words += " Where there is no point, modes are too few to have them all."
+        found.append(error_figure(results, [Errors("", counts, error)], FREQUENCY_WANTED, words))
+    return found
+
+
+def _over_position(results: Results) -> Figure:
+    unreduced = "frequency_unreduced" in results.dataset
+    caption = "Every line is one of the frequencies in their order, so lines may come close but do not cross." + (
+        " Circles are the unreduced finite-element model." if unreduced else ""
+    )
+    if results.size > 1:
+        caption += " Of the scene without its sweep."
+    title = "Natural frequencies over the position"
+    return draw("frequencies", title, caption, 4.2, partial(_draw_over_position, results))
+
+
+def _draw_over_position(results: Results, drawing: Drawing) -> None:
+    axes, base = drawing.subplots(), results.dataset["base_frequency"]
+    colours = shades(base.sizes["mode"])
+    for mode, colour in enumerate(colours):
+        axes.plot(base["position"], base.isel(mode=mode), color=colour)
+        axes.annotate(
+            str(mode + 1),
+            (float(base["position"][-1]), float(base.isel(mode=mode)[-1])),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
+            color=colour,
+        )
+        if "frequency_unreduced" in results.dataset:
+            full = results.dataset["frequency_unreduced"].isel(mode=mode)
+            axes.plot(full["unreduced_position"], full, "o", markersize=4.5, markerfacecolor="none", color=INK)
+    axes.set_ylim(0.0, None)
+    axes.set(xlabel=position_title(results), ylabel="natural frequency (Hz)")
+
+
+def _over_sweep(seen: View) -> Figure:
+    assert seen.x is not None
+    shown = min(SWEPT_MODES, seen.results.dataset.sizes["mode"])
+    caption = " ".join(text for text in (f"One panel for each of the lowest {shown}.", held_words(seen)) if text)
+    title = f"Frequencies over the position and {seen.x.noun}"
+    return draw("sweep", title, caption, 0.7 + 1.9 * shown, partial(_draw_over_sweep, seen, shown))
+
+
+def _draw_over_sweep(seen: View, shown: int, drawing: Drawing) -> None:
+    rows = drawing.subplots(shown, 1, squeeze=False, sharex=True)[:, 0]
+    for mode, axes in enumerate(rows):
+        curves = sweep_curves(seen, seen.results.dataset["frequency"].isel(mode=mode))
+        for curve, colour in zip(curves, shades(len(curves)), strict=True):
+            axes.plot(curve.x, curve.y, color=colour, label=f"{seen.x.noun if seen.x else ''} {curve.label}")
+        widen(axes, [curve.y for curve in curves])
+        axes.set_ylabel(f"frequency {mode + 1} (Hz)")
+    rows[-1].set_xlabel(position_title(seen.results))
+    legend_of_all(drawing, rows[0])
+
+
+def _shapes(results: Results) -> Figure:
+    count = min(SHAPES, results.dataset.sizes["mode"])
+    caption = (
+        f"The lowest {count} shapes with the carriage at the beginning, in the middle and at the end of its way, each "
+        "scaled to its own largest motion. Grey: at rest."
+        + (" What rides is drawn above what it rides." if any(p.rides for p in places(results)) else "")
+    )
+    height = 0.4 + 1.35 * count
+    return draw("shapes", "Shapes of the coupled system", caption, height, partial(_draw_shapes, results, count))
+
+
+def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
+    base, shape = results.dataset["base_frequency"], results.dataset["mode_shape"]
+    size = base.sizes["position"]
+    columns = sorted({0, size // 2, size - 1})
+    grid = drawing.subplots(count, len(columns), squeeze=False, sharex=True, sharey=True)
+    bodies = places(results)
+    riding = {c.body for c in results.study.carriage.values() if hasattr(c, "body")}
+    for mode in range(count):
+        for column, place in enumerate(columns):
+            axes, position = grid[mode, column], float(base["position"][place])
+            lines = np.asarray(shape.isel(position=place, mode=mode).values)
+            largest = float(np.nanmax(np.abs(lines)))
+            for body, line, colour in zip(bodies, lines, shades(len(bodies)), strict=True):
+                x, level = body.at(position), -GAP if body.name in riding else 0.0
+                axes.plot(x, np.full_like(x, level), color=HAIR, linewidth=1.0, zorder=1.5)
+                axes.plot(x, level + line / largest, color=colour, label=body.name)
+                if body.name == results.carriage.on:
+                    carriage_marks(axes, results, position, float(np.interp(position, x, line)) / largest)
+            axes.set_title(f"{number(float(base[place, mode]), 4)} Hz", color=MUTED, fontsize=8.0, pad=2.0)
+            axes.set_yticks([])
+            axes.grid(visible=False)
+            if mode == 0:
+                axes.annotate(
+                    f"{results.carriage_name} at {quantity(position, 'm')}",
+                    (0.0, 1.0),
+                    xytext=(0, 14),
+                    xycoords="axes fraction",
+                    textcoords="offset points",
+                )
+        grid[mode, 0].set_ylabel(f"mode {mode + 1}")
+    grid[0, 0].invert_yaxis()
+    for axes in grid[-1]:
+        axes.set_xlabel("along the way (m)")
+    if len(bodies) > 1:
+        legend_of_all(drawing, grid[0, 0])

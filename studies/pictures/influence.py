@@ -1,0 +1,141 @@
+"""Figures of statics: readings over the position, contact forces, deflected shapes, and how many modes they take."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+
+from studies.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
+from studies.pictures.at_rest import (
+    Errors,
+    carriage_marks,
+    error_figure,
+    held_words,
+    places,
+    position_title,
+    sweep_curves,
+    swept,
+)
+from studies.resting import READING_WANTED, contacts_vary, reading_errors
+from studies.results import Results, chosen, spread
+from studies.views import Curve
+from studies.words import quantity, scale_for
+
+Array = NDArray[np.float64]
+
+MOST_SENSORS = 5
+PANELS = 4  # of errors
+SHAPES = 5  # positions with a deflected shape
+
+
+def pictures(results: Results) -> list[Figure]:
+    """All figures that the dataset allows."""
+    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    contacts = [_contacts(results)] if contacts_vary(results) else []
+    found = [_readings(results, sensors), *contacts, _shapes(results)]
+    if "mode_count" in results.dataset.dims:
+        counts = [int(count) for count in results.dataset["mode_count"].values]
+        errors = {name: reading_errors(results, name) for name in chosen(list(results.sensors), PANELS)}
+        panels = [Errors(name.replace("_", " "), counts, error) for name, (error, _) in errors.items()]
+        against = next(words for _, words in errors.values())
+        words = f"Difference from {against}, over the largest reading."
+        found.append(error_figure(results, panels, READING_WANTED, words))
+    return found
+
+
+def _curves(results: Results, name: str) -> list[Curve]:
+    """One curve without a sweep, else some along its first axis."""
+    found, seen = results.dataset[name], swept(results)
+    if seen is not None and not seen.is_sampled:
+        return sweep_curves(seen, found)
+    flat = np.asarray(found.values).reshape(-1, found.sizes["position"])
+    return [Curve("", found["position"].values, flat[i]) for i in spread(len(flat), 6)]
+
+
+def _readings(results: Results, sensors: list[str]) -> Figure:
+    seen = swept(results)
+    texts = ["Everything at rest: displacements point down, as gravity does."]
+    if any(f"{name}_unreduced" in results.dataset for name in sensors):
+        texts.append("Circles are the unreduced finite-element model" + (", without the sweep." if seen else "."))
+    if seen is not None:
+        texts.append(held_words(seen))
+    height = 0.7 + 1.7 * len(sensors)
+    caption = " ".join(text for text in texts if text)
+    return draw("readings", "Static readings over the position", caption, height, partial(_draw, results, sensors))
+
+
+def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
+    rows, seen = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0], swept(results)
+    for axes, name in zip(rows, sensors, strict=True):
+        curves = _curves(results, name)
+        scale = scale_for(float(np.nanmax([np.abs(curve.y).max() for curve in curves])), results.sensors[name])
+        for curve, colour in zip(curves, shades(len(curves)), strict=True):
+            noun = seen.x.noun if seen is not None and seen.x is not None else ""
+            axes.plot(curve.x, curve.y * scale.factor, color=colour, label=f"{noun} {curve.label}")
+        if f"{name}_unreduced" in results.dataset:
+            full = results.dataset[f"{name}_unreduced"]
+            where, style = full["unreduced_position"], {"markersize": 4.5, "markerfacecolor": "none", "color": INK}
+            axes.plot(where, full * scale.factor, "o", **style)
+        widen(axes, [curve.y * scale.factor for curve in curves])
+        words = name.replace("_", " ")
+        axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
+        if results.sensors[name] == "m":
+            axes.invert_yaxis()
+    rows[-1].set_xlabel(position_title(results))
+    drawing.align_ylabels()
+    if len(rows[0].lines) > 2:
+        legend_of_all(drawing, rows[0])
+
+
+def _contacts(results: Results) -> Figure:
+    one = results.size > 1
+    caption = "At rest; below zero a contact would lift off." + (" Of the middle of the sweep." if one else "")
+    return draw("contacts", "Contact forces over the position", caption, 2.8, partial(_draw_contacts, results))
+
+
+def _draw_contacts(results: Results, drawing: Drawing) -> None:
+    axes, found = drawing.subplots(), results.dataset["contact_force"]
+    middle = found.isel({dim: size // 2 for dim, size in zip(results.dims, results.shape, strict=True)})
+    scale = scale_for(float(np.nanmax(np.abs(middle.values))), "N")
+    names = [str(name) for name in middle["contact"].values]
+    for name, colour in zip(names, shades(len(names)), strict=True):
+        axes.plot(middle["position"], middle.sel(contact=name) * scale.factor, color=colour, label=name)
+    widen(axes, list(np.asarray(middle.values).T * scale.factor))
+    axes.set(xlabel=position_title(results), ylabel=f"contact force ({scale.unit})")
+    if len(names) > 1:
+        legend_beside(axes)
+
+
+def _shapes(results: Results) -> Figure:
+    bodies = places(results)
+    positions = len(spread(results.dataset.sizes["position"], SHAPES))
+    caption = (
+        f"With the carriage at {positions} positions, down as gravity points"
+        + ("; a body that rides counts from where it stands on level rigid ground." if len(bodies) > 1 else ".")
+        + (" Of the scene without its sweep." if results.size > 1 else "")
+    )
+    height = 0.7 + 2.1 * len(bodies)
+    return draw("deflection", "Deflected shapes", caption, height, partial(_draw_shapes, results))
+
+
+def _draw_shapes(results: Results, drawing: Drawing) -> None:
+    found, bodies = results.dataset["deflection"], places(results)
+    rows = drawing.subplots(len(bodies), 1, squeeze=False, sharex=True)[:, 0]
+    chosen_places = spread(found.sizes["position"], SHAPES)
+    for number, (axes, body) in enumerate(zip(rows, bodies, strict=True)):
+        lines = np.asarray(found.isel(on_body=number).values)
+        scale = scale_for(float(np.abs(lines).max()), "m")
+        for place, colour in zip(chosen_places, shades(len(chosen_places)), strict=True):
+            position = float(found["position"][place])
+            x, y = body.at(position), lines[place] * scale.factor
+            label = f"{results.carriage_name} at {quantity(position, 'm')}"
+            axes.plot(x, y, color=colour if len(chosen_places) > 1 else BLUE, label=label)
+            if body.name == results.carriage.on:
+                carriage_marks(axes, results, position, float(np.interp(position, x, y)))
+        axes.set_ylabel(f"{body.name}\n({scale.unit})")
+        axes.invert_yaxis()
+    rows[-1].set_xlabel("along the way (m)")
+    legend_of_all(drawing, rows[0])

@@ -1,0 +1,150 @@
+"""The solid beam that comes with ansys-mapdl-reader: its frequencies, and statics along its top edge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.interpolate import CubicSpline
+from scipy.sparse import triu
+from scipy.sparse.linalg import spsolve
+
+import engine
+from engine.bodies.build import build_body
+from engine.bodies.imported import Ansys
+from engine.bodies.modal import ModalBody
+from results_schema.errors import BadInput
+from tests.bodies.models import in_process, optional
+
+full = optional("ansys.mapdl.reader.full")
+archive = optional("mapdl_archive")
+
+EXAMPLES = Path(full.__file__).parent / "examples"
+TABLE: dict[str, Any] = {
+    "kind": "ansys",
+    "full": str(EXAMPLES / "file.full"),
+    "nodes": str(EXAMPLES / "HexBeam.cdb"),
+    "gravity_direction": [0.0, -1.0, 0.0],
+    "track": {"from": [0.0, 1.0, 0.0], "to": [0.0, 1.0, 5.0]},
+    "modes": 6,
+}
+PUBLISHED = (1283.200, 1283.200, 5781.975, 6919.399)  # Hz
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Files are read here, as a process for each takes seconds; but in the tests of OWN_PROCESS."""
+    if request.function not in OWN_PROCESS:
+        monkeypatch.setattr("engine.bodies.imported.read_files", in_process)
+
+
+@pytest.fixture(scope="module")
+def beam() -> ModalBody:
+    return build_body(Ansys.model_validate(TABLE)).modal
+
+
+def test_frequencies(beam: ModalBody) -> None:
+    frequencies = beam.omega[:4] / (2.0 * np.pi)
+    assert np.abs(frequencies / np.array(PUBLISHED) - 1.0).max() < 1e-5 / 13  # as printed: 5e-7
+    assert beam.rigid_modes == 0 and beam.length == 5.0
+    said = dict(beam.checks)
+    assert said["nodes, degrees of freedom"] == "321, 900 free of 963"
+    assert said["track"] == "21 nodes from 10 to 31, 1 of them held along the load"
+    assert said["centre of mass"].endswith("among the nodes")
+
+
+def direct(places: np.ndarray, loads: np.ndarray) -> np.ndarray:
+    """(X, S) deflection at places per unit load, down being -y: file and spline read here, solved by scipy."""
+    rows, stiffness, _ = full.FullFile(str(EXAMPLES / "file.full")).load_km(as_sparse=True, sort=True)
+    mesh = archive.Archive(str(EXAMPLES / "HexBeam.cdb"), parse_vtk=False)
+    edge = np.flatnonzero((np.abs(mesh.nodes[:, 0]) < 1e-9) & (np.abs(mesh.nodes[:, 1] - 1.0) < 1e-9))
+    edge = edge[np.argsort(mesh.nodes[edge, 2])]
+    free = np.flatnonzero(stiffness.diagonal() != 0.0)
+    inner = (stiffness + triu(stiffness, 1).T).tocsc()[free][:, free]
+    at = {(int(node), int(way)): row for row, (node, way) in enumerate(rows[free])}
+    spline = CubicSpline(mesh.nodes[edge, 2], np.eye(len(edge)))
+    found = np.zeros((len(free), len(edge)))
+    for column, node in enumerate(mesh.nnum[edge]):
+        if (int(node), 1) in at:
+            found[at[int(node), 1], column] = -1.0
+    moved = np.array([spsolve(inner, found @ spline(float(s))) for s in loads]).T
+    return np.asarray(spline(places) @ found.T @ moved)
+
+
+def test_a_load_along_the_top_edge(beam: ModalBody) -> None:
+    places, loads = np.linspace(0.0, 5.0, 23), np.array([0.4, 1.3, 2.5, 3.77, 5.0])
+    wanted = direct(places, loads)
+    assert np.abs(beam.influence(places, loads) - wanted).max() < 1e-10 * wanted.max()
+
+
+def passage(speed: float, steps: int) -> Any:
+    motion = {"kind": "cruise", "start": 0.0, "end": 5.0, "speed": speed}
+    study = engine.Study(
+        kind="passage",
+        body={"beam": TABLE | {"damping_ratio": 0.5}},
+        carriage={"load": {"on": "beam", "kind": "force", "force": 1000.0, "motion": motion}},
+        sensor={"tip": {"body": "beam", "at": 4.9}, "under": {"under": "load"}},
+        solver={"steps": steps},
+        output={"histories": "all"},
+    )
+    return engine.run(study)
+
+
+def test_the_slow_limit_of_the_march_is_the_direct_solve() -> None:
+    """With static correction six modes give the whole deflection, the local dent under the load included.
+
+    Damping lags behind in proportion to the speed, so that twice the slower run minus the faster one is the limit.
+    """
+    steps = 32_000
+    slow, fast = passage(20.0, steps), passage(40.0, steps // 2)
+    some, other = slice(steps // 20, steps, steps // 20), slice(steps // 40, steps // 2, steps // 40)
+    places = slow["load_position"].values[some]
+    assert np.abs(places - fast["load_position"].values[other]).max() < 1e-9
+    tip = 1000.0 * direct(np.array([4.9]), places)[0]
+    under = 1000.0 * np.diag(direct(places, places))
+    for name, wanted in (("tip", tip), ("under", under)):
+        limit = 2.0 * slow[name].values[some] - fast[name].values[other]
+        assert np.abs(limit - wanted).max() < 1e-7 * tip.max()
+
+
+def test_nodes_of_a_result_file(beam: ModalBody) -> None:
+    other = build_body(Ansys.model_validate(TABLE | {"nodes": str(EXAMPLES / "file.rst")})).modal
+    assert np.array_equal(other.omega, beam.omega)
+
+
+def test_solid_elements_have_no_rotations() -> None:
+    table = TABLE | {"track": TABLE["track"] | {"interpolation": "rotations"}}
+    with pytest.raises(BadInput, match=r"track\.interpolation.*no rotations"):
+        build_body(Ansys.model_validate(table))
+
+
+def words_of(table: dict[str, Any]) -> str:
+    with pytest.raises(ValidationError) as caught:
+        Ansys.model_validate(table)
+    detail = caught.value.errors()[0]
+    assert detail["type"] == "wanderlast"
+    return f"{detail['loc']} {detail['ctx']}"
+
+
+def test_damaged_matrices(tmp_path: Path) -> None:
+    whole = (EXAMPLES / "file.full").read_bytes()
+    path = tmp_path / "cut.full"
+    path.write_bytes(whole[: len(whole) // 2])
+    found = words_of(TABLE | {"full": str(path)})
+    assert "full" in found and str(path) in found, found
+
+
+def test_damaged_nodes(tmp_path: Path) -> None:
+    text = (EXAMPLES / "HexBeam.cdb").read_text(encoding="utf-8").splitlines(keepends=True)
+    path = tmp_path / "nodes.cdb"
+    path.write_text("".join([*text[:100], *text[101:]]), encoding="utf-8")
+    assert "nodes are missing" in words_of(TABLE | {"nodes": str(path)})
+    head = [line.replace("321,       321", "320,       320") for line in text]
+    path.write_text("".join([*head[:100], *head[101:]]), encoding="utf-8")
+    assert "node 65 of" in words_of(TABLE | {"nodes": str(path)})
+
+
+OWN_PROCESS = (test_damaged_matrices,)

@@ -1,0 +1,330 @@
+"""Bodies of plain files against the frames that they were written from, and every refusal with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.io import mmwrite
+from scipy.sparse import block_diag, csc_array, csc_matrix, save_npz
+from scipy.sparse.linalg import spsolve
+
+import engine
+from engine.bodies import imported
+from engine.bodies.build import build_body
+from engine.bodies.imported import Matrices
+from engine.bodies.modal import ModalBody
+from engine.document import write_document
+from engine.plan import make_plan
+from engine.scene import Study, load
+from results_schema.errors import BadInput
+from studies.preview import preview
+from tests.bodies.frames import CLAMPED_FREE, LENGTH, PINNED, body, straight
+from tests.bodies.models import Files, in_process, refusal, study
+
+X = np.linspace(0.0, LENGTH, 31)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return Files(tmp_path_factory.mktemp("held"), straight(PINNED, elements=16))
+
+
+@pytest.fixture(scope="module")
+def loose(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """A frame that nothing holds: its files have all rows."""
+    return Files(tmp_path_factory.mktemp("loose"), straight({}, elements=12))
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Files are read here, as a process for each takes a second; but in the tests of OWN_PROCESS."""
+    if request.function not in OWN_PROCESS:
+        monkeypatch.setattr(imported, "read_files", in_process)
+
+
+def modal(table: Any) -> ModalBody:
+    return build_body(Matrices.model_validate(table)).modal
+
+
+def test_the_frames_own_modes_and_influence_lines(files: Files) -> None:
+    found, frame = modal(files.table(modes=10)), body(straight(PINNED, elements=16, modes=10))
+    assert np.abs(found.omega / frame.omega - 1.0).max() < 1e-10
+    assert found.length == LENGTH and found.rigid_modes == 0
+    nodes = np.linspace(0.0, LENGTH, 17)  # where the frame's statics are the model's
+    exact = frame.influence(nodes, nodes)
+    assert np.abs(found.influence(nodes, nodes) - exact).max() < 1e-10 * exact.max()
+    slopes = frame.influence(nodes, nodes, 1)
+    assert np.abs(found.influence(nodes, nodes, 1) - slopes).max() < 1e-10 * np.abs(slopes).max()
+    assert np.abs(found.influence(X, X) - frame.influence(X, X)).max() < 1e-4 * exact.max()
+    shapes = frame.shape(nodes)[:, :4]
+    assert np.abs(found.shape(nodes)[:, :4] - shapes).max() < 1e-8 * np.abs(shapes).max()
+    curvature = frame.shape(nodes[1:-1], 2)[:, 1]
+    assert np.abs(found.shape(nodes[1:-1] + 1e-9, 2)[:, 1] - curvature).max() < 0.01 * np.abs(curvature).max()
+
+
+@pytest.mark.parametrize("interpolation", ["rotations", "spline"])
+def test_statics_are_a_direct_solve_with_the_same_interpolation(files: Files, interpolation: str) -> None:
+    """Second source: scipy's splines of unit vectors, and its direct solver, on the frame's assembled matrix."""
+    assembly = files.assembly
+    order = np.argsort(assembly.mesh.points[:, 0])
+    places, total = assembly.mesh.points[order, 0], 6 * len(order)
+
+    def weights(s: float, derivative: int = 0) -> np.ndarray:
+        found = np.zeros((len(order), 6))
+        unit = np.eye(len(order))
+        if interpolation == "spline":
+            found[order, 2] = -CubicSpline(places, unit)(s, derivative)
+        else:  # down is -z; a positive rotation about y tilts a line along x down
+            none = np.zeros_like(unit)
+            found[order, 2] = -CubicHermiteSpline(places, unit, none)(s, derivative)
+            found[order, 4] = CubicHermiteSpline(places, none, unit)(s, derivative)
+        return found.reshape(total)[assembly.free]
+
+    track = files.table()["track"] | {"interpolation": interpolation}
+    found, x = modal(files.table(track=track)), np.array([0.3, 4.0, 7.7, 11.9])
+    for s in (0.2, 6.1, 9.99, 14.8):
+        moved = spsolve(csc_array(assembly.stiffness), weights(s))
+        for derivative in range(4):
+            wanted = np.array([weights(float(place), derivative) @ moved for place in x])
+            line = found.influence(x, [s], derivative)[:, 0]
+            assert np.abs(line - wanted).max() < 1e-10 * np.abs(wanted).max()
+            assert np.array_equal(found.influence_at(x, [s] * 4, derivative), line)
+
+
+@pytest.mark.parametrize("interpolation", ["rotations", "spline"])
+def test_shapes_are_smooth(files: Files, interpolation: str) -> None:
+    track = files.table()["track"] | {"interpolation": interpolation}
+    found = modal(files.table(track=track))
+    nodes = np.linspace(0.0, LENGTH, 17)[1:-1]
+    continuous = 1 if interpolation == "rotations" else 2
+    for derivative in range(continuous + 1):
+        gap = found.shape(nodes, derivative) - found.shape(nodes - 1e-10, derivative)
+        assert np.abs(gap).max() < 1e-6 * np.abs(found.shape(X, derivative)).max()
+    step = 1e-5
+    for derivative in range(3):
+        slope = (found.shape(X[1:-1] + 0.1 + step, derivative) - found.shape(X[1:-1] + 0.1 - step, derivative)) / (
+            2 * step
+        )
+        given = found.shape(X[1:-1] + 0.1, derivative + 1)
+        assert np.abs(slope - given).max() < 1e-5 * np.abs(given).max()
+
+
+def test_supports_of_the_study_hold_what_the_files_leave_free(files: Files, loose: Files) -> None:
+    held = Files(loose.folder, straight(PINNED, elements=12))
+    exact = body(straight(PINNED, elements=12))
+    Files(loose.folder, straight({}, elements=12))
+    del held
+    supports = {"1": ["x", "y", "z", "rx"], "2": ["y", "z"]}
+    found = modal(loose.table(supports=supports, track={"nodes": [1, *range(3, 14), 2]}))
+    assert np.abs(found.omega / exact.omega - 1.0).max() < 1e-9
+    assert found.mass == pytest.approx(exact.mass, rel=1e-12)
+    assert np.abs(found.participation - exact.participation).max() < 1e-8 * np.abs(exact.participation).max()
+    nodes = np.linspace(0.0, LENGTH, 13)
+    sag = exact.own_weight_deflection(nodes)
+    assert np.abs(found.own_weight_deflection(nodes) - sag).max() < 1e-9 * sag.max()
+    other = modal(loose.table(supports={"1-2": ["y", "z"], "1": ["x", "rx"]}))
+    assert np.abs(other.omega / exact.omega - 1.0).max() < 1e-9
+    clamped = modal(loose.table(supports={"1": "clamped"}))
+    assert np.abs(clamped.omega / body(straight(CLAMPED_FREE, elements=12)).omega - 1.0).max() < 1e-9
+
+
+def test_a_body_that_nothing_holds(loose: Files) -> None:
+    found, frame = modal(loose.table(modes=12)), body(straight({}, elements=12, modes=12))
+    assert found.rigid_modes == frame.rigid_modes == 6
+    assert np.abs(found.omega[6:] / frame.omega[6:] - 1.0).max() < 1e-8
+    nodes = np.linspace(0.0, LENGTH, 13)
+    exact = frame.influence(nodes, nodes)
+    assert np.abs(found.influence(nodes, nodes) - exact).max() < 1e-8 * np.abs(exact).max()
+    with pytest.raises(BadInput, match="own weight"):
+        found.own_weight_deflection(nodes)
+    dropped = modal(loose.table(modes=12, rigid_body_modes="drop"))
+    assert dropped.rigid_modes == 0 and np.array_equal(dropped.omega, found.omega[6:])
+    said = dict(found.checks)
+    assert said["rigid-body modes"] == "6"
+    assert said["mass by rigid motions"].startswith(f"{frame.mass:.6g} kg in all")
+    assert said["centre of mass"] == "(7.5, 0, 0) m, among the nodes"
+    assert float(said["rigid motions by the coordinates"].split()[0]) < 1e-10
+
+
+def test_soft_mounts_hold(tmp_path: Path) -> None:
+    """Mounts a million times softer than the members are mounts all the same: the body bounces on them."""
+    mounts = {name: {"node": name, "stiffness": [1e3] * 3, "rotational": [1e3] * 3} for name in ("a", "b")}
+    found = modal(Files(tmp_path, straight({}, elements=12, spring=mounts)).table())
+    frame = body(straight({}, elements=12, spring=mounts))
+    assert found.rigid_modes == 0
+    assert np.abs(found.omega / frame.omega - 1.0).max() < 1e-6
+
+
+def test_massless_degrees_of_freedom(tmp_path: Path) -> None:
+    table = straight(PINNED, elements=8, mass_matrix="lumped")
+    files = Files(tmp_path, table)
+    mass = files.assembly.mass.tolil()
+    turning = np.flatnonzero(files.assembly.free % 6 >= 3)
+    mass[turning, turning] = 0.0
+    save_npz(tmp_path / "mass.npz", csc_matrix(mass))
+    found = modal(files.table(modes=5))
+    stiffness = files.assembly.stiffness.toarray()
+    moving = np.setdiff1d(np.arange(len(stiffness)), turning)
+    inner = stiffness[np.ix_(turning, turning)]
+    condensed = stiffness[np.ix_(moving, moving)] - stiffness[np.ix_(moving, turning)] @ np.linalg.solve(
+        inner, stiffness[np.ix_(turning, moving)]
+    )
+    scale = 1.0 / np.sqrt(mass.toarray()[moving, moving])
+    exact = np.sqrt(np.linalg.eigvalsh(condensed * np.outer(scale, scale)))[:5]
+    assert np.abs(found.omega[:5] / exact - 1.0).max() < 1e-8
+    assert dict(found.checks)["massless degrees of freedom"].startswith(f"{len(turning)} of")
+    free = Files(tmp_path, straight({}, elements=8))
+    mass = free.assembly.mass.tolil()
+    turning = np.flatnonzero(free.assembly.free % 6 >= 3)
+    mass[turning, :] = 0.0
+    mass[:, turning] = 0.0
+    save_npz(tmp_path / "mass.npz", csc_matrix(mass))
+    assert "moves no mass" in str(refusal(free.table()))  # it spins about its own line
+
+
+def test_units_of_the_files(loose: Files, tmp_path: Path) -> None:
+    """The same frame in millimetres and kilonewtons."""
+    files = Files(tmp_path, straight({}, elements=12))
+    moves = files.assembly.free % 6 < 3
+    scale = np.where(moves, 1e-3, 1.0) / np.sqrt(1e-3 * 1e3)
+    for name, matrix in (("stiffness", files.assembly.stiffness), ("mass", files.assembly.mass)):
+        turned = csc_matrix(matrix.multiply(np.outer(scale, scale)))
+        mmwrite(tmp_path / f"{name}.mtx", turned)
+    rows = [
+        f"{n + 1},{1e3 * x!r},{1e3 * y!r},{1e3 * z!r}"
+        for n, (x, y, z) in enumerate(files.assembly.mesh.points.tolist())
+    ]
+    (tmp_path / "nodes.csv").write_text("\n".join(rows), encoding="utf-8")
+    units = {"length_unit": "1 mm", "force_unit": "1 kN", "supports": {"1": "clamped"}}
+    found = modal(
+        Study(kind="passage", body={"bed": files.table(mass=str(tmp_path / "mass.mtx"), **units)}).body["bed"]
+    )
+    wanted = modal(loose.table(supports={"1": "clamped"}))
+    assert np.abs(found.omega / wanted.omega - 1.0).max() < 1e-9
+    assert found.mass == pytest.approx(wanted.mass, rel=1e-9)
+    assert (
+        np.abs(
+            found.influence(X, X) / np.abs(wanted.influence(X, X)).max()
+            - wanted.influence(X, X) / np.abs(wanted.influence(X, X)).max()
+        ).max()
+        < 1e-9
+    )
+
+
+def test_an_inclined_track_stretches(tmp_path: Path) -> None:
+    """Under a vertical load an inclined, axially soft beam gives way along itself too: slopes have both parts."""
+    table = straight(CLAMPED_FREE, elements=16, section={"area": 1e-6}) | {
+        "node": {"a": [0.0, 0.0, 0.0], "b": [10.0, 0.0, 10.0]}
+    }
+    found, frame = modal(Files(tmp_path, table).table()), body(table)
+    places = np.linspace(0.0, found.length, 33)[1:-1]
+    exact = frame.influence(places, [found.length])
+    assert np.abs(found.influence(places, [found.length]) - exact).max() < 1e-4 * exact.max()
+    nodes = np.linspace(0.0, found.length, 17)[1:-1]
+    slopes = frame.influence(nodes, [found.length], 1)
+    assert np.abs(found.influence(nodes, [found.length], 1) - slopes).max() < 1e-3 * np.abs(slopes).max()
+    level = straight(CLAMPED_FREE, elements=16) | {"node": table["node"]}
+    assert exact.max() > 1.05 * body(level).influence(places, [found.length]).max()
+
+
+def test_wave_numbers(files: Files) -> None:
+    found = modal(files.table(modes=10))
+    sagging = [mode for mode in range(10) if found.wave_number[mode] > 0.0]
+    waves = np.arange(1, len(sagging) + 1) * np.pi / LENGTH
+    assert len(sagging) >= 4 and np.abs(found.wave_number[sagging] / waves - 1.0).max() < 0.01
+
+
+def test_points_and_other_directions(loose: Files) -> None:
+    supports = {"1": "clamped"}
+    table = loose.table(supports=supports, point={"tip": {"node": 2}, "side": {"node": 2, "direction": [0, 1, 0]}})
+    found = modal(table)
+    assert found.points is not None
+    assert np.abs(found.points.row("point.tip") - found.shape([LENGTH])[0]).max() < 1e-12
+    assert found.points.between("point.tip", "point.tip") == pytest.approx(found.influence([LENGTH], [LENGTH])[0, 0])
+    assert np.abs(found.points.influence("point.tip", X) - found.influence(X, [LENGTH])[:, 0]).max() < 1e-15
+    assert abs(found.points.between("point.tip", "point.side")) < 1e-15
+    assert found.points.own_weight("point.tip") == pytest.approx(found.own_weight_deflection([LENGTH])[0])
+    lateral = loose.table(supports=supports)
+    lateral["track"] |= {"direction": [0.0, 1.0, 0.0]}
+    sideways, frame = modal(lateral), body(straight(CLAMPED_FREE, elements=12, track_direction=[0.0, 1.0, 0.0]))
+    nodes = np.linspace(0.0, LENGTH, 13)
+    exact = frame.influence(nodes, nodes)
+    assert np.abs(sideways.influence(nodes, nodes) - exact).max() < 1e-9 * exact.max()
+    assert sideways.gravity_share == 0.0
+
+
+def test_a_passage_is_the_frames(files: Files) -> None:
+    given = engine.run(study(files.table(modes=8, damping_ratio=0.01), output={"histories": "all"}))
+    frame = engine.run(study(straight(PINNED, elements=16, modes=8, damping_ratio=0.01), output={"histories": "all"}))
+    scale = float(np.abs(frame["middle"]).max())
+    assert given["middle"].shape == frame["middle"].shape and int(given["status"]) == 0
+    assert float(np.abs(given["middle"].values - frame["middle"].values).max()) < 2e-4 * scale
+
+
+def test_checks_are_printed_and_the_key_follows_the_files(files: Files, tmp_path: Path) -> None:
+    copy = Files(tmp_path, straight(PINNED, elements=16))
+    plan = make_plan(study(copy.table()))
+    shown = next(table for table in preview(plan, 1).tables if table.title == "Import of bed")
+    assert ("rigid-body modes", "none: the supports hold the body") in shown.rows
+    save_npz(tmp_path / "mass.npz", csc_matrix(2.0 * copy.assembly.mass))
+    again = make_plan(study(copy.table()))
+    assert again.key != plan.key
+    assert np.abs(again.base.bodies[0].modal.omega / plan.base.bodies[0].modal.omega - 0.5**0.5).max() < 1e-9
+    assert load(write_document({"schema_version": 1} | study(copy.table()).data)).body["bed"].length == LENGTH
+
+
+def test_matrix_formats(files: Files, tmp_path: Path) -> None:
+    wanted = modal(files.table()).omega
+    dense = tmp_path / "dense.mtx"
+    mmwrite(dense, files.assembly.mass.toarray(), symmetry="symmetric")
+    general = tmp_path / "general.mtx"
+    mmwrite(general, files.assembly.stiffness, symmetry="general")
+    found = modal(files.table(mass=str(dense), stiffness=str(general))).omega
+    assert np.abs(found / wanted - 1.0).max() < 1e-9
+    for form in ("coo", "csr"):
+        save_npz(tmp_path / "form.npz", files.assembly.mass.asformat(form))
+        assert np.array_equal(modal(files.table(mass=str(tmp_path / "form.npz"))).omega, wanted)
+
+
+@pytest.mark.parametrize("end", [(LENGTH, 0.0, 0.0), (11.0, 7.0, 6.0)])
+def test_a_loose_part_beside_the_body(tmp_path: Path, end: tuple[float, float, float]) -> None:
+    """A second piece that nothing holds is no rigid-body mode of the whole; with exact zeros or almost."""
+    frame = {"node": {"a": [0.0, 0.0, 0.0], "b": list(end)}}
+    files = Files(tmp_path, straight({}, elements=4) | frame)
+    twice = {name: block_diag([getattr(files.assembly, name)] * 2) for name in ("stiffness", "mass")}
+    for name, matrix in twice.items():
+        save_npz(tmp_path / f"{name}.npz", csc_matrix(matrix))
+    points = files.assembly.mesh.points
+    places = np.concatenate([points, points + np.array([0.0, 5.0, 0.0])]).tolist()
+    lines = [f"{number},{x},{y},{z}" for number, (x, y, z) in enumerate(places, start=1)]
+    (tmp_path / "nodes.csv").write_text("\n".join(lines), encoding="utf-8")
+    table = files.table(stiffness=str(tmp_path / "stiffness.npz"), supports={"1": "clamped"})
+    del table["freedoms"]
+    found = str(refusal(table))
+    assert "bed.supports" in found and "without strain" in found
+    both = modal(table | {"supports": {"1": "clamped", "6": "clamped"}, "modes": 8})
+    single = body(straight(CLAMPED_FREE, elements=4, modes=4) | frame)
+    assert np.abs(both.omega[::2] / single.omega - 1.0).max() < 1e-8
+
+
+def test_a_table_out_of_files_rides(tmp_path: Path) -> None:
+    """A free body on two shoes does what the frame does that it was written from."""
+    plank = straight({}, elements=6) | {"node": {"a": [0.0, 0.0, 0.0], "b": [2.0, 0.0, 0.0]}}
+    shoes = {name: {"at": at, "stiffness": 1e6, "damping": 100.0} for name, at in (("front", 1.8), ("rear", 0.2))}
+    motion = {"kind": "cruise", "start": 1.0, "end": 14.0, "speed": 5.0}
+    found = []
+    for table in (Files(tmp_path, plank).table(modes=10), plank | {"modes": 10}):
+        bodies = {"bed": straight(PINNED, elements=8), "table": table}
+        carriage = {"on": "bed", "kind": "body", "body": "table", "contacts": shoes, "motion": motion}
+        sensor = {"middle": {"body": "bed", "at": 7.5}, "tool": {"body": "table", "at": 1.0}}
+        more = {"body": bodies, "carriage": {"table": carriage}, "sensor": sensor, "solver": {"steps": 8000}}
+        found.append(engine.run(Study(kind="passage", **more)))
+    for name in ("middle_max", "tool_max"):
+        assert float(found[0][name]) == pytest.approx(float(found[1][name]), rel=1e-5)
+
+
+OWN_PROCESS = (test_a_passage_is_the_frames, test_checks_are_printed_and_the_key_follows_the_files)

@@ -1,0 +1,110 @@
+"""Static readings over the position against closed forms, lever rules and slow marches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import engine
+from engine.influence import StaticReadings, contact_names, static_shapes, static_values
+from engine.lanes import LaneValues
+from engine.plan import base_scene
+from engine.scene import Study
+from engine.ways import frozen
+from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
+from tests.engine.test_riding import FLEXIBLE, THREE, TWO, UNEVEN, riding
+
+Array = NDArray[np.float64]
+
+WAY = cruise(0.0, 1.0, 1.0)
+PLACES = np.linspace(0.0, 1.0, 9)
+G = 9.81
+
+
+def readings(case: Study, places: Any = PLACES, **columns: Any) -> StaticReadings:
+    model = base_scene(case)
+    swept = {path.replace("__", "."): np.asarray(column, dtype=float) for path, column in columns.items()}
+    size = max((len(column) for column in swept.values()), default=1)
+    return static_values(model, LaneValues(model.study, swept, size), frozen(model, np.asarray(places, dtype=float)))
+
+
+def line(x: float, s: Array) -> Array:
+    """Deflection of a pinned beam, L = E I = 1, at x per unit force at s."""
+    low, high = np.minimum(x, s), np.maximum(x, s)
+    return np.asarray(low * (1.0 - high) * (1.0 - low**2 - (1.0 - high) ** 2) / 6.0)
+
+
+SENSORS = {"place": fixed(0.3), "moment": fixed(0.3, "bending_moment"), "below": under("car")}
+
+
+def test_readings_are_influence_lines() -> None:
+    found = readings(study(beam(modes=3), mass(0.5, WAY), sensor=SENSORS))
+    weight = 0.5 * G
+    expected = np.stack([line(0.3, PLACES), np.minimum(0.3 * (1 - PLACES), PLACES * 0.7), line_at_itself()], axis=1)
+    assert found.influence == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert found.sensors[0] == pytest.approx(weight * expected, rel=1e-9, abs=1e-15)
+    assert found.contacts[0] == pytest.approx(np.full((9, 1), weight))
+
+
+def line_at_itself() -> Array:
+    return np.asarray(PLACES**2 * (1.0 - PLACES) ** 2 / 3.0)
+
+
+def test_own_weight_and_other_carriages_are_added() -> None:
+    whole = study(
+        beam(modes=3, own_weight=True),
+        {"car": mass(0.5, WAY), "other": force(2.0, swing(0.7, 0.1, 1.0, 1))},
+        sensor={"middle": fixed(0.5), "moment": fixed(0.5, "bending_moment")},
+    )
+    found = readings(whole)
+    own = 5.0 * G / 384.0, G / 8.0
+    other = 2.0 * float(line(0.5, np.array([0.7]))[0]), 2.0 * 0.5 * 0.3
+    for j, unit in enumerate((line(0.5, PLACES), 0.5 * np.minimum(PLACES, 1.0 - PLACES))):
+        assert found.influence[:, j] == pytest.approx(unit, rel=1e-9, abs=1e-15)
+        assert found.sensors[0, :, j] == pytest.approx(0.5 * G * unit + own[j] + other[j], rel=1e-9)
+
+
+def test_variants_scale_with_weights_and_gravity() -> None:
+    case = study(beam(modes=3, own_weight=True), oscillator(0.5, 40.0, WAY, wheel_mass=0.1), sensor=SENSORS)
+    found = readings(case, carriage__car__mass=[0.5, 1.5], gravity=[9.81, 1.62])
+    for variant, (own, pull) in enumerate(((0.5, 9.81), (1.5, 1.62))):
+        alone = readings(case.with_values({"carriage.car.mass": own, "gravity": pull}))
+        assert found.sensors[variant] == pytest.approx(alone.sensors[0], rel=1e-12)
+        assert found.contacts[variant, :, 0] == pytest.approx(np.full(9, (own + 0.1) * pull))
+
+
+def test_contacts_of_a_table_carry_by_levers() -> None:
+    found = readings(riding(cruise(0.3, 0.7, 1.0), TWO, UNEVEN), [0.3, 0.5, 0.7])
+    assert found.contacts[0] == pytest.approx(0.5 * G * np.array([[0.22, 0.08]] * 3) / 0.3)
+    assert contact_names(base_scene(riding(cruise(0.3, 0.7, 1.0), TWO, UNEVEN))) == ["car.rear", "car.front"]
+
+
+def test_a_slow_march_tends_to_the_static_readings() -> None:
+    way = {"kind": "waypoints", "times": [0.0, 400.0], "positions": [0.3, 0.7]}
+    bed = beam(modes=4, own_weight=True, damping_ratio=0.05)
+    case = riding(way, THREE, FLEXIBLE, bed, solver={"steps": 10000}, output={"histories": {"every": 100}})
+    marched = engine.run(case)
+    places = marched["car_position"].values
+    names = [name for name, sensor in case.sensor.items() if sensor.quantity not in ("velocity", "acceleration")]
+    model = base_scene(case)
+    found = readings(case, places).sensors[0]
+    for name in names:
+        static = found[:, list(model.study.sensor).index(name)]
+        assert np.abs(marched[name].values - static).max() < 2e-5 * np.abs(static).max(), name
+
+
+def test_shapes_are_what_sensors_read() -> None:
+    case = riding(cruise(0.3, 0.7, 1.0), THREE, FLEXIBLE, beam(modes=4, own_weight=True))
+    model, places = base_scene(case), np.array([0.3, 0.6])
+    values, along = LaneValues(model.study, {}, 1), frozen(model, places)
+    found, names = readings(case, places).sensors[0], list(case.sensor)
+    bed, table = (
+        static_shapes(model, values, along, body, np.array([0.1, 0.61]) * (1.0, 0.5)[body])[0] for body in (0, 1)
+    )
+    assert bed[:, 1] == pytest.approx(found[:, names.index("place")], rel=1e-12)
+    tip = static_shapes(model, values, along, 1, np.array([0.1]))[0, :, 0]
+    assert tip == pytest.approx(found[:, names.index("tip")], rel=1e-12)
+    assert table.shape == (2, 2)

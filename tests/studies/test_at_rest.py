@@ -1,0 +1,348 @@
+"""The kinds `eigenfrequencies` and `influence`: grids, refusals, comparisons, sentences, figures, commands."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import engine
+import studies
+from engine.sweep import expand
+from results_schema.archive import open_archive
+from results_schema.errors import BadInput
+from results_schema.pieces import PieceStore
+from results_schema.status import Fidelity, Status
+from studies import answers, at_rest, catalogue, summary
+from studies.cli import main
+from studies.resting import frequency_errors, reading_errors
+from studies.results import Results
+from studies.study import kind_of
+from tests.scene.mutations import Mutation, mutations, survives
+from tests.studies import at_rest as small
+from tests.studies.at_rest import KINDS, MASS, TABLE
+
+Captured = pytest.CaptureFixture[str]
+
+COMPARED = "positions = 5\nmode_counts = [3, 6, 10]\nunreduced = 3"
+UNIT = np.sqrt(210e9 * 8e-6 / 78.5)  # of omega (L = pi): sqrt(E I / rho A)
+
+
+# ---- results ----
+
+
+def test_frequencies_on_the_grid() -> None:
+    found = small.run("eigenfrequencies", "positions = 5\nmodes = 4", MASS)
+    assert found.frequency.dims == ("mass", "position", "mode") and found.frequency.shape == (2, 5, 4)
+    assert found.position.values.tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]
+    bare = (np.pi / 4.0) ** 2 * UNIT / (2.0 * np.pi)
+    for mass in (20.0, 50.0):
+        first = float(found.frequency.sel(mass=mass, position=2.0, mode=1))
+        assert first == pytest.approx(bare / np.sqrt(1.0 + 2.0 * mass / 314.0), rel=2e-3)  # Rayleigh's, a little above
+    assert found.mode_shape.dims == ("on_body", "position", "mode", "body_place")
+    assert (found.fidelity_used == Fidelity.MASS).all() and (found.steps_used == 0).all()
+    assert (found.status == Status.OK).all() and (found.modes_used == 10).all()
+
+
+def test_readings_on_the_grid() -> None:
+    found = small.run("influence", sweep=MASS)
+    assert found.middle.dims == ("mass", "position") and found.contact.values.tolist() == ["car"]
+    stiffness, own = 210e9 * 8e-6, 5.0 * 78.5 * 9.80665 * 4.0**4 / (384.0 * 210e9 * 8e-6)
+    expected = 50.0 * 9.80665 * 4.0**3 / (48.0 * stiffness) + own
+    assert float(found.middle.sel(mass=50.0, position=2.0)) == pytest.approx(expected, rel=1e-9)
+    assert float(found.middle_influence.sel(mass=20.0, position=2.0)) == pytest.approx(4.0**3 / 48.0 / stiffness)
+    assert found.middle_influence.attrs["units"] == "m N-1"
+    np.testing.assert_allclose(found.contact_force.sel(mass=20.0), 20.0 * 9.80665)
+    shape = found.deflection.sel(on_body="bed", position=2.0, body_place=0.5)
+    base = float(small.run("influence").middle.sel(position=2.0))
+    assert float(shape) == pytest.approx(base, rel=1e-12)
+    assert (found.fidelity_used == Fidelity.STATIC).all() and (found.steps_used == 0).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_variants_are_what_they_are_alone(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sweep over what changes the scene and what does not, cut into pieces of two variants."""
+    stiffness = 'stiffness = { of = "body.bed.youngs_modulus", values = [1e11, 2e11, 3e11] }'
+    monkeypatch.setattr(at_rest, "AT_ONCE", 10)
+    case = small.study(kind, sweep=f"{stiffness}\n{MASS}")
+    assert len([piece for piece in kind_of(case).pieces(case) if piece.name.startswith("variants")]) == 3  # type: ignore[union-attr]
+    found = studies.run(case)
+    alone = small.study(kind).with_values({"body.bed.youngs_modulus": 2e11, "carriage.car.mass": 20.0})
+    one = studies.run(alone)
+    for name in ("frequency",) if kind == "eigenfrequencies" else ("middle", "moment", "moment_influence"):
+        np.testing.assert_allclose(found[name].sel(stiffness=2e11, mass=20.0), one[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_zipped_sweeps(kind: str) -> None:
+    own = 'own = { of = "body.bed.density", values = [7000.0, 7850.0] }'
+    found = small.run(kind, sweep=f"zip = true\n{MASS}\n{own}")
+    assert found.status.dims == ("variant",) and found.mass.dims == ("variant",)
+    assert answers.findings(found) and answers.figures(found)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_positions_where_a_variant_is_off_its_body_have_no_values(kind: str) -> None:
+    found = small.run(
+        kind, sweep='length = { of = "body.bed.length", values = [3.0, 4.0] }', question="positions = [1.0, 3.5]"
+    )
+    name = "frequency" if kind == "eigenfrequencies" else "middle"
+    known = np.isfinite(found[name].values.reshape(2, 2, -1)).all(axis=2)
+    assert known.tolist() == [[True, False], [True, True]]
+
+
+def test_a_contact_that_would_lift_is_flagged() -> None:
+    """A table much stiffer than its three contacts on a soft bed that hogs between supports: one of them pulls."""
+    text = small.text_of("influence", carriage=TABLE).replace('"pinned-pinned"', '"clamped-free"')
+    text = text.replace("at = 2.0\n", "at = 2.0\n").replace("second_moment = 8e-6", "second_moment = 8e-7")
+    found = studies.run(engine.load(text))
+    opened = bool((found.contact_force < 0.0).any())
+    assert opened and int(found.status) == Status.SEPARATED
+    assert any("separated" in text for text in answers.findings(found))
+
+
+def test_a_table_on_contacts() -> None:
+    found = small.run("influence", COMPARED, carriage=TABLE)
+    weight = 78.5 * 9.80665
+    np.testing.assert_allclose(found.contact_force.sum("contact"), weight, rtol=1e-9)
+    assert found.contact.values.tolist() == ["car.rear", "car.middle", "car.front"]
+    assert found.on_body.values.tolist() == ["bed", "table"]
+    assert "Contact forces lie between" in " ".join(answers.findings(found))
+
+
+# ---- comparisons ----
+
+
+@pytest.mark.parametrize("carriage", [small.CAR, TABLE], ids=["mass", "table"])
+def test_frequencies_agree_with_the_unreduced_model(carriage: str) -> None:
+    found = small.run("eigenfrequencies", f"{COMPARED}\nmodes = 5", carriage=carriage)
+    assert found.unreduced_position.values.tolist() == [1.0, 2.0, 3.0]
+    assert np.abs(found.frequency_difference).max() < 2e-3
+    ratio = found.frequency.sel(position=[1.0, 2.0, 3.0]).values / found.frequency_unreduced.values - 1.0
+    np.testing.assert_allclose(found.frequency_difference.values, ratio, atol=1e-12)
+    error, against = frequency_errors(Results.of(found))
+    assert against == "the unreduced model" and error.shape == (2, 3, 2)
+    assert (error[0, 1:] < error[1, 1:]).all() and error[0, 2].max() < 2e-3
+    assert np.isnan(error[:, 0]).all() == (carriage == small.CAR)  # three modes and a mass have four frequencies
+    assert found.checked_position.values.tolist() == [2.0, 3.0]
+
+
+@pytest.mark.parametrize("carriage", [small.CAR, TABLE], ids=["mass", "table"])
+def test_readings_agree_with_the_unreduced_model(carriage: str) -> None:
+    found = small.run("influence", COMPARED, carriage=carriage)
+    for sensor in ("middle", "moment"):
+        assert float(np.abs(found[f"{sensor}_difference"]).max()) < 1e-4
+        error, against = reading_errors(Results.of(found), sensor)
+        assert against == "the unreduced model" and error[0].max() < 1e-4 < error[1, 0].max()
+    assert float(np.abs(found.contact_force_difference).max()) < 1e-4
+    text = " ".join(answers.findings(found))
+    assert "with static correction from 3 modes of every body on" in text
+
+
+def test_without_the_unreduced_model_the_most_modes_are_the_reference() -> None:
+    found = Results.of(small.run("eigenfrequencies", "positions = [2.0]\nmode_counts = [4, 8]\nunreduced = 0"))
+    error, against = frequency_errors(found)
+    assert against == "the largest number of modes" and error.shape == (2, 2, 1) and error[0, -1, 0] == 0.0
+    assert "frequency_unreduced" not in found.dataset
+
+
+@pytest.mark.parametrize(("count", "places"), [(1, [2.0]), (2, [2.0, 3.0]), (3, [1.0, 2.0, 3.0])])
+def test_positions_of_the_unreduced_model(count: int, places: list[float]) -> None:
+    found = small.run("influence", f"positions = 5\nunreduced = {count}")
+    assert found.unreduced_position.values.tolist() == places
+
+
+def test_the_machine_bed_agrees_with_its_full_model() -> None:
+    """Coupled frequencies up to the 8th within 0.2 %, static deflections within 0.01 %, at five positions."""
+    for name in ("machine-bed-frequencies", "machine-bed-statics"):
+        case = engine.load(catalogue.find_study(name)).with_values(
+            {"question.positions": 5, "question.mode_counts": []}
+        )
+        found = studies.run(case)
+        assert found.unreduced_position.values.tolist() == pytest.approx([0.4, 0.95, 1.5, 2.05, 2.6])
+        if "frequency" in found:
+            assert found.frequency.shape == (5, 8) and float(np.abs(found.frequency_difference).max()) < 2e-3
+        else:
+            for sensor in ("bed_middle", "table_centre", "under_table"):
+                assert float(np.abs(found[f"{sensor}_difference"]).max()) < 1e-4, sensor
+            assert float(np.ptp(found.bed_middle.values)) > 5e-6
+
+
+# ---- refusals ----
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        ("positions = 1", r"question\.positions"),
+        ("positions = 2.5", r"question\.positions"),
+        ("positions = [2.0, 1.0]", r"question\.positions: a list in ascending order"),
+        ("positions = [2.0, 4.5]", r"question\.positions: a position where the carriage is off its body.*0 to 4 m"),
+        ('positions = ["2 m", "1 kg"]', r"question\.positions\.1"),
+        ("mode_counts = [5, 3]", r"question\.mode_counts"),
+        ("mode_counts = [0]", r"question\.mode_counts"),
+        ("unreduced = -1", r"question\.unreduced"),
+        ("position = 5", r'question\.position: unknown key.*did you mean "positions"'),
+    ],
+)
+def test_bad_questions_are_refused(kind: str, question: str, words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        studies.run(small.study(kind, question))
+
+
+def test_a_list_of_positions_may_use_the_whole_body() -> None:
+    found = small.run("influence", 'positions = [0.0, "50 cm", 4.0]')
+    assert found.position.values.tolist() == [0.0, 0.5, 4.0]
+
+
+AWAY = {"kind": "cruise", "start": 3.7, "end": 4.5, "speed": 1.0}
+PUSH = {"on": "bed", "kind": "force", "force": 5.0, "motion": AWAY}
+PULL = {"of": "gravity", "values": [1.0, 2.0]}
+LOOSE = {
+    "kind": "beam",
+    "length": 4.0,
+    "area": 0.01,
+    "second_moment": 8e-6,
+    "youngs_modulus": 2e11,
+    "density": 7850.0,
+    "supports": "free-free",
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "words"),
+    [
+        ("eigenfrequencies", {"solver.fidelity": "force"}, r"solver\.fidelity: forces have no inertia"),
+        ("eigenfrequencies", {"carriage.car": PUSH}, r"carriage: forces have no inertia"),
+        ("eigenfrequencies", {"carriage": {}, "sensor": {}}, r"carriage: nothing moves"),
+        ("influence", {"sensor.middle.quantity": "velocity"}, r"sensor\.middle\.quantity: .*no static reading"),
+        ("influence", {"sensor": {}}, r"sensor: nothing is measured"),
+        ("eigenfrequencies", {"body.bed": LOOSE, "question.unreduced": 1}, r"body\.bed\.supports: nothing holds"),
+        ("influence", {"body.bed": LOOSE}, r"body\.bed\.supports: nothing holds this body"),
+        ("influence", {"sensor.deflection": {"body": "bed", "at": 1.0}}, r"deflection: two results"),
+        ("influence", {"sweep.contact": PULL}, r"sweep\.contact: a result has this name"),
+        ("influence", {"envelope": {"all": {"body": "bed", "quantity": "displacement"}}}, r"envelope"),
+    ],
+)  # fmt: skip
+def test_scenes_that_do_not_suit_are_refused(kind: str, changes: dict[str, object], words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        studies.run(small.study(kind).with_values(changes))
+
+
+def test_a_table_must_stand_on_its_body() -> None:
+    case = small.study("influence", carriage=TABLE).with_values({"carriage.car.motion": AWAY})
+    with pytest.raises(BadInput, match=r"carriage\.car\.motion: the carriage never stands.*within 0\.3 to 3\.6 m"):
+        studies.run(case)
+
+
+def read(text: str) -> object:
+    loaded = engine.load(text)
+    kind_of(loaded)
+    return expand(loaded)
+
+
+SPOILT = [mutation for kind in KINDS for mutation in mutations(small.text_of(kind, COMPARED, MASS))]
+
+
+@pytest.mark.parametrize("mutation", SPOILT, ids=str)
+def test_every_key(mutation: Mutation) -> None:
+    survives(mutation, read)
+
+
+# ---- sentences and figures ----
+
+
+def test_sentences_of_frequencies_follow_the_data() -> None:
+    found = small.run("eigenfrequencies", "positions = 9\nmodes = 4", MASS)
+    text = "\n".join(answers.findings(found))
+    base = found.base_frequency
+    assert f"{float(base.sel(position=2.0, mode=1)):.4g}" in text and "with car at 2 m" in text
+    change = (base.max("position") - base.min("position")) / base.min("position")
+    assert f"frequency {int(np.argmax(change.values)) + 1} changes most, by {100 * float(change.max()):.2g} %" in text
+    low = float(found.frequency.sel(mode=1).min())
+    assert f"between {low:.4g} Hz at mass 50 kg with car at 2 m" in text
+    assert "come closest" in text and "nan" not in text
+
+
+def test_sentences_of_readings_follow_the_data() -> None:
+    found = small.run("influence", sweep=MASS)
+    text = "\n".join(answers.findings(found))
+    largest = 1e3 * float(found.middle.max())
+    assert f"to {largest:.4g} mm at mass 50 kg with car at 2 m" in text
+    own = 5.0 * 78.5 * 9.80665 * 4.0**4 / (384.0 * 210e9 * 8e-6)
+    assert f"({100 * own / float(found.middle.max()):.2g} % of that by own weight)" in text
+    assert "Contact forces" not in text  # a single mass presses with its weight
+    still = small.run("influence", "positions = [1.0, 1.5]", carriage=small.CAR.replace("40.0", "1e-13"))
+    assert "wherever car stands" in "\n".join(answers.findings(still))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("sweep", ["", MASS, f"{MASS}\ngravity = {{ of = 'gravity', values = [1.6, 9.8] }}"])
+def test_figures(kind: str, sweep: str) -> None:
+    carriage = small.CAR if sweep else TABLE
+    figures = answers.figures(small.run(kind, COMPARED, sweep, carriage))
+    names = [figure.name for figure in figures]
+    assert {"modes", "shapes" if kind == "eigenfrequencies" else "deflection"} <= set(names)
+    assert ("sweep" in names) == (bool(sweep) and kind == "eigenfrequencies")
+    assert ("contacts" in names) == (not sweep and kind == "influence")
+    for figure in figures:
+        assert figure.title and figure.caption and "nan" not in figure.caption
+
+
+# ---- commands ----
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_stopped_run_goes_on(kind: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    Path("small.toml").write_text(small.text_of(kind, COMPARED, MASS), encoding="utf-8")
+    written, write = [], PieceStore.write
+
+    def write_and_signal(self: PieceStore, name: str, dataset: xr.Dataset) -> Path:
+        written.append(write(self, name, dataset))
+        if len(written) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+        return written[-1]
+
+    assert main(["check", "small.toml"]) == 0
+    output = capsys.readouterr().out
+    assert (
+        "frequencies (Hz)" in output
+        and "variants-0000" in output
+        and "modes-6" in output
+        and "carriage.car.mass" in output
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(PieceStore, "write", write_and_signal)
+        assert main(["run", "small.toml"]) == 130
+    capsys.readouterr()
+    assert main(["run", "small.toml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["resumed"] == 2 and found["variants"] == 2
+    names = {one["name"] for one in found["results"]}
+    assert "frequency" in names or "middle" in names
+    assert not any(name.endswith(("_unreduced", "_by_mode_count")) for name in names)
+    root = open_archive("small.nc").root
+    xr.testing.assert_allclose(root.drop_attrs(), small.run(kind, COMPARED, MASS).drop_attrs())
+    assert summary.noun(root) == "variant"
+    assert main(["report", "small.nc"]) == 0
+    page = Path("small-report/report.html").read_text(encoding="utf-8")
+    assert "What was varied" in page and "unreduced finite-element model" in page
+
+
+def test_a_contact_that_opens_is_told_by_the_exit_code(here: Path, capsys: Captured) -> None:
+    text = small.text_of("influence", carriage=TABLE).replace('"pinned-pinned"', '"clamped-free"')
+    Path("small.toml").write_text(text.replace("second_moment = 8e-6", "second_moment = 8e-7"), encoding="utf-8")
+    assert main(["run", "small.toml"]) == 3

@@ -1,0 +1,136 @@
+"""Envelopes from the study file to the archive and its report, for every kind of study that marches."""
+
+from __future__ import annotations
+
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import engine
+from results_schema.archive import open_archive
+from results_schema.errors import ArchiveError, BadInput
+from results_schema.validate import validate
+from studies import answers, gathering
+from studies.cli import main
+from studies.options import RunOptions
+from studies.pictures import envelopes
+from studies.report import write_report
+from studies.results import Results
+from studies.runner import run_to_archive
+from studies.study import kind_of
+from tests.scene.mutations import mutations, survives
+from tests.studies import scenes
+from tests.studies.small import SMALL, write
+from tests.studies.test_cli_interrupted import after_parts, assert_same_results
+from tests.studies.test_report import archive, check_standing_alone
+
+EXTRA = """\
+[envelope.shape]
+body = "bed"
+places = 11
+
+[envelope.moments]
+body = "bed"
+quantity = "bending_moment"
+places = 7
+from = 1.0
+to = 9.0
+"""
+MASSES = 'mass = { of = "carriage.table.mass", values = [1, 20, 50] }'
+
+
+@pytest.mark.parametrize("kind", ["passage", "asymmetry", "double-peak", "trajectory"])
+def test_every_kind_that_marches(kind: str, tmp_path: Path) -> None:
+    dataset = scenes.run(kind, MASSES, extra=EXTRA)
+    assert dataset.shape_envelope_max.dims == ("mass", "shape_place")
+    assert dataset.moments_envelope_min.attrs["units"] == "N m"
+    assert dataset.moments_place.attrs["units"] == "m" and "place" in dataset.moments_place.attrs["long_name"]
+    np.testing.assert_allclose(dataset.moments_place.values, np.linspace(1.0, 9.0, 7), rtol=1e-14, atol=0)
+    middle = dataset.isel(shape_place=5)  # over the same instants as the sensor there
+    np.testing.assert_allclose(middle.shape_envelope_max, dataset.midspan_max, rtol=1e-10, atol=0, equal_nan=False)
+    page = write_report(archive(tmp_path, dataset), tmp_path / "out").read_text(encoding="utf-8")
+    reader = check_standing_alone(page)
+    drawn = {figure.name: figure for figure in answers.figures(dataset)}
+    assert list(drawn)[-1] == "envelopes" and drawn["envelopes"].caption in reader.text
+    assert "moments_envelope_max" in reader.text and "the largest bending moment along bed is" in reader.text
+    assert "envelope moments" in reader.text
+
+
+def test_the_sentence_names_value_place_and_variant() -> None:
+    dataset = scenes.run("passage", MASSES, extra=EXTRA)
+    said = next(text for text in answers.findings(dataset) if text.startswith("shape: "))
+    values = dataset.shape_envelope_max.values
+    which, place = np.unravel_index(np.argmax(values), values.shape)
+    assert f"{1000.0 * values.max():.3g} mm" in said
+    assert f"at {dataset.shape_place.values[place]:g} m of its track" in said
+    assert said.endswith(f"(mass {dataset.mass.values[which]:g} kg).")
+    alone = answers.findings(scenes.run("passage", extra=EXTRA))
+    assert any(re.search(r"^shape: .* m of its track\.$", text) for text in alone)
+
+
+def test_the_figure_draws_the_envelope_over_all_variants() -> None:
+    dataset = scenes.run("passage", MASSES, extra=EXTRA)
+    (figure,) = envelopes.pictures(Results.of(dataset))
+    shape, moments = figure.drawing.axes
+    assert shape.yaxis_inverted() and not moments.yaxis_inverted()
+    top, bottom = (line.get_ydata() for line in shape.get_lines()[:2])
+    np.testing.assert_allclose(top, 1000.0 * dataset.shape_envelope_max.max("mass"), rtol=1e-12, atol=0)
+    np.testing.assert_allclose(bottom, 1000.0 * dataset.shape_envelope_min.min("mass"), rtol=1e-12, atol=1e-12)
+    assert "3 variants" in figure.caption
+    assert envelopes.pictures(Results.of(scenes.run("passage", MASSES))) == []
+
+
+def test_failed_variants_are_left_out() -> None:
+    dataset = scenes.with_failures(scenes.run("passage", scenes.pace("passage"), extra=EXTRA), 2)
+    (figure,) = envelopes.pictures(Results.of(dataset))
+    assert all(np.isfinite(line.get_ydata()).all() for line in figure.drawing.axes[0].get_lines())
+    nothing = scenes.with_failures(scenes.run("passage", MASSES, extra=EXTRA), 1)
+    assert envelopes.pictures(Results.of(nothing)) == []
+    assert "shape: no variant has values." in answers.findings(nothing)
+
+
+def test_what_is_not_as_declared_is_found() -> None:
+    dataset = scenes.run("passage", MASSES, extra=EXTRA)
+    given = {"midspan": "m", "moment": "N m"}, ["table"], {"shape": "m", "moments": "N m"}
+    validate(dataset, "passage", *given)
+    with pytest.raises(ArchiveError, match="moments_envelope_max: expected in every passage"):
+        validate(dataset.drop_vars("moments_envelope_max"), "passage", *given)
+    with pytest.raises(ArchiveError, match="shape_envelope_min: expected dimensions"):
+        turned = dataset.assign(shape_envelope_min=dataset.shape_envelope_min.transpose())
+        validate(turned, "passage", *given)
+    with pytest.raises(ArchiveError, match="shape_envelope_min: expected a declared name"):
+        validate(dataset, "passage", *given[:2], {"moments": "N m"})
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
+    text = SMALL.replace("[sweep]", '[envelope.shape]\nbody = "beam"\n\n[sweep]')
+    write(tmp_path, text)
+    assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
+    with monkeypatch.context() as patch:
+        after_parts(patch, 2, signal.SIGINT)
+        assert main(["run", "small.toml"]) == 130
+    outcome = run_to_archive(engine.load("small.toml"), Path("small.nc"), RunOptions())
+    assert 2 <= outcome.resumed < 16
+    assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
+    assert open_archive("small.nc").root.shape_envelope_max.shape == (8, 2, 51)
+
+
+@pytest.mark.parametrize("how", ["drop", "misspell", "retype", "text", "nan"])
+def test_every_key(how: str) -> None:
+    text = scenes.text_of("passage", extra=EXTRA)
+    tried = [one for one in mutations(text) if one.path[0] == "envelope" and one.how == how]
+    assert len(tried) >= 2
+    for mutation in tried:
+        survives(mutation, engine.load)
+
+
+@pytest.mark.parametrize("kind", ["work-precision", "stability"])
+def test_studies_that_measure_have_none(kind: str) -> None:
+    text = scenes.text_of("passage", extra=EXTRA).replace('kind = "passage"', f'kind = "{kind}"')
+    with pytest.raises(BadInput, match=r"envelope: studies of the kind"):
+        kind_of(engine.load(text))
