@@ -30,7 +30,8 @@ from engine.unreduced_statics import statics_at
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-MOST_STEPS = 20_000  # up to which the unreduced model takes two steps for each of the march
+FINER = 4  # steps of the unreduced model for each of the march, so that its many modes do not ring by their steps
+MOST_STEPS = 60_000  # of the unreduced model, unless the march itself takes more
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ def compare_variant(plan: Plan, variant: int, check: Callable[[], None] = lambda
     counts = counts_shown(tables.timeline, plan.window, "auto" if wanted == "none" else wanted)
     marched, _ = march_chosen(tables, values, counts, 1)
     whole = unreduced_model(study, *_timing(bucket.scene))
-    by = 2 if 2 * tables.timeline.steps <= MOST_STEPS else 1
+    by = int(np.clip(MOST_STEPS // tables.timeline.steps, 1, FINER))
     course = Course(
         refined(tables.timeline, by),
         float(values.time_scale(next(iter(study.carriage)))[0]),

@@ -32,6 +32,7 @@ MOST_GROUPS = 4
 NEAR = 0.15  # how close a harmonic must be to be named as the cause
 SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
 SYMMETRIC = 0.05  # odd over even harmonics below which the two halves of a cycle are alike
+UNLIKE = 0.1  # odd over even harmonics from which the two halves of a cycle look different
 
 RESULTS = (
     Variable(
@@ -302,7 +303,17 @@ def _halves(results: Results, sensor: str) -> list[str]:
     if largest < SYMMETRIC:
         alike = f"odd harmonics are at most {percent(largest)} of the even"
         return [f"{sensor}: the two halves of a cycle are alike; {alike}."]
+    start = _from_where(results, np.asarray(ratio.values))
     return [
-        f"{sensor}: the two halves of a cycle differ; odd harmonics reach {number(largest)} times the even"
+        f"{sensor}: the two halves of a cycle differ{start}; odd harmonics reach {number(largest)} times the even"
         f"{in_words(results, place)}."
     ]
+
+
+def _from_where(results: Results, odd: Array) -> str:
+    """From which frequency ratio on the halves of a cycle are visibly unlike, if not from the lowest on."""
+    ratio = results.everywhere(theory.frequency_ratio(results))
+    unlike, known = odd > UNLIKE, np.isfinite(odd)
+    if not unlike.any() or not (known & (ratio < ratio[unlike].min())).any():
+        return ""
+    return f" by more than {percent(UNLIKE)} of the even harmonics from Ω/ω₁ = {number(float(ratio[unlike].min()))} on"
