@@ -46,7 +46,7 @@ def static_values(model: SceneModel, values: LaneValues, along: Along) -> Static
     sensors = [signal for signal in build_signals(model) if isinstance(signal, Sensor)]
     unit, loads = static_readings(model, sensors, along), _loads(model, values)
     force = static_state(model, along).force
-    parts = np.array([contact_row(model, c.carriage, c.spring) for c in contact_forces(model)])
+    parts = np.array([contact_row(model, c.carriage, c.contact) for c in contact_forces(model)])
     contacts = np.einsum("kr,srl->skl", parts, np.broadcast_to(force, (along[0].s.size, *force.shape[1:])))
     return StaticReadings(
         np.einsum("sjl,lv->vsj", unit, loads), np.einsum("skl,lv->vsk", contacts, loads), unit[:, :, 0]
@@ -66,9 +66,9 @@ def contact_names(model: SceneModel) -> list[str]:
 
 def _name(model: SceneModel, contact: ContactForce) -> str:
     carriage = model.carriages[contact.carriage].name
-    if contact.spring is None:
+    if contact.contact is None:
         return carriage
-    return f"{carriage}.{model.springs[contact.spring - model.first_spring].key.rpartition('.')[2]}"
+    return f"{carriage}.{model.contact_names(contact.carriage)[contact.contact]}"
 
 
 def _loads(model: SceneModel, values: LaneValues) -> Array:

@@ -80,8 +80,13 @@ class SceneModel:
 
     @property
     def leading_body(self) -> BodyPart:
-        """The body of the first carriage, whose first period and length make ratios."""
-        return self.bodies[self.carriages[0].body]
+        """The body of the first carriage, whose first period and length make ratios; where that is rigid and rides,
+        the first one below it that bends."""
+        below = {carriage.rides: carriage.body for carriage in self.carriages}
+        body = self.carriages[0].body
+        while not self.bodies[body].modal.omega.any():
+            body = below[body]
+        return self.bodies[body]
 
     @property
     def first_omega(self) -> float:
@@ -110,6 +115,15 @@ class SceneModel:
         numbered = enumerate(self.springs, start=self.first_spring)
         return {r: spring for r, spring in numbered if spring.carriage == carriage}
 
+    def contact_names(self, carriage: int) -> dict[int, str]:
+        """The contacts of a body that rides by the numbers of their riders; empty for other carriages."""
+        tie = self.carriages[carriage]
+        if tie.rides is None:
+            return {}
+        spec = self.study.carriage[tie.name]
+        assert isinstance(spec, BodyCarriage)
+        return {rider: name for (rider, _), name in zip(tie.loads, spec.contacts, strict=True)}
+
     def reacts(self, carriage: int) -> bool:
         """Whether the contact force of a carriage depends on how its body moves."""
         return self.carriages[carriage].inertia != "force" or bool(self.springs_of(carriage))
@@ -117,6 +131,8 @@ class SceneModel:
     @property
     def fidelity(self) -> Fidelity:
         """The model that this scene marches: the fullest of its carriages'."""
+        if self.study.solver.fidelity == "static":
+            return Fidelity.STATIC
         if self.springs:
             return Fidelity.TIED
         kinds = {carriage.inertia for carriage in self.carriages}
@@ -187,7 +203,7 @@ def _in_use(study: Study, body: str) -> bool:
 def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
     """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
     fidelity, carriage = study.solver.fidelity, study.carriage[name]
-    if fidelity == "force" or not carriage.inertial or isinstance(carriage, BodyCarriage):
+    if fidelity in ("force", "static") or not carriage.inertial or isinstance(carriage, BodyCarriage):
         return "force"
     if _sprung(study, name):
         wheel = f"carriage.{name}.wheel_mass"
@@ -197,7 +213,7 @@ def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
 
 def _sprung(study: Study, name: str) -> bool:
     """Whether a carriage's spring acts; below the full fidelity it is locked."""
-    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity == "auto"
+    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity in ("auto", "static")
 
 
 def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:

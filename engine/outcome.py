@@ -28,7 +28,7 @@ from engine.richardson import march_chosen, relative_error
 from engine.signals import contact_forces
 from engine.tables import SceneTables
 from results_schema.parts import Rows
-from results_schema.status import Status
+from results_schema.status import Fidelity, Status
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -71,9 +71,14 @@ def run_chunk(
         "diverged_step": diverged_step,
         "fidelity_used": np.full(variants.size, int(tables.model.fidelity), dtype=np.int8),
         "modes_used": np.full(variants.size, tables.model.body_modes, dtype=np.int32),
-        "steps_used": np.full(variants.size, tables.steps, dtype=np.int32),
+        "steps_used": np.full(variants.size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
     }
     return flat, _histories(plan, bucket, variants, halted)
+
+
+def _rests(tables: SceneTables) -> bool:
+    """Whether nothing is marched."""
+    return tables.model.fidelity is Fidelity.STATIC
 
 
 def _extremes(tables: SceneTables, marched: Marched) -> Flat:

@@ -24,9 +24,10 @@ from engine.resolution import steps_to_resolve
 from engine.resonance import check_steps, spring_steps
 from engine.scene import Study
 from engine.sweep import Cases, expand
-from engine.tables import SceneTables
+from engine.tables import STATIC_STATIONS, SceneTables
 from engine.timeline import Window
 from results_schema.errors import BadInput
+from results_schema.status import Fidelity
 from results_schema.variables import declarations
 
 Counts = NDArray[np.int64]
@@ -46,6 +47,7 @@ READING_SECONDS = 6e-7  # of an envelope's place at a station, in tables
 MOST_MARK_BYTES = 32 * 2**20  # of one chunk's extremes along bodies
 MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
+STATIC_STEPS = 800  # stations of statics over one passage or cycle
 SHOWN = 64  # variants whose histories are kept by default
 
 
@@ -75,6 +77,8 @@ class Bucket:
     @property
     def seconds_per_variant(self) -> float:
         """Expected time on one thread."""
+        if self.scene.fidelity is Fidelity.STATIC:
+            return 1e-9 * STATIC_STATIONS * len(self.tables.signals)
         signals = 1.0 + 0.1 * len(self.tables.signals)
         ties = self.scene.ties**1.2
         marches, more = (1.0, 1.0) if self.scene.scheme.stride == 1 else (PAIR, PAIR_PLACES)
@@ -326,6 +330,8 @@ def _buckets(
 
 def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Callable[[Counts], str]]:
     """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
+    if scene.fidelity is Fidelity.STATIC:
+        return np.full(values.size, STATIC_STEPS, dtype=np.int64), lambda part: "statics: nothing is marched"
     time_scale = values.time_scale(scene.carriages[0].name)
     if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
         steps = values.of("solver.steps").astype(np.int64)
@@ -344,8 +350,21 @@ def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tu
     return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
 
 
+def _check_static(scene: SceneModel, tables: SceneTables) -> None:
+    for sensor in tables.sensors:
+        if sensor.offset_order:
+            raise BadInput(
+                f'fidelity = "static" has no {sensor.quantity}',
+                where=scene.study.source.where(f"sensor.{sensor.name}.quantity"),
+                expected="a quantity that statics tell, such as displacement",
+            )
+
+
 def _check_readings(scene: SceneModel, tables: SceneTables) -> None:
-    """Refuse a sensor under a carriage that is never on its body while anything is recorded. Raises BadInput."""
+    """Refuse a sensor under a carriage that is never on its body while anything is recorded, and rates of what is at
+    rest. Raises BadInput."""
+    if scene.fidelity is Fidelity.STATIC:
+        _check_static(scene, tables)
     for sensor in tables.sensors:
         seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
         if not seen:

@@ -17,8 +17,10 @@ from engine.kernels.layout import LANES, LARGEST, SMALLEST, Record, Watch
 from engine.kernels.pairs import extrapolate, survey
 from engine.lanes import LaneValues, from_blocks
 from engine.march import Halted, March, Marched, march, prepare
+from engine.quasistatic import rest
 from engine.tables import SceneTables
 from engine.timeline import Segment
+from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -27,7 +29,10 @@ Counts = NDArray[np.int64]
 def march_chosen(
     tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
 ) -> tuple[Marched, Array | None]:
-    """March by the study's scheme; a pair gives its largest estimated errors (sensors, V) too. Raises Halted."""
+    """March by the study's scheme, or rest at every place; a pair gives its largest estimated errors (sensors, V) too.
+    Raises Halted."""
+    if tables.model.fidelity is Fidelity.STATIC:
+        return rest(tables, values, counts, size), None
     if tables.model.scheme.stride == 1:
         return march(tables, values, counts, size, halted), None
     return march_pair(tables, values, counts, size, halted)

@@ -19,11 +19,11 @@ PARAMETERS: Mapping[str, Mapping[str, str]] = {
     "hht-alpha": {"alpha": "-0.05, say, from -1/3 to 0"},
     "generalized-alpha": {"rho_inf": "0.8, say, from 0 to 1"},
 }
-FIDELITIES = ("auto", "force", "mass", "mass-without-convective")
+FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective")
 MAX_STEPS = 100_000_000
 
 SchemeName = Annotated[str, AfterValidator(one_of(*SCHEMES))]
-Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES, planned=("static",)))]
+Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES))]
 
 
 class Solver(Spec):

@@ -111,6 +111,10 @@ class Sensor:
             return np.zeros((1, model.omega.size))
         return _spread(model, model.bodies[self.body], self._rows(model, along))
 
+    def rides(self, model: SceneModel) -> int | None:
+        """The rider that it moves with."""
+        return self.under
+
     def _felt(self, model: SceneModel, along: tuple[Way, ...]) -> Iterator[tuple[int, Grip]]:
         """The grips of all ties on its body, with the ties' numbers."""
         for r, grips in enumerate(model.grips):
@@ -224,16 +228,16 @@ class SprungSensor(Sensor):
 @dataclass(frozen=True, eq=False)
 class ContactForce:
     """The force (N) between a carriage (its number) and its body, or at one contact of a body that rides (the number of
-    its spring among all ties)."""
+    its rider)."""
 
     carriage: int
-    spring: int | None = None
+    contact: int | None = None
 
     def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
         return []
 
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
-        return np.broadcast_to(contact_row(model, self.carriage, self.spring), (along[0].s.size, model.ties))
+        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return np.zeros(along[0].s.size)
@@ -242,13 +246,13 @@ class ContactForce:
     def offset_order(self) -> int:
         return 0
 
-    def rider(self, model: SceneModel) -> int:
+    def rides(self, model: SceneModel) -> int:
         """The rider whose place it is."""
-        return self.carriage if self.spring is None else model.springs[self.spring - model.first_spring].rider
+        return self.carriage if self.contact is None else self.contact
 
     def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
-        rider = self.rider(model)
+        rider = self.rides(model)
         way, body = along[rider], model.carriages[self.carriage].body
         if not way.active:
             return np.zeros(way.s.size, dtype=np.bool_)
@@ -258,17 +262,17 @@ class ContactForce:
 
 @dataclass(frozen=True, eq=False)
 class ContactSensor(Sensor):
-    """The force at one contact of a body that rides (the number of its spring among all ties), or at all contacts of a
-    carriage together, as a sensor with its history. It counts wherever the carriage's contact is on its body."""
+    """The force at one contact of a body that rides (the number of its rider), or at all contacts of a carriage
+    together, as a sensor with its history. It counts wherever the carriage's contact is on its body."""
 
     carriage: int
-    spring: int | None
+    contact: int | None
 
     def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
         return []
 
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
-        return np.broadcast_to(contact_row(model, self.carriage, self.spring), (along[0].s.size, model.ties))
+        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
     def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return self.missed(model, along)
@@ -279,8 +283,11 @@ class ContactSensor(Sensor):
     def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
         return np.ones(1)
 
+    def rides(self, model: SceneModel) -> int:
+        return ContactForce(self.carriage, self.contact).rides(model)
+
     def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
-        return np.full(along[0].s.size, along[ContactForce(self.carriage, self.spring).rider(model)].active)
+        return np.full(along[0].s.size, along[self.rides(model)].active)
 
     def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         return np.zeros(along[0].s.size)
@@ -289,14 +296,14 @@ class ContactSensor(Sensor):
 Signal = Sensor | ContactForce
 
 
-def contact_row(model: SceneModel, carriage: int, spring: int | None = None) -> Array:
+def contact_row(model: SceneModel, carriage: int, contact: int | None = None) -> Array:
     """(ties,) parts of all ties' forces that make the contact force of a carriage, or that at one of its contacts."""
-    found = np.zeros(model.ties)
-    if spring is None:
-        found[[carriage, *model.springs_of(carriage)]] = 1.0
+    found, springs = np.zeros(model.ties), model.springs_of(carriage)
+    if contact is None:
+        found[[carriage, *springs]] = 1.0
     else:
-        found[spring] = 1.0
-        found[carriage] = model.springs[spring - model.first_spring].share
+        found[carriage] = dict(model.carriages[carriage].loads)[contact]
+        found[[r for r, spring in springs.items() if spring.rider == contact]] = 1.0
     return found
 
 
@@ -304,8 +311,8 @@ def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
     """The contact force of every carriage; of a body that rides, that of every contact."""
     found: list[ContactForce] = []
     for number, carriage in enumerate(model.carriages):
-        springs = model.springs_of(number) if carriage.rides is not None else {}
-        found += [ContactForce(number, spring) for spring in springs] or [ContactForce(number)]
+        contacts = [None] if carriage.rides is None else [rider for rider, _ in carriage.loads]
+        found += [ContactForce(number, contact) for contact in contacts]
     return tuple(found)
 
 
@@ -343,8 +350,7 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
         return Sensor(name, spec.quantity, body, at, under)
     springs = model.springs_of(under)
     if spec.quantity == "contact_force":
-        key = f"carriage.{spec.carriage}.contacts.{spec.contact}"
-        chosen = [r for r, spring in springs.items() if spring.key == key]
+        chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]
         return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)
     mode = next((spring.mode for spring in springs.values()), None)
     return (

@@ -13,7 +13,7 @@ from engine.bodies.modal import ModalBody
 from engine.carriages import BodyCarriage, Contact
 from engine.scene import Study
 from engine.ties import CarriageTie, Grip, SpringTie
-from engine.timeline import Rider
+from engine.timeline import AT_END, Rider
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -68,8 +68,8 @@ def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) 
         held = Grip(-1.0, place.rides, None, _held_at(contact))
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
         rigid = contact.stiffness == "rigid"
-        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid, shares[number]))
-    acting = tuple(springs) if study.solver.fidelity == "auto" else ()
+        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
+    acting = tuple(springs) if study.solver.fidelity in ("auto", "static") else ()
     return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
 
 
@@ -157,7 +157,8 @@ def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[R
     low, high = carriage.motion.range()
     for rider, (word, contact) in zip(riders, carriage.contacts.items(), strict=True):
         where = study.source.where(f"carriage.{name}.contacts.{word}")
-        stays = low + rider.offset >= -1e-9 * rider.length and high + rider.offset <= rider.length * (1.0 + 1e-9)
+        slack = AT_END * rider.length
+        stays = low + rider.offset >= -slack and high + rider.offset <= rider.length + slack
         if rider.stays and not stays:
             raise BadInput(
                 "this contact leaves the body that it rides",

@@ -140,9 +140,9 @@ class SceneTables:
             self.__dict__.pop(name, None)
 
     @cached_property
-    def static_over_window(self) -> StaticUnit:
-        """Static readings at stations spread over the recorded part, and where a carriage passes a sensor: there
-        influence lines have their kinks."""
+    def static_counts(self) -> Array:
+        """Stations, by their count, spread over the recorded part, and where a carriage passes a sensor, as influence
+        lines have their kinks there."""
         first, last = self.timeline.window
         last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
         counts = np.linspace(first, last, STATIC_STATIONS)
@@ -152,7 +152,12 @@ class SceneTables:
             for sensor in self.sensors
             if sensor.under is None
         ]
-        return self.static_at(np.unique(np.concatenate([counts, *passing])))
+        return np.unique(np.concatenate([counts, *passing]))
+
+    @cached_property
+    def static_over_window(self) -> StaticUnit:
+        """Static readings at `static_counts`."""
+        return self.static_at(self.static_counts)
 
     @cached_property
     def static_scales(self) -> Array:
@@ -203,7 +208,7 @@ class SceneTables:
         """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
         apart, which it reaches with all its contacts."""
         riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
-        own = {0, *(spring.rider for spring in self.model.springs_of(0).values())}
+        own = {0, *(rider for rider, _ in self.model.carriages[0].loads)}
         lowest = np.minimum.reduce([along[r].s for r in own])
         highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
         before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)

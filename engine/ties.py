@@ -76,7 +76,6 @@ class SpringTie:
     mode: int | None
     damped: bool
     rigid: bool = False
-    share: float = 1.0
 
     def grips(self, body: int) -> tuple[Grip, ...]:
         """Where its force acts; ``body`` is ridden."""

@@ -28,6 +28,7 @@ Window = Literal["whole", "last-cycle"]
 
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
 _SAME = 1e-12  # events closer than this part of the scene are one
+AT_END = 1e-9  # of the body's length: a contact beyond an end by no more touches it, for its offset is rounded
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,12 @@ class Rider:
         if not self.stays and not self.delay <= middle <= self.end:
             return False
         place = float(self.path(np.array([middle]), start, end).S[0])
-        return 0.0 <= place <= self.length
+        return -self._slack <= place <= self.length + self._slack
+
+    @property
+    def _slack(self) -> float:
+        """m by which a contact may be beyond an end that it touches; a carriage itself is where its motion says."""
+        return AT_END * self.length if self.offset else 0.0
 
     @cached_property
     def speed_jumps(self) -> tuple[Array, Array]:
@@ -111,7 +117,8 @@ class Rider:
     def _crossings(self) -> Iterator[float]:
         """The motion's own times at which it passes an end of the body."""
         low, high = (end + self.offset for end in self.motion.range())
-        ends = [place for place, beyond in ((0.0, low < 0.0), (self.length, high > self.length)) if beyond]
+        beyond = ((0.0, low < -self._slack), (self.length, high > self.length + self._slack))
+        ends = [place for place, passed in beyond if passed]
         if not ends:
             return
         from scipy.optimize import brentq

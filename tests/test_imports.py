@@ -33,7 +33,7 @@ STAGES = {
     "scenes as arrays": "timeline ties standing model ways grips statics track signals lanes influence coupled "
     "fidelity tables envelopes resonance resolution",
     "all work of a study": "reduction plan histories remarks",
-    "the run": "starting march richardson ode transition comparison outcome dataset execution unreduced_track "
+    "the run": "starting march quasistatic richardson ode transition comparison outcome dataset execution unreduced_track "
     "unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march unreduced_comparison",
 }
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {

@@ -146,7 +146,7 @@ def test_numbers_and_units() -> None:
         ('scheme = "newmark"', 'scheme = "newmark"\nrho_inf = 1.5', ["solver.rho_inf", "<= 1"]),
         ('scheme = "newmark"', 'scheme = "fox-goodwin"', ["solver", "beta and gamma", "not for this scheme"]),
         ("gamma = 0.5", "gamma = 0.4", ["solver.gamma", ">= 0.5"]),
-        ('fidelity = "auto"', 'fidelity = "static"', ["not built yet"]),
+        ('fidelity = "auto"', 'fidelity = "statics"', ["solver.fidelity", '"static"']),
         ("audit = 0", "audit = 5", ["audit", "not built yet"]),
         ("steps = 500", "steps = 0", ["solver.steps", ">= 1"]),
         ("steps = 500", "steps = 1000000000", ["solver.steps", "<= 1e+08"]),

@@ -1,0 +1,95 @@
+"""The lowest rung: every carriage so slow that nothing moves but the loads. Static readings stand for a march.
+
+What is read anywhere is exact for the model, as influence lines are; nothing is stepped, so a variant costs next to
+nothing and has neither lag nor vibration.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.influence import static_readings
+from engine.kernels.layout import (
+    BELOW_AT,
+    LARGEST,
+    LARGEST_AT,
+    MARKS,
+    SMALLEST,
+    SMALLEST_AT,
+    SQUARES,
+)
+from engine.lanes import LaneValues, weight
+from engine.march import Marched
+from engine.signals import ContactForce, ContactSensor, Sensor, Signal
+from engine.tables import SceneTables
+from engine.ways import Way
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+MOST_READINGS = 2**22  # stations x signals x variants at a time
+
+
+def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> Marched:
+    """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
+    sensors at stations by their count."""
+    model, signals = tables.model, tables.signals
+    loads = np.stack([*(weight(model, values, c) for c in range(len(model.carriages))), values.of("gravity")])[:, :size]
+    at = tables.static_counts
+    unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
+    distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
+    marks = np.zeros((len(signals), MARKS, distinct.shape[1]))
+    piece = max(1, MOST_READINGS // unit[:, :, 0].size)
+    for first in range(0, distinct.shape[1], piece):
+        part = slice(first, first + piece)
+        marks[:, :, part] = _marks(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
+    marks = marks[:, :, inverse.reshape(-1)]
+    sensors = len(tables.sensors)
+    guard = np.full((len(signals) - sensors, MARKS, size), -1.0)
+    history = np.zeros((counts.size, sensors, size))
+    if counts.size:
+        here = _counted(tables, signals[:sensors], tables.ways_at(counts))[:, :, None]
+        found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :sensors], loads)
+        history = np.where(here, found, np.nan)
+    return Marched(marks, guard, history, np.ones(size, dtype=np.bool_))
+
+
+def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
+    """(S, J, C + 1) readings of all signals per unit weight of each carriage, and last per unit gravity."""
+    model = tables.model
+    readers = [signal if isinstance(signal, Sensor) else _reader(tables, signal) for signal in tables.signals]
+    return static_readings(model, readers, tables.ways_at(counts))
+
+
+def _reader(tables: SceneTables, contact: ContactForce) -> Sensor:
+    """A contact force as a sensor."""
+    body, carriage = tables.model.carriages[contact.carriage].body, contact.carriage
+    return ContactSensor("", "contact_force", body, 0.0, carriage, carriage, contact.contact)
+
+
+def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Flags:
+    """(S, J) where each signal reads anything."""
+    found = []
+    for signal in signals:
+        rider, counts = signal.rides(tables.model), signal.counted(tables.model, along)
+        here = None if rider is None else along[rider].here
+        found.append(counts if here is None else counts & here)
+    return np.stack(found, axis=1)
+
+
+def _marks(readings: Array, counted: Flags, at: Array) -> Array:
+    """(J, MARKS, V) of readings (S, J, V) at stations by their count (S,)."""
+    found = np.full((readings.shape[1], MARKS, readings.shape[2]), -1.0)  # none has diverged
+    seen = counted[:, :, None]
+    for value, where, sign in ((LARGEST, LARGEST_AT, 1.0), (SMALLEST, SMALLEST_AT, -1.0)):
+        signed = np.where(seen, sign * readings, -np.inf)
+        place = np.argmax(signed, axis=0)
+        found[:, value] = sign * np.take_along_axis(signed, place[None], axis=0)[0]
+        found[:, where] = np.where(np.asarray(counted.any(axis=0))[:, None], at[place], -1.0)
+    below: Flags = np.logical_and(seen, readings < 0.0)
+    found[:, BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
+    step = np.gradient(at)[:, None, None]
+    found[:, SQUARES] = np.sum(np.where(seen, readings**2, 0.0) * step, axis=0)
+    return found
