@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engine.model import SceneModel
 from engine.scene import Study
 from engine.signals import Sensor, Signal, contact_forces
-from engine.tables import SceneTables, SegmentTable
+from engine.tables import Missed, SceneTables, SegmentTable
 from engine.timeline import Segment
 from engine.ways import Way
 from results_schema.errors import BadInput
@@ -81,8 +81,8 @@ class EnvelopeTables(SceneTables):
         """(places,) zeros: which variants diverge, the march of the sensors tells."""
         return np.zeros(len(self.places))
 
-    def _build(self, segment: Segment) -> SegmentTable:
-        found = super()._build(segment)
+    def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
+        found = super()._build(segment, missed)
         for place in self.places:
             place.together.known.clear()
         return found

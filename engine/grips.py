@@ -72,12 +72,15 @@ def residual(model: SceneModel, along: Along) -> Array:
     felt = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.held and not spring.rigid]
     if not felt or not model.study.solver.static_correction:
         return np.zeros((0, 0, 0))
-    found = np.zeros((along[0].s.size, ties, ties))
+    found, known = np.zeros((along[0].s.size, ties, ties)), dict[tuple[Grip, Grip], Array]()
     for r in felt:
         for s in range(ties):
             if s in felt and s < r:
                 found[:, r, s] = found[:, s, r]
                 continue
             for one, other in shared(model, r, s, along):
-                found[:, r, s] += missed_flexibility(model, one, other, along)
+                first, second = sorted((one.unit, other.unit), key=str)  # dead loads and springs hold the same places
+                if (first, second) not in known:
+                    known[first, second] = missed_flexibility(model, first, second, along)
+                found[:, r, s] += one.factor * other.factor * known[first, second]
     return found

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.lanes import LaneValues, weight
+from engine.lanes import LaneValues, weights
 from engine.model import SceneModel
 from engine.signals import ContactForce, Sensor, build_signals, contact_forces, contact_row
 from engine.statics import static_state
@@ -73,8 +73,7 @@ def _name(model: SceneModel, contact: ContactForce) -> str:
 
 def _loads(model: SceneModel, values: LaneValues) -> Array:
     """(C + 1, V) weight of every carriage in N, and gravity."""
-    weights = [weight(model, values, number) for number in range(len(model.carriages))]
-    return np.stack([*weights, values.of("gravity")])
+    return np.stack([*weights(model, values), values.of("gravity")])
 
 
 def _together(one: Array, other: Array) -> tuple[Array, Array]:

@@ -100,6 +100,11 @@ def weight(model: SceneModel, values: LaneValues, carriage: int) -> Array:
     return moving_mass(model, values, carriage) * values.of("gravity") * model.bodies[tie.body].modal.gravity_share
 
 
+def weights(model: SceneModel, values: LaneValues) -> Array:
+    """(C, V) N of all carriages."""
+    return np.stack([weight(model, values, number) for number in range(len(model.carriages))])
+
+
 def rounded(values: Array) -> Array:
     """Values rounded to 40 binary digits."""
     mantissa, exponent = np.frexp(values)
@@ -163,7 +168,6 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     """The lanes of some variants, whose number must be a multiple of LANES."""
     rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
     none, numbers = np.zeros(values.size), range(len(model.carriages))
-    weights = [weight(model, values, number) for number in numbers]
     masses = [_contact_mass(model, values, number) for number in numbers]
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
     rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
@@ -178,7 +182,7 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
         mobility=to_blocks(np.concatenate([ones, *(1.0 / values.of(f"{s.key}.mass")[None] for s in model.sprung)])),
         mass=to_blocks(np.stack(masses + dampers + springs)),
         joint=to_blocks(np.stack(carriages + dampers + rigid)),
-        weight=to_blocks(np.stack(weights + dampers + springs)),
+        weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs])),
         damper=to_blocks(np.stack(carriages + coefficients)),
         spring=to_blocks(np.stack(carriages + dampers + stiffness)),
         time_scale=to_blocks(values.time_scale(model.carriages[0].name)),

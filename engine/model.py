@@ -25,6 +25,9 @@ from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 
+PROBED = 65  # places along a track at which it is looked for what a mode moves
+UNFELT = 1e-6  # of the largest: a mode that moves its track less is none of the loads' business
+
 
 @dataclass(frozen=True, eq=False)
 class BodyPart:
@@ -88,16 +91,24 @@ class SceneModel:
             body = below[body]
         return self.bodies[body]
 
-    @property
+    @cached_property
     def first_omega(self) -> float:
-        """Lowest elastic natural frequency of the leading body, rad/s."""
-        omega = self.leading_body.modal.omega
-        return float(omega[omega > 0.0][0])
+        """Lowest elastic natural frequency of the leading body that moves its track along the load, rad/s."""
+        modal = self.leading_body.modal
+        size = np.abs(modal.shape(np.linspace(0.0, modal.length, PROBED))).max(axis=0)
+        felt = (modal.omega > 0.0) & (size > UNFELT * size.max())
+        return float(modal.omega[felt if felt.any() else modal.omega > 0.0][0])
 
     @property
     def riders(self) -> tuple[Rider, ...]:
         """The ways of all carriages, then of all contacts of bodies that ride."""
         return (*(carriage.rider for carriage in self.carriages), *self.contacts)
+
+    @property
+    def timing(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Paces and delays of all carriages by name, as `build_model` takes them."""
+        riders = {carriage.name: carriage.rider for carriage in self.carriages}
+        return {name: r.pace for name, r in riders.items()}, {name: r.delay for name, r in riders.items()}
 
     @property
     def first_spring(self) -> int:
@@ -237,7 +248,9 @@ def _standing(
         carriage = study.carriage[tie.name]
         if isinstance(carriage, BodyCarriage):
             rides = names.index(carriage.body)
-            found[number] = stand(study, Place(number, tie, rides, first), parts[rides].modal, swept)
+            found[number] = stand(
+                study, Place(number, tie, parts[tie.body].modal, rides, first), parts[rides].modal, swept
+            )
             first += len(carriage.contacts)
     return found
 
@@ -262,7 +275,12 @@ def _check_rigid_modes(model: SceneModel) -> None:
     for number, part in enumerate(model.bodies):
         where = model.study.source.where(f"body.{part.name}.supports")
         if part.modal.rigid_modes and part.own_weight:
-            raise BadInput("nothing holds this body against its own weight", where=where, remedy="own_weight = false")
+            raise BadInput(
+                "nothing holds this body fully, so its own weight has no static state",
+                where=where,
+                remedy='supports that hold every direction, such as supports.NODE = ["x"] of a frame that may slide; '
+                "bodies that ride take own_weight = false",
+            )
         if number in riding:
             continue
         if part.modal.rigid_modes == len(part.modal.omega):
@@ -275,6 +293,6 @@ def _check_rigid_modes(model: SceneModel) -> None:
             raise BadInput(
                 "nothing holds this body, so it has no static equilibrium to start from",
                 where=where,
-                expected="supports that hold it",
-                remedy='hold the body, or set initial = "rest"',
+                expected="supports that hold it in every direction",
+                remedy='hold it, a frame that may slide by supports.NODE = ["x"], or set initial = "rest"',
             )

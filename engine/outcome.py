@@ -18,7 +18,7 @@ from engine.kernels.layout import (
     SMALLEST_AT,
     SQUARES,
 )
-from engine.lanes import LaneValues, padded, weight
+from engine.lanes import LaneValues, padded, weights
 from engine.march import Marched
 from engine.model import SceneModel
 from engine.plan import Bucket, Plan
@@ -169,25 +169,24 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 def _statics(tables: SceneTables, values: LaneValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
     unit = tables.static_over_window
-    weights = np.stack([weight(tables.model, values, c) for c in range(len(tables.model.carriages))])
-    gravity = values.of("gravity")
+    loads, gravity = weights(tables.model, values), values.of("gravity")
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors):
-        if weights.shape[0] == 1 and not np.any(unit.gravity[:, j]):
-            found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(weights[0])
+        if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
+            found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
         else:
-            found[f"{sensor.name}_static"] = _largest_static(unit.force[:, j], unit.gravity[:, j], weights, gravity)
+            found[f"{sensor.name}_static"] = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
     return found
 
 
-def _largest_static(force: Array, offset: Array, weights: Array, gravity: Array) -> Array:
+def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -> Array:
     """(V,) largest |sum of unit readings times weights + offset times gravity|, in pieces of variants."""
     found = np.empty(gravity.size)
     for first in range(0, gravity.size, 1024):
         part = slice(first, first + 1024)
         reading = offset[:, None] * gravity[part]
-        for r in range(weights.shape[0]):
-            reading = reading + force[:, r, None] * weights[r, part]
+        for r in range(loads.shape[0]):
+            reading = reading + force[:, r, None] * loads[r, part]
         found[part] = np.abs(reading).max(axis=0)
     return found
 
@@ -203,17 +202,17 @@ def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts
     if plan.reduction is None:
         return {}
     unit = tables.static_at(counts)
-    weights = np.stack([weight(tables.model, values, c) for c in range(len(tables.model.carriages))])
+    loads = weights(tables.model, values)
     static = unit.gravity[:, :, None] * values.of("gravity")
-    for r in range(weights.shape[0]):
-        static = static + unit.force[:, :, r, None] * weights[r]
+    for r in range(loads.shape[0]):
+        static = static + unit.force[:, :, r, None] * loads[r]
     first, last = tables.timeline.window
     cycle = Cycle(
         phase=(counts - first) / (last - first),
         position=tables.timeline.positions(0, counts.astype(np.float64)),
         history=history,
         static=static,
-        static_slope=tables.static_slope_at(counts)[:, :, None] * weights[0],
+        static_slope=tables.static_slope_at(counts)[:, :, None] * loads[0],
         motion=tables.model.carriages[0].rider.motion,
     )
     return dict(plan.reduction(cycle))

@@ -24,7 +24,7 @@ from engine.resolution import steps_to_resolve
 from engine.resonance import check_steps, spring_steps
 from engine.scene import Study
 from engine.sweep import Cases, expand
-from engine.tables import STATIC_STATIONS, SceneTables
+from engine.tables import KEPT_BYTES, STATIC_STATIONS, SceneTables
 from engine.timeline import Window
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -140,7 +140,8 @@ class Plan:
         for bucket in self.buckets:
             lanes = LANES * -(-bucket.variants.size // LANES)
             timeline = bucket.tables.timeline
-            tabulated = min(timeline.steps, bucket.steps) if timeline.repeats else timeline.steps
+            again = timeline.repeats and bucket.tables.cycle_bytes <= KEPT_BYTES
+            tabulated = min(timeline.steps, bucket.steps) if again else timeline.steps
             found += bucket.seconds_per_variant * lanes / threads
             found += BUCKET_SECONDS + STATION_SECONDS * tabulated * bucket.scene.ties
             found += READING_SECONDS * tabulated * places_read(self.study)
@@ -320,7 +321,7 @@ def _buckets(
 ) -> Iterator[Bucket]:
     """Variants of one scene by their step counts."""
     values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
-    steps, reasons = _steps(scene, values, check_steps)
+    steps, reasons = steps_of(scene, values, check_steps)
     pace = values.time_scale(scene.carriages[0].name)  # variants of like pace rise and fall together: fewer extremes
     for part in _split(np.arange(variants.size), steps):
         tables = SceneTables(scene, int(steps[part[0]]), window, refinement=scene.scheme.stride)
@@ -328,7 +329,7 @@ def _buckets(
         yield Bucket(tables, variants[part[np.argsort(pace[part], kind="stable")]], reasons(part))
 
 
-def _steps(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Callable[[Counts], str]]:
+def steps_of(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Callable[[Counts], str]]:
     """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
     if scene.fidelity is Fidelity.STATIC:
         return np.full(values.size, STATIC_STEPS, dtype=np.int64), lambda part: "statics: nothing is marched"

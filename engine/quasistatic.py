@@ -19,7 +19,7 @@ from engine.kernels.layout import (
     SMALLEST_AT,
     SQUARES,
 )
-from engine.lanes import LaneValues, weight
+from engine.lanes import LaneValues, weights
 from engine.march import Marched
 from engine.signals import ContactForce, ContactSensor, Sensor, Signal
 from engine.tables import SceneTables
@@ -36,7 +36,7 @@ def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> 
     """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
     sensors at stations by their count."""
     model, signals = tables.model, tables.signals
-    loads = np.stack([*(weight(model, values, c) for c in range(len(model.carriages))), values.of("gravity")])[:, :size]
+    loads = np.stack([*weights(model, values), values.of("gravity")])[:, :size]
     at = tables.static_counts
     unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count

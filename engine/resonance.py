@@ -59,6 +59,7 @@ def spring_steps(model: SceneModel, values: LaneValues) -> dict[str, Array]:
     """Steps (V,) per unit of scene time that the springs ask for, by rule; empty without any."""
     if not model.springs:
         return {}
+    check_free_vibration(model)
     turns = values.time_scale(model.carriages[0].name) / (2.0 * math.pi)
     rules = (
         {}
@@ -81,10 +82,24 @@ def check_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
     check_fixed_steps(model, time_scale, steps)
     if not model.springs:
         return
+    check_free_vibration(model)
     if math.isfinite(model.scheme.stability_limit):
         _refuse(model, _least_for_limit(model, values), steps, "the step is beyond the scheme's stability limit")
     least = model.scheme.stride * time_scale * contact_omega(model, values) / (2.0 * math.pi)
     _refuse(model, least, steps, "a step is longer than a period of the contact on its spring: the march could grow")
+
+
+def check_free_vibration(model: SceneModel) -> None:
+    """Refuse free vibration with springs by a conditionally stable scheme: its steps follow from the bodies' modes
+    alone, whatever the springs of a variant. Raises BadInput."""
+    for carriage in model.carriages:
+        if math.isfinite(model.scheme.stability_limit) and getattr(carriage.rider.motion, "after", 0.0) > 0.0:
+            raise BadInput(
+                "free vibration with springs needs a scheme that is stable with any step",
+                where=model.study.source.where(f"carriage.{carriage.name}.motion.after"),
+                expected="0",
+                remedy='scheme = "average-acceleration"',
+            )
 
 
 def _least_for_limit(model: SceneModel, values: LaneValues) -> Array:

@@ -314,9 +314,13 @@ def _check_rider(study: Study, name: str, carriage: BodyCarriage) -> None:
     """A body that rides is another one, rides once, and has the points that its contacts name."""
     here = f"carriage.{name}.body"
     _must_exist(study, here, carriage.body, "body")
-    riding = [c.body for c in study.carriage.values() if isinstance(c, BodyCarriage)]
-    if carriage.body == carriage.on or riding.count(carriage.body) > 1:
-        what = "a body cannot ride on itself" if carriage.body == carriage.on else "this body rides twice"
+    riding = [(c.body, c.on) for c in study.carriage.values() if isinstance(c, BodyCarriage)]
+    below, on = [carriage.body], dict(riding)
+    while below[-1] in on and below.count(below[-1]) == 1:
+        below.append(on[below[-1]])
+    alone = [body for body, _ in riding].count(carriage.body) == 1
+    if carriage.body in below[1:] or not alone:
+        what = "a body cannot ride on itself" if alone else "this body rides twice"
         raise BadInput(what, where=study.source.where(here), received=shortened(carriage.body), remedy="another body")
 
 

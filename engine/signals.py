@@ -27,6 +27,7 @@ from engine.ways import Way
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+HELD = 1e-9  # of the largest mode shape, below which an end of a track does not move
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 # of w along the track, for what statics make; axial forces are those of `ModalBody.sections` alone
 DERIVATIVE = {"displacement": 0, "axial_force": 1, "bending_moment": 2, "stress": 2, "strain": 2, "shear_force": 3}
@@ -83,9 +84,12 @@ class Sensor:
         found = np.zeros((along[0].s.size, model.ties))
         if self.quantity not in DERIVATIVE or not model.study.solver.static_correction:
             return found
+        known = dict[Grip, Array]()
         for r, grip in self._felt(model, along):
-            kept = self._kept(model, along, shape_rows(model, grip, along))
-            found[:, r] += grip.factor * (self._full(model, along, place(grip, along)) - kept)
+            if grip.unit not in known:  # a carriage's weight and its springs hold the same places
+                kept = self._kept(model, along, shape_rows(model, grip, along))
+                known[grip.unit] = self._full(model, along, place(grip, along)) - kept
+            found[:, r] += grip.factor * known[grip.unit]
         return found
 
     def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
@@ -317,10 +321,12 @@ def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
 
 
 def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, float]:
-    """Places between which a contact force counts: a pinned or clamped end is left out where the way leads to it."""
+    """Places between which a contact force counts: an end that is held along the load is left out where the way leads
+    to it."""
     length = rider.length
-    beam = model.study.body[model.bodies[body].name]
-    left, right = getattr(beam, "ends", ("free", "free"))
+    modal = model.bodies[body].modal
+    ends, inner = (np.abs(modal.shape(at)) for at in ([0.0, length], np.linspace(0.0, length, 9)))
+    left, right = ("held" if held else "free" for held in (ends <= HELD * inner.max()).all(axis=1))
     low, high = (1.0 - SPAN_COUNTED) * length, SPAN_COUNTED * length
     forward = rider.stays or float(rider.motion.path(0.0).dS) > 0.0
     backward = rider.stays or not forward
@@ -360,8 +366,15 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     )
 
 
-def tabulate_watch(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Watch:
-    """Rows of every signal along a segment."""
+def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Array:
+    """(stations, signals, ties) static responses per unit force of each tie that the kept modes miss."""
+    return np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1))
+
+
+def tabulate_watch(
+    model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...], missed: Array | None = None
+) -> Watch:
+    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
@@ -372,7 +385,7 @@ def tabulate_watch(model: SceneModel, signals: tuple[Signal, ...], along: tuple[
         on_a=_stacked(rows["a"], modes),
         signal=np.array([number for number, _ in ordered], dtype=np.int64),
         order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
-        static=np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1)),
+        static=tabulate_missed(model, signals, along) if missed is None else missed,
         offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
         counted=np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1)),

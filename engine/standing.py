@@ -19,15 +19,17 @@ from results_schema.errors import BadInput
 Array = NDArray[np.float64]
 
 LIFTS = 1e-9  # of its weight: a contact that pulls more at rest would lift
+CLASH = 1e-7  # of a shape, per contact: rigid contacts that the modes cannot tell apart any better are one
 HELD = 1e-6  # part of a body's mass that its elastic modes may take of a uniform acceleration
 
 
 class Place(NamedTuple):
-    """Whose contacts: the carriage's number and tie, the number of the body that rides, and of its first contact among
-    all riders."""
+    """Whose contacts: the carriage's number and tie, what it rides on, the number of the body that rides, and of its
+    first contact among all riders."""
 
     number: int
     tie: CarriageTie
+    below: ModalBody
     rides: int
     first: int
 
@@ -61,6 +63,7 @@ def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) 
     reference = 0.5 * modal.length if carriage.reference is None else carriage.reference
     riders = tuple(replace(place.tie.rider, offset=_offset(c, reference)) for c in carriage.contacts.values())
     _check_ways(study, name, carriage, riders)
+    _check_joints(study, name, _joints(carriage, riders, place.below, modal))
     shares = _shares(study, name, carriage, modal)
     springs = []
     for number, (word, contact) in enumerate(carriage.contacts.items()):
@@ -125,8 +128,19 @@ def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares:
             "this body would tip over: its contacts cannot carry its weight at rest",
             where=study.source.where(f"carriage.{name}.contacts"),
             expected="contacts on both sides of its centre of mass",
-            received=", ".join(f"{share:.4g} of the weight" for share in shares),
+            received=_places_in_words(study, name),
+            remedy="a contact further out on the side to which it tips, or another one",
         )
+
+
+def _places_in_words(study: Study, name: str) -> str:
+    """Where the contacts of a carriage stand on the body that rides."""
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
+    places = [
+        f"{word} at {c.at:g} m" if c.at is not None else f"{word} at {c.point}" for word, c in carriage.contacts.items()
+    ]
+    return ", ".join(places)
 
 
 def _check_fidelity(study: Study, name: str) -> None:
@@ -176,3 +190,27 @@ def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[R
                 expected="a way that stays on the body, without jumps of speed, delay or free vibration afterwards",
                 remedy="a stiffness in N/m",
             )
+
+
+def _joints(carriage: BodyCarriage, riders: tuple[Rider, ...], below: ModalBody, above: ModalBody) -> Array:
+    """(J, N) rows of the rigid contacts over the modes of both bodies, in the middle of the way."""
+    joints = [(r, c) for r, c in zip(riders, carriage.contacts.values(), strict=True) if c.stiffness == "rigid"]
+    middle, rows = 0.5 * sum(carriage.motion.range()), []
+    for rider, contact in joints:
+        under = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0]
+        held = Grip(1.0, 0, None, _held_at(contact)).fixed_row(above)
+        rows.append(np.concatenate([under * np.sqrt(below.mass), held * np.sqrt(above.mass)]))
+    return np.array(rows)
+
+
+def _check_joints(study: Study, name: str, rows: Array) -> None:
+    """Refuse more rigid contacts than the kept modes of both bodies can meet."""
+    met = int(np.linalg.matrix_rank(rows, tol=CLASH * len(rows))) if rows.size else 0
+    if met < len(rows):
+        raise BadInput(
+            "the kept modes of both bodies cannot meet so many rigid contacts",
+            where=study.source.where(f"carriage.{name}.contacts"),
+            expected=f"at most {met} of them rigid, at different places",
+            received=str(len(rows)),
+            remedy="more modes, or a stiffness in N/m",
+        )

@@ -15,6 +15,8 @@ from engine.ways import Way
 
 Array = NDArray[np.float64]
 
+NOW = 1e-12  # of a rider's time: an event so early is that of time 0
+
 
 def initial_state(model: SceneModel, lanes: LaneTable) -> State:
     """Modal state at time 0, (blocks, N, LANES): undeformed and at rest, or the static equilibrium under the weights
@@ -39,8 +41,9 @@ def _first_places(model: SceneModel) -> tuple[Way, ...]:
     """Where all riders are at time 0, and their speed per unit of scene time."""
     found = []
     for rider in model.riders:
-        path = rider.path(np.zeros(1), 0.0, 1e-9)
-        found.append(Way(np.clip(path.S, 0.0, rider.length), path.dS, path.ddS, rider.touches(0.0, 1e-9)))
+        change = min(time for time in rider.events() if time > NOW * rider.end)
+        path = rider.path(np.zeros(1), 0.0, change)
+        found.append(Way(np.clip(path.S, 0.0, rider.length), path.dS, path.ddS, rider.touches(0.0, change)))
     return tuple(found)
 
 

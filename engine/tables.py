@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.fidelity import free_steps
+from engine.grips import residual
 from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
-from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_watch
+from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_missed, tabulate_watch
 from engine.ties import Grip
 from engine.timeline import Segment, Timeline, Window, build_timeline, refined
 from engine.track import tabulate_ties
@@ -23,6 +24,9 @@ from engine.ways import Way, ways
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+
+SegmentKey = tuple[float, float, int, tuple[bool, ...]]
+Missed = list[Array]  # of one segment: residual flexibility between ties, and of the signals; or empty
 
 KEPT_BYTES = 96 * 2**20  # tables kept per scene; older ones are built again
 STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
@@ -61,7 +65,8 @@ class SceneTables:
     window: Window
     readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
     refinement: int = 1
-    _kept: OrderedDict[tuple[float, float, int, tuple[bool, ...]], SegmentTable] = field(default_factory=OrderedDict)
+    _kept: OrderedDict[SegmentKey, SegmentTable] = field(default_factory=OrderedDict)
+    _missed: OrderedDict[SegmentKey, Missed] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
@@ -108,6 +113,11 @@ class SceneTables:
         """The scheme's coefficients."""
         return self.model.scheme.coefficients
 
+    @property
+    def cycle_bytes(self) -> int:
+        """Size of the rows of all ties over one unit of scene time."""
+        return 32 * self.steps * self.model.omega.size * self.model.ties
+
     def table(self, segment: Segment) -> SegmentTable:
         """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
         unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
@@ -115,18 +125,34 @@ class SceneTables:
         with self._lock:
             found = self._kept.pop(key, None)
             if found is None:
-                found = self._build(segment._replace(start=segment.start - unit, end=segment.end - unit))
+                shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
+                found = self._build(shifted, self._missed_of(key))
             self._kept[key] = found
             while len(self._kept) > 1 and sum(table.bytes for table in self._kept.values()) > KEPT_BYTES:
                 self._kept.popitem(last=False)
         return found
 
-    def _build(self, segment: Segment) -> SegmentTable:
+    def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
         along = self._ways(segment)
         contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
-        watch = tabulate_watch(self.model, self.signals, along)
+        if not missed:
+            found = residual(self.model, along), tabulate_missed(self.model, self.signals, along)
+            if self.timeline.repeats:
+                missed.extend(found)
+        else:
+            found = missed[0], missed[1]
+        watch = tabulate_watch(self.model, self.signals, along, found[1])
         guard = tabulate_watch(self.model, contacts, along) if contacts else watch
-        return SegmentTable(tabulate_ties(self.model, along, self.scheme), watch, guard)
+        return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, guard)
+
+    def _missed_of(self, key: SegmentKey) -> Missed:
+        """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate
+        than the rows, and much less memory. Empty where they are not known; older ones are dropped."""
+        found = self._missed.pop(key, [])
+        self._missed[key] = found
+        while len(self._missed) > 1 and sum(part.nbytes for one in self._missed.values() for part in one) > KEPT_BYTES:
+            self._missed.popitem(last=False)
+        return found
 
     def _ways(self, segment: Segment) -> tuple[Way, ...]:
         """The ways of all carriages along a segment."""
@@ -136,6 +162,7 @@ class SceneTables:
         """Drop the tables, when no chunk needs them any more."""
         with self._lock:
             self._kept.clear()
+            self._missed.clear()
         for name in ("with_accelerations", "coarser"):
             self.__dict__.pop(name, None)
 

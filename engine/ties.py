@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Inertia = Literal["force", "mass", "mass-without-convective"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Grip:
     """A place where a tie acts on a body with ``factor`` times its force: where a rider is (its number), or a fixed
     place of the body's track (m) or a point of it (by name)."""
@@ -25,6 +25,11 @@ class Grip:
     body: int
     rider: int | None = None
     at: float | str = 0.0
+
+    @property
+    def unit(self) -> Grip:
+        """The same place with the factor 1."""
+        return replace(self, factor=1.0)
 
     def fixed_row(self, modal: ModalBody) -> Array:
         """(N,) what every mode of its body moves a fixed place by."""

@@ -19,8 +19,11 @@ from engine.ways import Way
 Array = NDArray[np.float64]
 
 
-def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | Alpha) -> Ties:
-    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment."""
+def tabulate_ties(
+    model: SceneModel, along: tuple[Way, ...], scheme: Newmark | Alpha, missed: Array | None = None
+) -> Ties:
+    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
+    `grips.residual`, where it is known."""
     stations = along[0].s.size
     rows = np.zeros((stations, model.omega.size, model.ties, 4))
     drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
@@ -41,7 +44,7 @@ def tabulate_ties(model: SceneModel, along: tuple[Way, ...], scheme: Newmark | A
     given, reacting = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
     unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
-    missed = residual(model, along)
+    missed = residual(model, along) if missed is None else missed
     reaches = np.asarray(rows.any(axis=(0, 3)))
     return Ties(np.ascontiguousarray(rows), drive, level, reacting, given, moves, springs, missed, unity, reaches)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
-from engine.lanes import LaneValues, weight
+from engine.lanes import LaneValues, weights
 from engine.model import SceneModel, build_model
 from engine.plan import Bucket, Plan
 from engine.richardson import march_chosen
@@ -64,7 +64,7 @@ def compare_variant(plan: Plan, variant: int, check: Callable[[], None] = lambda
     wanted = plan.study.output.histories
     counts = counts_shown(tables.timeline, plan.window, "auto" if wanted == "none" else wanted)
     marched, _ = march_chosen(tables, values, counts, 1)
-    whole = unreduced_model(study, *_timing(bucket.scene))
+    whole = unreduced_model(study, *bucket.scene.timing)
     by = int(np.clip(MOST_STEPS // tables.timeline.steps, 1, FINER))
     course = Course(
         refined(tables.timeline, by),
@@ -109,13 +109,8 @@ def reading_contacts(study: Study) -> Study:
 
 def _tables(plan: Plan, bucket: Bucket, study: Study) -> SceneTables:
     """The bucket's scene with the variant's own numbers and sensors."""
-    model = build_model(study, *_timing(bucket.scene))
+    model = build_model(study, *bucket.scene.timing)
     return SceneTables(model, bucket.steps, plan.window, refinement=bucket.tables.refinement)
-
-
-def _timing(model: SceneModel) -> tuple[dict[str, float], dict[str, float]]:
-    riders = {carriage.name: carriage.rider for carriage in model.carriages}
-    return {name: r.pace for name, r in riders.items()}, {name: r.delay for name, r in riders.items()}
 
 
 def _first_period(model: SceneModel) -> float:
@@ -125,8 +120,8 @@ def _first_period(model: SceneModel) -> float:
 def _static(tables: SceneTables, values: LaneValues, counts: Counts) -> Array:
     """(H, J) static readings of the march's own model."""
     unit = tables.static_at(counts)
-    weights = np.array([weight(tables.model, values, c)[0] for c in range(len(tables.model.carriages))])
-    return np.asarray(unit.gravity * values.of("gravity")[0] + unit.force @ weights)
+    loads = weights(tables.model, values)[:, 0]
+    return np.asarray(unit.gravity * values.of("gravity")[0] + unit.force @ loads)
 
 
 def _standing(whole: Unreduced, tables: SceneTables, counts: Counts) -> Along:

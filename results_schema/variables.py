@@ -38,6 +38,7 @@ _RESERVED_WORDS = """
     harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
+    tolerance_asked worst_result left_out
 """
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
@@ -304,7 +305,7 @@ CONTACT_FORCES: tuple[Variable, ...] = (
         "{carriage}_contact_force_min_position",
         units="m",
         long_name="position of {carriage} at its smallest contact force",
-        meaning="NaN where it never touches the body",
+        meaning="of its reference; NaN where that is off the body, or it never touches it",
         nan_allowed=True,
     ),
     Variable(
@@ -438,25 +439,40 @@ declare(
         lead="none",
     ),
 )
+
+
+def _audited(name: str, words: str, meaning: str, dtype: str = "float64", nan_allowed: bool = False) -> Variable:
+    return Variable(name, ("sample",), dtype, long_name=words, meaning=meaning, lead="none", nan_allowed=nan_allowed)
+
+
 declare(
     "/audit",
-    Variable(
+    _audited(
         "observed_error",
-        ("sample",),
-        long_name="observed relative error",
-        meaning="against the same variant at higher fidelity",
-        lead="none",
+        "observed relative error",
+        "largest difference of what the variant reports from the same computed again with all terms, twice the modes "
+        "and four times the steps or more: of extremes, peaks and harmonics over the largest static value of the "
+        "sensor (velocity and acceleration: over its own largest value), of the lag over the cruise's length, of "
+        "odd_rms and even_excess themselves; NaN where it could not be compared",
         nan_allowed=True,
-        planned=True,
     ),
-    Variable(
+    _audited(
         "estimated_error",
-        ("sample",),
-        long_name="estimated relative error",
-        meaning="the estimate of the archive for the same variant",
-        lead="none",
+        "estimated relative error",
+        "the estimate of the archive for the same variant; NaN where it has none",
         nan_allowed=True,
-        planned=True,
+    ),
+    _audited("tolerance_asked", "tolerance", "solver.tolerance of the variant"),
+    _audited("worst_result", "result with the largest difference", "and its sensor", dtype="str"),
+    _audited("modes_used", "number of modes of the audit", "", dtype="int32"),
+    _audited("steps_used", "number of steps of the audit", "over one passage or cycle", dtype="int32"),
+    Variable(
+        "left_out",
+        (),
+        "int64",
+        long_name="variants that were picked for the audit and have no values",
+        meaning="not among the samples",
+        lead="none",
     ),
 )
 

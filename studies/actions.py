@@ -36,12 +36,14 @@ def check(study: str) -> None:
     from studies.measuring import MeasuringKind
     from studies.preview import preview, preview_of_pieces
     from studies.study import kind_of
+    from studies.unreduced import check_unreduced
 
     loaded = engine.load(catalogue.find_study(study))
     kind = kind_of(loaded)
     if isinstance(kind, MeasuringKind):
         shown = preview_of_pieces(kind, loaded)
     else:
+        check_unreduced(loaded)
         plan = engine.make_plan(loaded, reduction=kind.reduction(loaded))
         shown = preview(plan, len(os.sched_getaffinity(0)))
     console.show_preview(shown)
@@ -62,13 +64,16 @@ def run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
 
 
 def exit_code(outcome: Outcome) -> int:
-    """Exit code of a finished run: 3 where some variants are not ok.
+    """Exit code of a finished run: 3 where some variants are not ok, or an audit found the tolerance missed.
 
     A study that measures asks where methods fail: a method that diverges is its answer, and nothing that a script has
     to look after. So it ends with 0.
     """
+    from studies.audit import Verdict
     from studies.summary import all_ok, is_measured
 
+    if outcome.audit is not None and not Verdict.of(outcome.audit).held:
+        return SOME_NOT_OK
     return 0 if is_measured(outcome.results) or all_ok(outcome.results) else SOME_NOT_OK
 
 

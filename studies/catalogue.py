@@ -62,11 +62,14 @@ def find_study(study: str) -> Path:
 
 
 def start_text(kind: str) -> str:
-    """A study file to start from: what is special about the kind, then every key that all kinds share.
+    """A study file to start from: what is special about the kind, then every key that all kinds share; or a built-in
+    study, by its name where no kind has it.
 
-    Raises BadInput for an unknown kind.
+    Raises BadInput for an unknown name.
     """
     known = starts()
+    if kind not in known and kind in built_in():
+        return built_in()[kind].read_text(encoding="utf-8")
     if kind not in known:
         raise BadInput(
             "no such kind of study", where=kind, expected=f"one of {', '.join(known)}", remedy=_nearest(kind, known)

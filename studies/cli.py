@@ -25,10 +25,10 @@ def commands() -> None:
     STUDY is the path of a study file (TOML) or the name of a built-in study (see "wanderlast list").
 
     \b
-    Exit codes: 0 fine; 2 bad input; 3 finished, but some variants carry a status other than ok;
-    4 damaged or foreign archive; 70 workers gave up; 74 input/output failed (disk full,
-    read-only); 75 another run holds the archive; 130 and 143 interrupted, finished work is kept;
-    1 a bug of our own.
+    Exit codes: 0 fine; 2 bad input; 3 finished, but some variants carry a status other than ok,
+    or an audit missed the tolerance; 4 damaged or foreign archive; 70 workers gave up;
+    74 input/output failed (disk full, read-only); 75 another run holds the archive;
+    130 and 143 interrupted, finished work is kept; 1 a bug of our own.
     """
 
 
@@ -36,7 +36,7 @@ def commands() -> None:
 @click.argument("kind")
 @click.argument("file", type=_FILE, required=False)
 def init(kind: str, file: Path | None) -> None:
-    """Write a commented study file of KIND to start from.
+    """Write a commented study file of KIND to start from, or a copy of the built-in study KIND.
 
     FILE is KIND.toml unless given.
     """

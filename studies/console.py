@@ -126,6 +126,8 @@ def show_archive(summary: Summary) -> None:
 def show_outcome(outcome: Outcome) -> None:
     """What a run found: the range of every result and the variants there, statuses, the archive."""
     from studies import summary
+    from studies.audit import told_audit
+    from studies.results import Results
 
     results = outcome.results
     rows = [
@@ -139,7 +141,8 @@ def show_outcome(outcome: Outcome) -> None:
         for found in summary.ranges(results)
     ]
     table(results.attrs["title"], ("result", "smallest", "where", "largest", "where"), rows)
-    say(*_about_statuses(summary.counts(results), summary.noun(results)), _about_work(outcome))
+    audit = told_audit(outcome.audit, Results.of(results)) if outcome.audit is not None else []
+    say(*_about_statuses(summary.counts(results), summary.noun(results)), *audit, _about_work(outcome))
 
 
 def show_throughput(found: Throughput) -> None:

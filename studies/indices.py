@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PROMINENCE = 0.02  # of the cycle's range: smaller bumps are no peaks
+FLAT = 1e-8  # of its largest value, below which a range is rounding
 PEAKS = 8
 HARMONICS = 16
 _EVEN_SPACING = 1e-9
@@ -113,8 +114,9 @@ def asymmetry(legs: Legs, forward: float) -> Asymmetry:
 
     With odd = (f - b)/2, even = (f + b)/2 and R the range of the static response w_s: lag = <odd, w_s'>/<w_s', w_s'>,
     loop area = integral of (f - b) over the length x R, rms(odd)/R, rms(even - w_s)/R. forward: 1 where the way out
-    goes along the position, -1 against it. NaN where the static response does not vary.
+    goes along the position, -1 against it. NaN where the static response does not vary but for rounding.
     """
+    level = np.abs(legs.static).max(axis=0)
     along, across, area, odd_square, even_square = (np.zeros(legs.size.shape) for _ in range(5))
     fields = zip(legs.weight, legs.forward, legs.backward, legs.static, legs.slope, strict=True)
     for weight, out, back, static, slope in fields:
@@ -126,7 +128,8 @@ def asymmetry(legs: Legs, forward: float) -> Asymmetry:
         even_square += weight * (excess * excess)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (across / along, area / legs.size, np.sqrt(odd_square) / legs.size, np.sqrt(even_square) / legs.size)
-    return Asymmetry(*(np.where(np.isfinite(value), value, np.nan) for value in found))
+    varies = legs.size > FLAT * level
+    return Asymmetry(*(np.where(np.isfinite(value) & varies, value, np.nan) for value in found))
 
 
 def prominent(cycle: Array) -> Mask:
@@ -139,7 +142,9 @@ def prominent(cycle: Array) -> Mask:
     lanes = cycle.reshape(count, -1)
     first, lane = np.argmin(lanes, axis=0), np.arange(lanes.shape[1])
     lowest = lanes[first, lane]
-    threshold = PROMINENCE * (lanes.max(axis=0) - lowest)
+    span = lanes.max(axis=0) - lowest
+    flat = span <= FLAT * np.abs(lanes).max(axis=0)  # rounding has no peaks
+    threshold = np.where(flat, np.inf, PROMINENCE * span)
     found = np.zeros(lanes.shape, dtype=bool)
     rising = np.zeros(len(lane), dtype=bool)
     bottom, top, top_at = lowest.copy(), lowest.copy(), first.copy()

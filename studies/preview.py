@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.audit import audit_plan, audit_seconds, audited, spread_quasi_randomly, suggested_size
 from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
 from engine.plan import Bucket, Plan, base_scene, explain
 from engine.remarks import remarks
 from engine.sweep import Cases, expand
 from studies.measuring import disk_bytes
+from studies.simpler import HEADINGS, simpler_models
 from studies.words import counted, number, unit_text
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
 BUCKETS_SHOWN = 30
+SIMPLER = "What simpler models would leave out of displacement, over the largest static one"
 
 
 class Table(NamedTuple):
@@ -46,12 +49,27 @@ class Preview:
 
 def preview(plan: Plan, threads: int) -> Preview:
     """The explanation of a plan for so many threads; computes nothing large."""
-    tables = (_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan), _work(plan))
+    tables = (
+        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan), _work(plan)),
+        Table(SIMPLER, HEADINGS, simpler_models(plan)),
+    )
     cost = (
         f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
-        f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk."
+        f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk.{_audit(plan)}"
     )
     return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks(plan)))
+
+
+def _audit(plan: Plan) -> str:
+    """What the audit costs; where the study leaves it open, one of a reasonable size."""
+    wanted = plan.study.solver.audit
+    variants = spread_quasi_randomly(plan.cases, suggested_size(plan)) if wanted == "auto" else audited(plan)
+    if not variants.size:
+        return ""
+    more = f"about {duration(audit_seconds(audit_plan(plan, variants)))} more"
+    if wanted == "auto":
+        return f" No audit; audit = {variants.size} takes {more}."
+    return f" The audit of {counted(variants.size, 'variant')} takes {more}."
 
 
 def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:

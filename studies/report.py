@@ -21,8 +21,11 @@ from results_schema.archive import Archive, open_archive
 from results_schema.errors import BadInput
 from results_schema.status import Status, label
 from results_schema.variables import Variable, expand
+from studies import audit
 from studies.answers import figures_of, findings_of
+from studies.audit import told_audit
 from studies.figures import Figure, png, svg
+from studies.pictures import audit as audited
 from studies.pictures import unreduced
 from studies.results import Results
 from studies.study import kind_named
@@ -92,7 +95,11 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     _check_folder(folder)
     source = open_archive(archive)
     results = Results.of(source.root)
-    figures = [*figures_of(results), *unreduced.pictures(results, source.groups.get(GROUP))]
+    figures = [
+        *figures_of(results),
+        *audited.pictures(results, source.groups.get(audit.GROUP)),
+        *unreduced.pictures(results, source.groups.get(GROUP)),
+    ]
     page = page_of(source, results, figures)
     text = _template().render(page=page)
     files.make_folder(folder)
@@ -113,7 +120,8 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
         noun=noun(source.root),
         facts=_facts(results, noun(source.root)),
         findings=[
-            _finding(results, text) for text in (*findings_of(results), *told_unreduced(source.groups.get(GROUP)))
+            _finding(results, text)
+            for text in (*findings_of(results), *_audited(source, results), *told_unreduced(source.groups.get(GROUP)))
         ],
         figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
         statuses=_statuses(results, noun(source.root)),
@@ -124,6 +132,11 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
         provenance=_provenance(source),
         study_text=results.study.source.text,
     )
+
+
+def _audited(source: Archive, results: Results) -> list[str]:
+    """What the audit says, as sentences."""
+    return [f"{text[0].upper()}{text[1:]}." for text in told_audit(source.groups.get(audit.GROUP), results)]
 
 
 def _template() -> Template:

@@ -19,6 +19,7 @@ from results_schema.archive import OutputState, open_archive, output_state, writ
 from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
 from results_schema.pieces import PieceStore
+from studies.audit import GROUP, audit_group, planned_audit, refuse_audit
 from studies.gathering import Gatherer
 from studies.measuring import MeasuringKind, Work, disk_bytes, key_of, measure
 from studies.options import RunOptions
@@ -41,7 +42,7 @@ class Outcome:
 
     results: the archive's root. resumed: variants (of a study that measures: pieces) that an earlier start had
     finished. was_finished: there was nothing to do. seconds: of this run. remarks: what is worth knowing about a study
-    that was run.
+    that was run. audit: the archive's group, where variants were audited.
     """
 
     archive: Path
@@ -50,6 +51,7 @@ class Outcome:
     was_finished: bool
     seconds: float
     remarks: tuple[str, ...] = ()
+    audit: xr.Dataset | None = None
 
 
 def run_to_archive(
@@ -66,8 +68,9 @@ def run_to_archive(
     files.check_output_place(archive)
     _check_target(study, archive)
     if _state(study, archive, options) == "same study, finished":
-        root = open_archive(archive).root
-        return Outcome(archive, root, int(root["status"].size), True, time.perf_counter() - started)
+        found = open_archive(archive)
+        seconds, audit = time.perf_counter() - started, found.groups.get(GROUP)
+        return Outcome(archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
     run = _Run(study, archive, options, progress, stop, started)
     return _measured(kind, run) if isinstance(kind, MeasuringKind) else _marched(kind, run)
 
@@ -91,6 +94,7 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
 
     check_unreduced(run.study)
     plan = make_plan(run.study, reduction=kind.reduction(run.study))
+    finer = planned_audit(plan)
     files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
     worth_knowing = tuple(remarks(plan))
     with (PartStore.discard_foreign if run.options.overwrite else PartStore)(run.archive, plan.key) as store:
@@ -98,15 +102,17 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
         _march(plan, store, done, run)
         run.stop.check()
         root = _finished_dataset(plan, store)
-        groups = model_groups(plan.base) | unreduced_group(plan, root, run.stop.check)
+        audit = audit_group(plan, finer, root, Work(run.options.threads, run.stop))
+        groups = model_groups(plan.base) | unreduced_group(plan, root, run.stop.check) | audit
         seconds = _write(run, root, plan.key, groups)
         store.remove()
-    return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing)
+    return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing, audit.get(GROUP))
 
 
 def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
     """A study in pieces, one after another."""
     refuse_unreduced(run.study)
+    refuse_audit(run.study)
     pieces = kind.pieces(run.study)
     files.check_free(run.archive.parent, disk_bytes(pieces), "the pieces and the archive")
     key = key_of(run.study, pieces)

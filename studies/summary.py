@@ -117,6 +117,9 @@ def _beside_the_grid(results: xr.Dataset) -> set[str]:
 
 def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
     """What `run --json` prints."""
+    from studies.audit import as_json as audit_as_json
+    from studies.results import Results
+
     results = outcome.results
     return {
         "archive": str(outcome.archive),
@@ -129,6 +132,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
         "seconds": outcome.seconds,
         "exit_code": exit_code,
         "remarks": list(outcome.remarks),
+        "audit": None if outcome.audit is None else audit_as_json(outcome.audit, Results.of(results)),
         "results": [
             {
                 "name": found.name,

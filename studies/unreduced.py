@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from results_schema.variables import axes, declarations, sensor_unit
+from results_schema.variables import QUANTITY_UNITS, axes, declarations, sensor_unit
 from studies.measuring import described
 from studies.results import Results, spread
 from studies.words import counted, listed, percent
@@ -100,7 +100,7 @@ def _filled(array: Array, stations: int) -> Array:
 def _gaps(one: Compared) -> dict[str, Array]:
     """(J,) the numbers of every sensor."""
     dynamic, marched_dynamic = one.unreduced - one.unreduced_static, one.marched - one.marched_static
-    size = _largest(one.unreduced)
+    size = _scales(one)
     spans = [_span(history, size) for history in (one.unreduced, dynamic, one.unreduced_static)]
     pairs = ((one.marched, one.unreduced), (marched_dynamic, dynamic), (one.marched_static, one.unreduced_static))
     gaps = [_largest(left - right) / span for (left, right), span in zip(pairs, spans, strict=True)]
@@ -110,6 +110,12 @@ def _gaps(one: Compared) -> dict[str, Array]:
         "static_difference": gaps[2],
         "dynamic_range": spans[1] / spans[0],
     }
+
+
+def _scales(one: Compared) -> Array:
+    """(J,) largest values; of forces the largest of all, beside which one may be rounding as a whole."""
+    found, forces = _largest(one.unreduced), [QUANTITY_UNITS[q] == "N" for q in one.quantities.values()]
+    return np.where(forces, found.max(initial=0.0, where=forces), found)
 
 
 def _largest(values: Array) -> Array:

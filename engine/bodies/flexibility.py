@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DENSE = 200  # degrees of freedom up to which all eigenvalues are computed
 _COLUMNS = 64  # right-hand sides solved at a time
 _ATTEMPTS = 4
+ROUNDING = 1e-12  # of the largest motion: below it a solution has no digits
 SAME_FREQUENCY = 1e-6  # relative difference of frequencies that count as equal
 
 
@@ -137,6 +138,15 @@ class Flexibility:
         apart = qr(mass @ self.rigid)[0][:, rigid:]
         inverse, shapes = eigh(apart.T @ mass @ apart, apart.T @ stiffness @ apart, subset_by_index=lowest)
         return self._refined(-inverse, apart @ shapes)
+
+
+def without_rounding(motions: Array, axis: int | tuple[int, ...]) -> Array:
+    """Motions with 0 in place of what is below 1e-12 of the largest along some axes: what the solver left of nothing.
+
+    Section forces multiply it by large stiffnesses, and a body without axial load would read one.
+    """
+    largest = np.abs(motions).max(axis=axis, keepdims=True)
+    return np.where(np.abs(motions) < ROUNDING * largest, 0.0, motions)
 
 
 def factorised(stiffness: csc_array, mass: csc_array, rigid: Array) -> Flexibility:

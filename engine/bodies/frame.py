@@ -233,15 +233,6 @@ class Frame(Body):
         return self.gravity if self.track.direction is None else self.track.direction
 
     @property
-    def ends(self) -> tuple[str, str]:
-        """How the ends of the track are held against its load: "pinned" or "free"."""
-        first, last = self.line.members[0], self.line.members[-1]
-        nodes = self.member[first[0]].nodes[int(first[1])], self.member[last[0]].nodes[1 - int(last[1])]
-        acts = [word for word, part in zip(DIRECTIONS[:3], self.line.direction, strict=True) if abs(part) > 0.0]
-        left, right = ("pinned" if set(acts) <= set(self.holds(node)) else "free" for node in nodes)
-        return left, right
-
-    @property
     def lacks_for_stress(self) -> str:
         for name, _ in self.line.members:
             section = self.member[name].section

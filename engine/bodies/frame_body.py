@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.bodies.body import AUTO_MODES, MAX_MODES
 from engine.bodies.craig_bampton import reduce_model
-from engine.bodies.flexibility import SAME_FREQUENCY, Flexibility, factorised
+from engine.bodies.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
 from engine.bodies.frame import Frame
 from engine.bodies.frame_assembly import MASSES, Assembly, Counts, assemble, rigid_motions
 from engine.bodies.frame_geometry import unit
@@ -77,7 +77,7 @@ def _reduced(frame: Frame) -> ModalBody:
     masses = MASSES[frame.mass_matrix](track.beams)
     along = track_shapes(track, moved, mode_forces(track, moved, omega, masses))
     turn = settled(omega, along, float(track.places[-1]), shapes)
-    moved, shapes = moved @ turn, shapes @ turn
+    moved, shapes = without_rounding(moved @ turn, (0, 1)), shapes @ turn
     kept = kept_modes(frame, omega)
     omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
     gravity = unit(frame.gravity)

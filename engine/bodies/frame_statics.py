@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.bodies.flexibility import Flexibility
+from engine.bodies.flexibility import Flexibility, without_rounding
 from engine.bodies.frame_assembly import Assembly
 from engine.bodies.frame_track import TrackBeams, TrackPoints, track_places
 from engine.bodies.modal import Array
@@ -152,6 +152,7 @@ def track_statics(
     if not rigid:
         pull = assembly.drag @ gravity
         weight = points.of(assembly.whole(flexibility.solve(pull[:, None]))).reshape(size, 1)
+    moved, weight = without_rounding(moved, 0), without_rounding(weight, 0)
     return TrackStatics(track, patterns, moved, weight[:, 0], spread, rigid)
 
 

@@ -61,6 +61,16 @@ def line_between(numbers: Counts, places: Array, ends: tuple[Array, Array], tole
         )
         raise BadInput("too few nodes near this line", where="from", expected="at least 2", received=received)
     order = near[np.argsort(along[near], kind="stable")]
+    spacing = float(np.diff(along[order]).max())
+    for key, gap in (("from", along[order[0]]), ("to", length - along[order[-1]])):
+        if gap > spacing + limit:
+            raise BadInput(
+                f"no node of this line is near its end: it would be {gap:.4g} m shorter",
+                where=key,
+                expected=f"a node within {spacing:.4g} m, the largest distance between its nodes",
+                received=f"{len(order)} nodes from {along[order[0]]:.4g} to {along[order[-1]]:.4g} m of {length:.4g} m",
+                remedy="another place, or tolerance = ... for nodes beside the line",
+            )
     return _line(numbers, places, order, (ends[0], ends[1]), max(limit, OFF_LINE * length), "tolerance")
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from engine.reduction import Cycle
     from engine.scene import Study
+    from studies.audit import Pair
     from studies.figures import Figure
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
@@ -132,6 +133,14 @@ class Asymmetry:
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return dataset
+
+    def differences(self, pair: Pair) -> dict[str, Array]:
+        """For an audit: lag over the length of the cruise; odd and even parts, which are parts of the static range."""
+        motion = f"carriage.{next(iter(pair.values.study.carriage))}.motion"
+        start, end, turn = (pair.values.of(f"{motion}.{key}") for key in ("start", "end", "turn"))
+        cruise = np.abs(end - start) * (1.0 - 2.0 * turn)
+        lag = pair.gap("lag") / cruise[:, None]
+        return {"lag": lag, "odd_rms": pair.gap("odd_rms"), "even_excess": pair.gap("even_excess")}
 
     def findings(self, results: Results) -> list[str]:
         left = theory.remainder_of_start(results)
@@ -265,7 +274,11 @@ def _first_beyond(results: Results, sensor: str, settled: NDArray[np.bool_]) -> 
     odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
     some = settled.any() and not settled.all()
     odd, of = (np.where(settled, odd, np.nan), " of those that have settled") if some else (odd, "")
-    return f"{sensor}: the odd part{of} {listed([exceeds(results, odd, part) for part in THRESHOLDS])}."
+    if not np.isfinite(odd).any():
+        return f"{sensor}: no odd part is defined, as its static response does not vary."
+    told = THRESHOLDS if np.nanmax(odd) > THRESHOLDS[0] else THRESHOLDS[:1]
+    said = [exceeds(results, odd, part) for part in told]
+    return f"{sensor}: the odd part{of} {listed(said)}."
 
 
 def _mass(results: Results) -> list[str]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from engine.reduction import Cycle
     from engine.scene import Study
+    from studies.audit import Pair
     from studies.figures import Figure
 
 Array = NDArray[np.float64]
@@ -152,6 +153,12 @@ class DoublePeak:
         }
         return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
 
+    def differences(self, pair: Pair) -> dict[str, Array]:
+        """For an audit: harmonics, and the values of peaks where both have as many. A bump near the least prominence is
+        a peak in one and none in the other without being an error; the harmonics see what matters of it."""
+        harmonics = pair.gap("harmonic").max(axis=2)
+        return {"peak_value": pair.relative(_peak_gap(pair)), "harmonic": pair.relative(harmonics)}
+
     def findings(self, results: Results) -> list[str]:
         said = []
         for sensor in list(results.sensors)[:MOST_SENSORS]:
@@ -166,6 +173,18 @@ class DoublePeak:
 
 
 KIND = DoublePeak()
+
+
+def _peak_gap(pair: Pair) -> Array:
+    """(n, J) the largest difference of peaks in the order of their phases, begun where both fit best: a peak at the
+    beginning of the cycle may stand at its end in the other."""
+    one, other = (np.asarray(part["peak_value"], dtype=np.float64) for part in (pair.reported, pair.again))
+    count = np.isfinite(one).sum(axis=2)
+    found = np.zeros(count.shape)
+    for place in zip(*np.nonzero(count == np.isfinite(other).sum(axis=2)), strict=True):
+        values, again = one[place][: count[place]], other[place][: count[place]]
+        found[place] = min((np.abs(values - np.roll(again, k)).max() for k in range(count[place])), default=0.0)
+    return found
 
 
 def _axis(name: str) -> dict[str, object]:

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 import engine
 import studies
 from engine.fidelity import allow_any_steps
-from engine.lanes import padded
+from engine.influence import static_values
+from engine.lanes import LaneValues, padded
 from engine.march import march
 from engine.plan import make_plan
+from engine.resonance import contact_omega, spring_steps
 from engine.richardson import march_chosen
 from engine.scene import Study
+from engine.ways import frozen
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
@@ -94,6 +97,7 @@ def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, 
 PLAIN: Table = {"steps": 200, "static_correction": False}
 SCENES: dict[str, Callable[[], Study]] = {
     "rigid, passing": lambda: riding(cruise(0.3, 0.7, 0.8)),
+    "reference on, contacts off": lambda: riding(cruise(0.05, 0.95, 0.8)),
     "rigid, uneven, over both ends": lambda: riding(cruise(-0.4, 1.4, 0.8), table=UNEVEN),
     "backward, over both ends": lambda: riding(cruise(1.4, -0.4, 0.8), table=UNEVEN),
     "without static correction": lambda: riding(shuttle(0.3, 0.7, 0.8, 0.1, 2), THREE, FLEXIBLE, solver=PLAIN),
@@ -265,6 +269,30 @@ def test_lanes_agree_with_single_variants() -> None:
         assert float(found[name]) == pytest.approx(float(alone[name]), rel=1e-12)
 
 
+def test_steps_resolve_every_contact_on_its_spring() -> None:
+    """20 per period of k (v.v + largest phi.phi), summed over the contacts: of a rigid body v.v = 1/m + arm^2/J."""
+    (bucket,) = make_plan(riding(cruise(0.3, 0.7, 0.8), solver={"steps": "auto"})).buckets
+    places = np.linspace(0.0, 1.0, 257)
+    mobility = np.max(sum(2.0 * np.sin(n * np.pi * places) ** 2 for n in range(1, 6)))
+    own = 1.0 / 0.5 + 0.15**2 / 0.01
+    square = (400.0 + 500.0) * (own + mobility)
+    (rule,) = spring_steps(bucket.scene, LaneValues(bucket.scene.study, {}, 1)).values()
+    assert float(rule[0]) == pytest.approx(20.0 * 0.5 * np.sqrt(square) / (2.0 * np.pi), rel=1e-9)
+    rigid = {"rear": {"at": 0.05, "stiffness": "rigid"}, "front": TWO["front"]}
+    model = make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid)).base
+    assert float(contact_omega(model, LaneValues(model.study, {}, 1))[0] ** 2) == pytest.approx(500.0 * square / 900.0)
+
+
+def test_a_damper_that_only_a_sweep_has() -> None:
+    contact = "carriage.car.contacts.b.damping"
+    case = riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), THREE, sweep={"damping": {"of": contact, "values": [0.0, 0.6]}})
+    found = engine.run(case)
+    for damping in (0.0, 0.6):
+        alone = engine.run(case.without_sweep().with_values({contact: damping}))
+        assert float(found.b_max.sel(damping=damping)) == pytest.approx(float(alone.b_max), rel=1e-12)
+    assert abs(float(found.b_max[0]) - float(found.b_max[1])) > 1e-3
+
+
 def test_a_trajectory_has_the_acceleration_of_what_rides() -> None:
     sensor = {"centre": fixed(0.2, "acceleration", body="table")}
     case = riding(cruise(0.3, 0.7, 0.8), sensor=sensor, kind="trajectory", output={"histories": "all"})
@@ -296,6 +324,7 @@ WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
         ("carriage.car.contacts.front.at", 0.5, r"contacts\.front\.at: a place off the track of the body that rides"),
         ("carriage.car.contacts.front.at", 0.1, r"carriage\.car\.contacts: this body would tip over"),
         ("carriage.car.contacts", {}, r"carriage\.car\.contacts"),
+        ("carriage.car.contacts.rear", {"at": 0.35, "stiffness": 1.0}, r"this body would tip over"),
         ("carriage.car.contacts.front.stiffness", 0.0, r"contacts\.front\.stiffness"),
         ("carriage.car.contacts.front.stiffness", "stiff", r"contacts\.front\.stiffness"),
         ("carriage.car.contacts.front.stiffness", "rigid", r"a rigid contact has no damper"),
@@ -305,7 +334,7 @@ WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
         ("carriage.car.motion.end", 0.9, r"contacts\.front: this contact leaves the body"),
         ("carriage.car.reference", 0.6, r"carriage\.car\.reference: a place off the track"),
         ("solver.fidelity", "mass", r"solver\.fidelity: .*has no meaning"),
-        ("body.table.own_weight", True, r"nothing holds this body against its own weight"),
+        ("body.table.own_weight", True, r"nothing holds this body fully"),
         ("body.table", beam(length=0.4, modes=4), r"something holds this body"),
         ("body.table.centre", 0.41, r"body\.table\.centre"),
         ("sensor.rear.contact", "raer", r"sensor\.rear\.contact: no such contact"),
@@ -323,6 +352,57 @@ def test_rigid_contacts_meet_no_shocks() -> None:
     for motion in (cruise(-0.4, 1.4, 0.8), shuttle(0.3, 0.7, 0.8, 0.0, 1), cruise(0.3, 0.7, 0.8, after=1.0)):
         with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
             make_plan(riding(motion, rigid))
+    whole = swing(0.5, 0.2, 0.7, 2)  # sets off and stops at once, as a scene of its own begins and ends
+    make_plan(riding(whole, rigid))
+    car = {"on": "bed", "kind": "body", "body": "table", "contacts": rigid}
+    push = {"on": "bed", "kind": "force", "force": 1.0, "motion": cruise(0.0, 1.0, 0.1)}
+    late = {"motion": cruise(0.3, 0.7, 0.8), "delay": 0.1}  # it is not there before
+    for cars in ({"car": car | {"motion": whole}, "push": push}, {"car": car | late}):
+        with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
+            make_plan(study(beam(), cars, body={"bed": beam(), "table": RIGID}))
+
+
+@pytest.mark.parametrize(
+    ("bed", "places", "most"), [(5, np.linspace(0.05, 0.35, 8), 7), (5, [0.2, 0.2], 1), (1, [0.0, 0.1, 0.2, 0.4], 3)]
+)
+def test_rigid_contacts_that_the_modes_cannot_meet_are_refused(bed: int, places: Any, most: int) -> None:
+    """A rigid body moves in two ways, and the bed in as many as it has modes."""
+    rigid = {f"c{number}": {"at": float(at), "stiffness": "rigid"} for number, at in enumerate(places)}
+    with pytest.raises(BadInput, match=rf"carriage\.car\.contacts: .*at most {most} of them rigid"):
+        make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid, bed=beam(modes=bed)))
+
+
+def test_a_rigid_contact_stays_on_the_track() -> None:
+    """From the first instant on, with the speed that a slope gives it, on a bed that sags by itself too."""
+    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
+    sensors = {"below": under("car"), "own": fixed(0.2, body="table")}
+    changes: Table = {
+        "solver": {"steps": 4000, "static_correction": False},
+        "sensor": sensors,
+        "kind": "trajectory",
+        "output": {"histories": "all"},
+    }
+    for motion in (shuttle(0.3, 0.7, 0.8, 0.1, 1), swing(0.4, 0.3, 0.9, 1)):
+        found = studies.run(riding(motion, one, RIGID, beam(modes=4, own_weight=True, damping_ratio=0.02), **changes))
+        gap = np.abs(found.own.values - found.below.values)
+        assert gap.max() < 1e-4 * np.abs(found.below.values).max()
+
+
+@pytest.mark.parametrize("correction", [True, False])
+@pytest.mark.parametrize("heavy", [True, False])
+def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -> None:
+    """A table half on a bed whose end gives way: what is off it stands on level ground."""
+    springs = [{"at": 0.0, "stiffness": 40.0}, {"at": 1.0, "stiffness": 60.0}]
+    solver = {"steps": 200, "static_correction": correction}
+    case = riding(
+        cruise(-0.4, 1.4, 0.8), THREE, FLEXIBLE, beam(modes=3, supports=springs, own_weight=heavy), solver=solver
+    )
+    (bucket,) = make_plan(case).buckets
+    twin, model = Twin(case), bucket.scene
+    places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
+    found = static_values(model, LaneValues(case, {}, 1), frozen(model, places)).contacts[0]
+    right = np.array([twin.static(float(place))[1] for place in places])
+    assert np.abs(found - right).max() <= 1e-9 * np.abs(right).max()
 
 
 def test_its_weight_alone() -> None:
@@ -336,3 +416,23 @@ def test_its_weight_alone() -> None:
     base = beam(damping_ratio=0.02, modes=5)
     single = engine.run(study(base, forces, **(changes | {"solver": {"steps": 300}})))
     assert float(found.place_max) == pytest.approx(float(single.place_max), rel=1e-9)
+    assert float(found.car_contact_force_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3)
+    assert float(found.car_contact_force_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
+    sensors = {name: {"carriage": "car", "contact": name, "quantity": "contact_force"} for name in TWO}
+    read = engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN, **(changes | {"sensor": sensors})))
+    assert float(read.rear_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3) == float(read.rear_static)
+    assert float(read.front_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
+
+
+def test_static_slopes_move_all_contacts() -> None:
+    """By the reference's place, against static readings a little apart, whatever the fidelity."""
+    way = shuttle(0.3, 0.7, 0.8, 0.1, 1)
+    for fidelity in ("auto", "force"):
+        case = riding(way, table=UNEVEN, sensor={"place": fixed(0.61)}, solver={"steps": 200, "fidelity": fidelity})
+        (bucket,) = make_plan(case).buckets
+        tables, counts = bucket.tables, np.array([40])
+        (place,) = tables.timeline.positions(0, counts)
+        apart = frozen(bucket.scene, place + np.array([-1e-4, 1e-4]))
+        left, right = static_values(bucket.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
+        assert abs(right - left) > 1e-7
+        assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

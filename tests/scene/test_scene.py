@@ -147,7 +147,7 @@ def test_numbers_and_units() -> None:
         ('scheme = "newmark"', 'scheme = "fox-goodwin"', ["solver", "beta and gamma", "not for this scheme"]),
         ("gamma = 0.5", "gamma = 0.4", ["solver.gamma", ">= 0.5"]),
         ('fidelity = "auto"', 'fidelity = "statics"', ["solver.fidelity", '"static"']),
-        ("audit = 0", "audit = 5", ["audit", "not built yet"]),
+        ("audit = 0", "audit = -5", ["solver.audit", ">= 0"]),
         ("steps = 500", "steps = 0", ["solver.steps", ">= 1"]),
         ("steps = 500", "steps = 1000000000", ["solver.steps", "<= 1e+08"]),
         ("schema_version = 1", "schema_version = 2", ["schema_version", "newer"]),

@@ -58,11 +58,20 @@ def with_histories(dataset: xr.Dataset, chosen: tuple[int, ...] = (0, 5)) -> xr.
     return dataset
 
 
+_AUDITED = {
+    ("float64", True): np.array([1e-4, 2e-4, np.nan]),
+    ("float64", False): np.array([1e-3, 1e-3, 1e-2]),
+    ("int32", False): np.array([8, 12, 24], dtype=np.int32),
+    ("str", False): np.array(["midspan_max", "lag of é", ""]),
+    ("int64", False): np.array(2),
+}
+
+
 def groups() -> dict[str, xr.Dataset]:
     """The groups `/audit` and `/model/bed`."""
-    audit = xr.Dataset(
+    audit = xr.Dataset(  # NaN where it is allowed
         {
-            name: ("sample", np.array([1e-4, 2e-4, np.nan]), variable.attributes())
+            name: (variable.dims, _AUDITED[variable.dtype, variable.nan_allowed], variable.attributes())
             for name, variable in expand("/audit", {}, []).items()
         },
         coords={

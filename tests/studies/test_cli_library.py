@@ -139,3 +139,8 @@ def test_unknown_names_are_refused_with_the_nearest() -> None:
         catalogue.find_study("doublepeak")
     with pytest.raises(BadInput, match='did you mean "trajectory"'):
         catalogue.start_text("trajectori")
+
+
+def test_a_built_in_study_can_be_copied() -> None:
+    assert catalogue.start_text("machine-bed-run") == TEXTS["machine-bed-run"]
+    assert catalogue.start_text("passage") == STARTS["passage"]  # the kind, where a study has the same name

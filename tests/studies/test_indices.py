@@ -67,6 +67,8 @@ def test_flat_tops_and_constant_cycles() -> None:
     flat = np.array([0.0, 1.0, 1.0, 0.0, 0.5, 0.5, 0.5, 0.0])
     assert indices.peaks(flat[:, None]).number[0] == len(naive.peaks(flat.tolist())) == 2
     assert indices.peaks(np.full((16, 1), 3.0)).number[0] == 0
+    rounding = 3.0 + 1e-12 * np.sin(np.arange(16.0))
+    assert indices.peaks(rounding[:, None]).number[0] == 0
 
 
 @settings(max_examples=20, deadline=None)
@@ -130,6 +132,10 @@ def test_no_lag_where_the_static_response_does_not_vary() -> None:
     zeros = np.zeros((40, 1, 2))
     assert all(
         np.isnan(value).all() for value in indices.asymmetry(indices.folded((0.1, 0.4), zeros, zeros, zeros), 1.0)
+    )
+    weight = 1000.0 + 1e-9 * np.random.default_rng(0).standard_normal((40, 1, 2))  # constant but for rounding
+    assert all(
+        np.isnan(value).all() for value in indices.asymmetry(indices.folded((0.1, 0.4), weight, weight, zeros), 1.0)
     )
 
 

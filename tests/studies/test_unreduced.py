@@ -57,7 +57,7 @@ def test_the_group_is_as_declared(archive: Archive) -> None:
     validate(group, unreduced.GROUP, {}, ())
     assert group["sample"].values.tolist() == [1]
     assert group["degrees_of_freedom"].values.tolist() == [2 * 16 + 15 + 1 + 2]
-    assert group["unreduced_steps"].values.tolist() == [4800]
+    assert group["unreduced_steps"].values.tolist() == [9600]
 
 
 def test_its_histories_are_those_of_the_study(archive: Archive) -> None:
@@ -123,7 +123,9 @@ def test_numbers_are_parts_of_ranges() -> None:
     """By hand: histories of range 4 and 3, a dynamic part of range 2, a constant static response."""
     whole, static = np.array([[0.0, 4.0, 2.0], [1.0, 4.0, 3.0]]), np.array([[0.0, 2.0, 2.0], [3.0, 3.0, 3.0]])
     marched = whole + np.array([[0.0, 0.4, np.nan], [0.0, 0.0, -0.3]])
-    given = Compared({}, np.zeros(3), np.zeros(3), marched, static, whole, static, 1, 1)
+    given = Compared(
+        {"a": "displacement", "b": "stress"}, np.zeros(3), np.zeros(3), marched, static, whole, static, 1, 1
+    )
     found = unreduced._gaps(given)
     np.testing.assert_allclose(found["difference"], [0.1, 0.1])
     np.testing.assert_allclose(found["dynamic_difference"], [0.2, 0.1])
@@ -147,3 +149,11 @@ def test_a_study_that_measures_refuses_it(tmp_path: Path) -> None:
     study = Study(schema_version=1, kind="stability", output={"unreduced": 1}, **scene)
     with pytest.raises(BadInput, match=r"output\.unreduced"):
         run_to_archive(study, tmp_path / "found.nc", RunOptions())
+
+
+def test_a_force_that_is_rounding_beside_others_has_no_range() -> None:
+    """An axial force of 1e-12 N beside contact forces of hundreds differs by nothing that counts."""
+    whole = np.array([[1e-12, -2e-12, 0.0], [700.0, 500.0, 600.0]])
+    names = {"axial": "axial_force", "shoe": "contact_force"}
+    found = unreduced._gaps(Compared(names, np.zeros(3), np.zeros(3), 2.0 * whole, whole, whole, whole, 1, 1))
+    assert np.isnan(found["difference"][0]) and found["difference"][1] == 3.5
