@@ -15,6 +15,7 @@ from engine.model import SceneModel
 from engine.plan import Bucket, Plan, base_scene, explain
 from engine.remarks import remarks
 from engine.sweep import Cases, expand
+from results_schema.errors import BadInput
 from studies.measuring import disk_bytes
 from studies.simpler import HEADINGS, simpler_models
 from studies.words import counted, number, unit_text
@@ -63,7 +64,10 @@ def preview(plan: Plan, threads: int) -> Preview:
 def _audit(plan: Plan) -> str:
     """What the audit costs; where the study leaves it open, one of a reasonable size."""
     wanted = plan.study.solver.audit
-    variants = spread_quasi_randomly(plan.cases, suggested_size(plan)) if wanted == "auto" else audited(plan)
+    try:
+        variants = spread_quasi_randomly(plan.cases, suggested_size(plan)) if wanted == "auto" else audited(plan)
+    except BadInput:  # the finer plan would need too many steps, which only matters to who asks for it
+        return " No audit."
     if not variants.size:
         return ""
     more = f"about {duration(audit_seconds(audit_plan(plan, variants)))} more"

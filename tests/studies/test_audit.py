@@ -38,6 +38,7 @@ from studies.kinds import asymmetry, double_peak
 from studies.kinds.double_peak import _peak_gap
 from studies.measuring import Work
 from studies.options import RunOptions
+from studies.preview import preview
 from studies.report import write_report
 from studies.results import Results
 from studies.runner import Outcome, run_to_archive
@@ -374,3 +375,9 @@ def test_without_an_audit_nothing_is_said(
     assert main(["check", "small.toml"]) == 0
     assert "No audit; audit = 16 takes about" in capsys.readouterr().out
     assert engine.load("small.toml").solver.audit == "auto"
+
+
+def test_a_check_does_not_refuse_what_only_an_audit_could_not_do() -> None:
+    """Four times the steps of a very slow cruise would be too many; nobody has asked for them."""
+    slow = study(beam(), mass(0.5, cruise(0.0, 1.0, 1e-5)))
+    assert "No audit" in preview(make_plan(slow), 1).cost
