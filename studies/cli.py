@@ -141,6 +141,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
         return code if isinstance(code, int) else 0
 
+    if arguments is None:
+        stopping.own_process()
     code = trouble.exit_code_of(invoke)
     if arguments is None:
         stopping.end_undisturbed()

@@ -19,6 +19,7 @@ GRACE_SECONDS = 1.7
 KEPT = "finished work is kept, run again to resume"
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_whole_process = threading.Event()
 _SHOW_CURSOR = "\x1b[?25h"
 
 
@@ -65,8 +66,14 @@ def stop_on_signals() -> Iterator[Stop]:
         yield stop
     finally:
         deadline.cancel()
+        leaving = _whole_process.is_set() and stop.event.is_set()
         for number, handler in former.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if leaving else handler)
+
+
+def own_process() -> None:
+    """Say that the command is the whole process: once it is asked to stop it hears no second signal on its way out."""
+    _whole_process.set()
 
 
 def end_undisturbed() -> None:
