@@ -20,6 +20,7 @@ from engine.bodies.reduced import Reduced
 from engine.bodies.reduced_body import load_body
 from engine.bodies.rigid import Rigid
 from engine.bodies.rigid_body import rigid_body
+from results_schema.errors import BadInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,12 @@ class Built:
 
 def build_body(body: Body) -> Built:
     """A body of a study in modal coordinates. Raises BadInput, with the key within the body as its place."""
-    return BUILDERS[type(body)](body)
+    built = BUILDERS[type(body)](body)
+    modes = built.modal.omega.size
+    if isinstance(body.damping_ratio, tuple) and len(body.damping_ratio) < modes:
+        what = "fewer damping ratios than modes: modes of equal frequency are kept together"
+        raise BadInput(what, where="damping_ratio", expected=f"{modes} ratios", received=str(len(body.damping_ratio)))
+    return built
 
 
 def _beam(body: Beam) -> Built:

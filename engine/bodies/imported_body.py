@@ -43,12 +43,7 @@ def imported_body(body: Imported) -> ModalBody:
     Raises BadInput, with the key within the body as its place, for a model that cannot be a body as it stands.
     """
     text = body.model_dump_json(exclude={"damping_ratio": True, "own_weight": True}) + body.content
-    found = _imported_body(_Content(text, body))
-    if isinstance(body.damping_ratio, tuple) and len(body.damping_ratio) < len(found.omega):
-        what = "fewer damping ratios than modes: modes of equal frequency are kept together"
-        expected, received = f"{len(found.omega)} ratios", str(len(body.damping_ratio))
-        raise BadInput(what, where="damping_ratio", expected=expected, received=received)
-    return found
+    return _imported_body(_Content(text, body))
 
 
 @lru_cache(maxsize=8)

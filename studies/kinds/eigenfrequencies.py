@@ -115,8 +115,8 @@ class Eigenfrequencies:
     def check(self, study: Study) -> None:
         """Something moves that has inertia, and positions exist."""
         first_carriage(study)
-        if study.solver.fidelity == "force" or not any(c.inertial for c in study.carriage.values()):
-            forced = study.solver.fidelity == "force"
+        forced = study.solver.fidelity in ("force", "static")  # a load, whatever it weighs
+        if forced or not any(c.inertial for c in study.carriage.values()):
             raise BadInput(
                 "forces have no inertia: frequencies do not depend on where they stand",
                 where=study.source.where("solver.fidelity" if forced else "carriage"),

@@ -103,7 +103,10 @@ def _check_scene(study: Study) -> None:
 
 
 def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
-    """A mass that crosses. Raises BadInput."""
+    """A mass that crosses, with its inertia. Raises BadInput."""
+    if study.solver.fidelity in ("force", "static"):
+        where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'
+        raise BadInput("a force has no inertia that could fail", where=where, expected='"auto"', received=received)
     if not carriage.inertial:
         where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
         raise BadInput("a force has no inertia that could fail", where=where, expected=expected)

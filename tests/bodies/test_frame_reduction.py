@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.bodies.build import build_body
 from engine.bodies.craig_bampton import reduce_model
 from engine.bodies.flexibility import factorised
 from engine.bodies.frame import Frame
@@ -159,7 +160,7 @@ def test_groups_of_equal_frequencies_are_whole() -> None:
     with pytest.raises(BadInput, match="no mode is left"):
         body(tube | {"leave_out": [1, 3]})
     with pytest.raises(BadInput, match="damping_ratio"):
-        body(tube | {"damping_ratio": [0.1, 0.1, 0.1]})
+        build_body(Frame.model_validate(tube | {"damping_ratio": [0.1, 0.1, 0.1]}))
 
 
 @pytest.mark.parametrize("matrix", ["consistent", "lumped"])

@@ -219,6 +219,7 @@ LOOSE = {
     ("kind", "changes", "words"),
     [
         ("eigenfrequencies", {"solver.fidelity": "force"}, r"solver\.fidelity: forces have no inertia"),
+        ("eigenfrequencies", {"solver.fidelity": "static"}, r"solver\.fidelity: forces have no inertia"),
         ("eigenfrequencies", {"carriage.car": PUSH}, r"carriage: forces have no inertia"),
         ("eigenfrequencies", {"carriage": {}, "sensor": {}}, r"carriage: nothing moves"),
         ("influence", {"sensor.middle.quantity": "velocity"}, r"sensor\.middle\.quantity: .*no static reading"),

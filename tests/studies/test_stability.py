@@ -283,6 +283,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
         {"carriage": {"mass": {"on": "beam", "kind": "force", "force": 1.0, "motion": CRUISE}}},
         "carriage.mass.kind",
     ),
+    "statics": ({"solver": {"fidelity": "static"}}, "solver.fidelity"),
     "own weight": ({"bed": {"own_weight": True}}, "body.beam.own_weight"),
     "ratios": ({"bed": {"damping_ratio": [0.0, 0.1], "modes": 2}}, "body.beam.damping_ratio"),
     "loose": ({"bed": {"supports": "free-free"}}, "body.beam.supports"),
