@@ -23,8 +23,8 @@ from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.model import SceneModel, build_model
 from engine.plan import START_SECONDS, Bucket, Plan, steps_of
+from engine.readings import Sensor
 from engine.scene import Study
-from engine.signals import Sensor
 from engine.sweep import Cases
 from engine.tables import SceneTables
 from results_schema.status import Fidelity

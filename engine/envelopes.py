@@ -13,9 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import contact_forces
 from engine.model import SceneModel
+from engine.readings import Sensor
 from engine.scene import Study
-from engine.signals import Sensor, Signal, contact_forces
+from engine.signals import Signal
 from engine.tables import Missed, SceneTables, SegmentTable
 from engine.timeline import Segment
 from engine.ways import Way

@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import ContactForce, contact_forces, contact_row
 from engine.lanes import LaneValues, weights
 from engine.model import SceneModel
-from engine.signals import ContactForce, Sensor, build_signals, contact_forces, contact_row
+from engine.readings import Sensor
+from engine.signals import build_signals
 from engine.statics import static_state
 from engine.ways import Way
 

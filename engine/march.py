@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import contact_forces
 from engine.histories import rows_sampled
 from engine.kernels.layout import (
     BELOW_AT,
@@ -29,7 +30,6 @@ from engine.kernels.layout import (
 from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
 from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table
-from engine.signals import contact_forces
 from engine.starting import initial_state
 from engine.tables import SceneTables
 from engine.timeline import Segment

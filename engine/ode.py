@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import ContactForce
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues, lane_table, moving_mass, weight
 from engine.model import SceneModel
-from engine.signals import ContactForce
 from engine.starting import initial_state
 from engine.tables import SceneTables
 from engine.timeline import Segment, build_timeline

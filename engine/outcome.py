@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import contact_forces
 from engine.envelopes import MOST_KEPT, envelope_names
 from engine.histories import counts_reduced
 from engine.kernels.layout import (
@@ -25,7 +26,6 @@ from engine.plan import Bucket, Plan
 from engine.reduction import Cycle
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_chosen, relative_error
-from engine.signals import contact_forces
 from engine.tables import SceneTables
 from results_schema.parts import Rows
 from results_schema.status import Fidelity, Status

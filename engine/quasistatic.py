@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import ContactForce, ContactSensor
 from engine.influence import static_readings
 from engine.kernels.layout import (
     BELOW_AT,
@@ -21,7 +22,8 @@ from engine.kernels.layout import (
 )
 from engine.lanes import LaneValues, weights
 from engine.march import Marched
-from engine.signals import ContactForce, ContactSensor, Sensor, Signal
+from engine.readings import Sensor
+from engine.signals import Signal
 from engine.tables import SceneTables
 from engine.ways import Way
 

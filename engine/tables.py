@@ -11,12 +11,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.contacts import ContactForce
 from engine.fidelity import free_steps
 from engine.grips import residual
 from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
-from engine.signals import ContactForce, Sensor, Signal, build_signals, tabulate_missed, tabulate_watch
+from engine.readings import Sensor
+from engine.signals import Signal, build_signals, tabulate_missed, tabulate_watch
 from engine.ties import Grip
 from engine.timeline import Segment, Timeline, Window, build_timeline, refined
 from engine.track import tabulate_ties

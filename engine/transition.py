@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.comparison import ComparisonScheme, frozen_track, propagate_comparison
+from engine.contacts import ContactForce
 from engine.kernels.layout import LANES, MARKS, Alpha, Lanes, Record, State, Ties
 from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle
 from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table, padded, to_blocks
 from engine.march import prepare
 from engine.model import SceneModel
-from engine.signals import ContactForce, tabulate_watch
+from engine.signals import tabulate_watch
 from engine.tables import SceneTables
 from engine.track import tabulate_ties
 from engine.ways import Way

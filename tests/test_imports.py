@@ -30,9 +30,9 @@ STAGES = {
     "bodies.frame_statics bodies.frame_sections bodies.frame_points bodies.frame_body bodies.reduced_body "
     "bodies.rigid_body bodies.imported_body bodies.imported_checks bodies.imported_line bodies.imported_model "
     "bodies.imported_rows bodies.build",
-    "scenes as arrays": "timeline ties standing model ways grips statics track signals lanes influence coupled "
-    "fidelity tables envelopes resonance resolution excitation moving_load ringing "
-    "bouncing neglect ladder",
+    "scenes as arrays": "timeline ties standing model ways grips statics track readings contacts signals lanes "
+    "influence coupled fidelity tables envelopes resonance resolution excitation moving_load ringing bouncing neglect "
+    "ladder",
     "all work of a study": "reduction plan histories remarks audit",
     "the run": "starting march quasistatic richardson ode transition comparison outcome dataset execution "
     "unreduced_track unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march unreduced_comparison",

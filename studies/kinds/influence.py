@@ -170,8 +170,8 @@ class _Static:
     name = "influence"
 
     def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+        from engine.contacts import contact_forces
         from engine.influence import static_values
-        from engine.signals import contact_forces
 
         found = static_values(model, values, along)
         named: dict[str, NDArray[Any]] = {}

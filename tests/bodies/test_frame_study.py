@@ -207,6 +207,19 @@ def put(table: dict[str, Any], keys: list[str], value: Any) -> None:
         table[keys[-1]] = value
 
 
+UNIFORM: dict[str, Any] = {
+    "kind": "beam",
+    "length": LENGTH,
+    "area": AREA,
+    "second_moment": SECOND_MOMENT,
+    "youngs_modulus": MODULUS,
+    "density": DENSITY,
+    "supports": "pinned-pinned",
+    "modes": 5,
+    "own_weight": True,
+}
+
+
 def passage(body: dict[str, Any], mass: float, speed: float) -> Study:
     motion = {"kind": "cruise", "start": 0.0, "end": LENGTH, "speed": speed}
     return Study(
@@ -219,17 +232,7 @@ def passage(body: dict[str, Any], mass: float, speed: float) -> Study:
 
 
 def test_a_passage_over_a_straight_frame_is_one_over_a_beam() -> None:
-    beam = {
-        "kind": "beam",
-        "length": LENGTH,
-        "area": AREA,
-        "second_moment": SECOND_MOMENT,
-        "youngs_modulus": MODULUS,
-        "density": DENSITY,
-        "supports": "pinned-pinned",
-        "modes": 5,
-        "own_weight": True,
-    }
+    beam = UNIFORM
     frame = straight({"a": "pinned", "b": ["z"]}, elements=24, modes=5, plane="xz", own_weight=True)
     expected, found = (engine.run(passage(body, 600.0, 8.0)) for body in (beam, frame))
     assert int(found.status) == 0
@@ -240,18 +243,7 @@ def test_a_passage_over_a_straight_frame_is_one_over_a_beam() -> None:
 
 
 def test_sensors_of_section_forces_are_those_of_the_beam() -> None:
-    beam = {
-        "kind": "beam",
-        "length": LENGTH,
-        "area": AREA,
-        "second_moment": SECOND_MOMENT,
-        "youngs_modulus": MODULUS,
-        "density": DENSITY,
-        "supports": "pinned-pinned",
-        "modes": 5,
-        "own_weight": True,
-        "fibre_distance": 0.1,
-    }
+    beam = UNIFORM | {"fibre_distance": 0.1}
     frame = straight({"a": "pinned", "b": ["z"]}, elements=24, modes=5, plane="xz", own_weight=True)
     found = []
     for table in (beam, frame):

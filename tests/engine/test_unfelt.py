@@ -9,8 +9,8 @@ import pytest
 
 import engine
 from engine.bodies.import_track import line_between
+from engine.contacts import span_counted
 from engine.model import build_model
-from engine.signals import span_counted
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, straight
 from tests.engine.build import Table, beam, cruise, fixed, mass, study
