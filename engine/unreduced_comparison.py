@@ -30,8 +30,8 @@ from engine.unreduced_statics import statics_at
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-FINER = 4  # steps of the unreduced model for each of the march, so that its many modes do not ring by their steps
-MOST_STEPS = 60_000  # of the unreduced model, unless the march itself takes more
+FINER = 8  # steps of the unreduced model for each of the march, so that its many modes do not ring by their steps
+MOST_STEPS = 120_000  # of the unreduced model, unless the march itself takes more
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,7 @@ def test_the_group_is_as_declared(archive: Archive) -> None:
     validate(group, unreduced.GROUP, {}, ())
     assert group["sample"].values.tolist() == [1]
     assert group["degrees_of_freedom"].values.tolist() == [2 * 16 + 15 + 1 + 2]
-    assert group["unreduced_steps"].values.tolist() == [9600]
+    assert group["unreduced_steps"].values.tolist() == [19200]
 
 
 def test_its_histories_are_those_of_the_study(archive: Archive) -> None:
