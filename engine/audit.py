@@ -1,152 +1,237 @@
 """The audit of a study: some of its variants once more with all terms, twice the modes and four times the steps.
 
-Which variants, and how they are marched again, follows from the study alone.
+Which variants follows from the study alone, and with how much of what they took: those that a variant of its march got
+after all improvement.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.axes import sobol_points
 from engine.bodies.body import AUTO_MODES, MAX_MODES, Body
 from engine.bodies.frame import MAX_FIXED_INTERFACE_MODES, Frame
 from engine.bodies.reduced import Reduced
 from engine.bodies.reduced_body import load_body
 from engine.bodies.rigid import Rigid
-from engine.fidelity import allow_any_steps, check_most_steps
+from engine.bucket import PACE, Bucket
+from engine.choice import Choice, automatic_bodies
+from engine.fidelity import MOST_STEPS, STEPS_PER_PERIOD, check_most_steps, safe_steps
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.model import SceneModel, build_model
-from engine.plan import START_SECONDS, Bucket, Plan, steps_of
-from engine.readings import Sensor
+from engine.plan import Plan, fixed_steps, scenes
+from engine.resolution import steps_to_resolve
+from engine.resonance import spring_steps
 from engine.scene import Study
 from engine.sweep import Cases
-from engine.tables import SceneTables
+from engine.tables import KEPT_BYTES, SceneTables
 from results_schema.status import Fidelity
 
+Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 MORE_MODES, MORE_STEPS = 2, 4
 LEAST_STEPS = 800  # of a variant that marched none
-PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, for `suggested_size`
+MODES_OF_STATICS = 3  # whose double is marched for a variant that marched none: statics err by the slowest modes
+PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
-_MOST_DRAWS = 16  # per variant of the sweep; what is not drawn by then is taken in order
+SHARED, FULL_SHARED = 8, 2  # times the steps that a variant takes to share tables; once there are `LANES` of them
+GROUP_SECONDS = 0.05  # besides tables and marching, for expected times only
+STATION_SECONDS = 3e-6  # of tables; likewise
+MODE_SECONDS = 2e-7  # of tables for each mode; likewise
 
 
-def audited(plan: Plan) -> Counts:
-    """(n,) flat numbers of the variants that the study wants audited, ascending; "auto" is none."""
+class Used(NamedTuple):
+    """What variants (V,) are marched with: modes of all bodies together, and steps over one passage or cycle; 0 where
+    nothing is marched."""
+
+    modes: Counts
+    steps: Counts
+
+
+class Sample(NamedTuple):
+    """Variants (n,) to audit by their flat numbers, in the order in which fewer of them are spread best, and the
+    seconds that their audit may be expected to take on one thread: of more, half are left out."""
+
+    variants: Counts
+    seconds: float
+
+
+class _Group(NamedTuple):
+    """Variants that are marched again together, with twice so many modes of the bodies whose modes are chosen."""
+
+    scene: SceneModel
+    chosen: int
+    steps: int
+    variants: Counts
+
+    def seconds(self, plan: Plan) -> float:
+        """Expected time on one thread; no body with more modes is made for that."""
+        tables, ties = SceneTables(self.scene, self.steps, plan.window), self.scene.ties
+        automatic = len(automatic_bodies(self.scene))
+        modes = MORE_MODES * (self.chosen * automatic + _fixed_modes(self.scene)) + self.scene.omega.size
+        modes -= self.scene.body_modes  # what is left are those of sprung masses
+        timeline = tables.timeline
+        once = timeline.repeats and tables.cycle_bytes <= KEPT_BYTES
+        stations = min(timeline.steps, self.steps) if once else timeline.steps
+        lanes = LANES * -(-self.variants.size // LANES)
+        march = modes * (1.0 + 0.1 * len(plan.study.sensor)) * ties**1.2 * timeline.steps * lanes / PACE
+        return float(GROUP_SECONDS + (STATION_SECONDS + MODE_SECONDS * modes) * stations * ties + march)
+
+
+def expected(plan: Plan) -> Used:
+    """What the variants of a plan are to be marched with before anything is improved."""
+    found = Used(*(np.zeros(plan.size, dtype=np.int64) for _ in Used._fields))
+    for bucket in plan.buckets:
+        found.modes[bucket.variants] = bucket.scene.body_modes
+        found.steps[bucket.variants] = 0 if bucket.scene.fidelity is Fidelity.STATIC else bucket.steps
+    return found
+
+
+def sampled(plan: Plan) -> Sample:
+    """The variants to audit; where the study leaves their number open 1 % of them, 16 to 256, that may take 30 % of
+    the run's time or 2 s. Raises BadInput where the study asks for an audit of more steps than can be marched."""
     wanted = plan.study.solver.audit
-    return spread_quasi_randomly(plan.cases, 0 if wanted == "auto" else int(wanted))
+    if wanted == "auto":
+        count = int(np.clip(np.rint(PART * plan.size), FEWEST, MOST))
+        seconds = max(MOST_TIME * plan.total_seconds(1), FREE_SECONDS)
+        return Sample(spread_quasi_randomly(plan.cases, count), seconds)
+    sample = Sample(spread_quasi_randomly(plan.cases, int(wanted)), np.inf)
+    for group in _groups(plan, sample.variants, expected(plan)):
+        check_most_steps(group.scene, np.array([group.steps]))
+    return sample
 
 
 def spread_quasi_randomly(cases: Cases, count: int) -> Counts:
-    """(n,) flat numbers, ascending, of `count` variants or all: scrambled Sobol points over the sweep's dimensions."""
-    if count >= cases.size:
-        return np.arange(cases.size, dtype=np.int64)
-    found, draws = np.zeros(0, dtype=np.int64), 2 * count
-    while found.size < count and draws <= _MOST_DRAWS * cases.size:
-        places = np.floor(sobol_points(draws, len(cases.shape)) * cases.shape).astype(np.int64)
-        drawn = np.ravel_multi_index(tuple(places.T), cases.shape)
+    """(n,) flat numbers of `count` variants or all, spread over the sweep's dimensions, and so are the first of them:
+    the additive recurrence of the generalised golden ratio, the root of x^(d+1) = x + 1 (Roberts 2018)."""
+    wanted, dimensions = min(count, cases.size), max(1, len(cases.shape))
+    ratio = 2.0
+    for _ in range(64):
+        ratio = (1.0 + ratio) ** (1.0 / (dimensions + 1))
+    steps = ratio ** -np.arange(1.0, dimensions + 1.0)
+    found, draws = np.zeros(0, dtype=np.int64), 2 * wanted
+    while found.size < wanted and draws <= 16 * cases.size:
+        points = np.mod(0.5 + np.arange(1.0, draws + 1.0)[:, None] * steps, 1.0)[:, : len(cases.shape)]
+        places = np.floor(points * cases.shape).astype(np.int64)
+        drawn = np.ravel_multi_index(tuple(places.T), cases.shape) if cases.shape else np.zeros(1, dtype=np.int64)
         found, draws = drawn[np.sort(np.unique(drawn, return_index=True)[1])], 2 * draws
-    left = np.setdiff1d(np.arange(cases.size), found) if found.size < count else found[:0]
-    return np.sort(np.concatenate([found, left])[:count])
+    left = np.setdiff1d(np.arange(cases.size), found) if found.size < wanted else found[:0]
+    return np.concatenate([found, left])[:wanted]
 
 
-def audit_plan(plan: Plan, variants: Counts) -> Plan:
-    """The plan that marches some variants again; their flat numbers stay what they are, and no history is kept.
+def audit_plan(plan: Plan, sample: Sample, used: Used) -> Plan | None:
+    """The plan that marches the sample again, or as much of it as its time allows; None where that is nothing.
 
-    Variants of one scene share the steps of the one that needs most, sixteen at a time. Raises BadInput where that is
-    more than can be marched.
+    Flat numbers stay what they are, and no history is kept. used: by all variants of the plan.
     """
-    buckets: list[Bucket] = []
-    by_scene: dict[int, list[Bucket]] = {}
-    for bucket in plan.buckets:
-        by_scene.setdefault(id(bucket.scene), []).append(bucket)
-    for own in by_scene.values():
-        chosen = [np.sort(bucket.variants[np.isin(bucket.variants, variants)]) for bucket in own]
-        if sum(part.size for part in chosen):
-            buckets += _finer_buckets(plan, own, chosen)
+    most = max(MOST_STEPS // MORE_STEPS, int(expected(plan).steps.max(initial=0)))
+    groups = _affordable(plan, sample, used._replace(steps=np.minimum(used.steps, most)))
+    if not groups:
+        return None
     study = plan.study.with_values({"envelope": {}}) if plan.study.envelope else plan.study
-    return replace(plan, study=study, buckets=tuple(buckets), shown=np.zeros(0, dtype=np.int64))
+    buckets = tuple(_bucket(plan, group) for group in groups)
+    return replace(plan, study=study, buckets=buckets, shown=np.zeros(0, dtype=np.int64))
 
 
-def audit_seconds(plan: Plan) -> float:
-    """Expected time of an `audit_plan` on one thread."""
-    return plan.total_seconds(1) - START_SECONDS
+def audit_seconds(plan: Plan, sample: Sample) -> tuple[int, float]:
+    """How many variants are expected to be audited, and the time that takes on one thread."""
+    groups = _affordable(plan, sample, expected(plan))
+    return sum(group.variants.size for group in groups), sum(group.seconds(plan) for group in groups)
 
 
-def suggested_size(plan: Plan) -> int:
-    """How many variants to audit: 1 % of them, 16 to 256, or half as many until that is expected to take no more than
-    30 % of the run's time or 2 s; 0 where not even one is."""
-    count = min(plan.size, int(np.clip(np.rint(PART * plan.size), FEWEST, MOST)))
-    allowed = max(MOST_TIME * plan.total_seconds(1), FREE_SECONDS)
-    while count and audit_seconds(audit_plan(plan, spread_quasi_randomly(plan.cases, count))) > allowed:
+def _affordable(plan: Plan, sample: Sample, used: Used) -> list[_Group]:
+    """The groups of so many variants that their time is within the sample's."""
+    count = sample.variants.size
+    while count:
+        groups = list(_groups(plan, sample.variants[:count], used))
+        if not np.isfinite(sample.seconds) or sum(group.seconds(plan) for group in groups) <= sample.seconds:
+            return groups
         count //= 2
-    return count
+    return []
 
 
-def silent(model: SceneModel, sensors: Iterable[Sensor]) -> NDArray[np.bool_]:
-    """(J,) sensors where no mode of their body says anything, such as the deflection at a support: what they read is
-    rounding, and has no relative error."""
-    return np.array(
-        [type(sensor) is Sensor and sensor.under is None and _says_nothing(model, sensor) for sensor in sensors]
-    )
+def _groups(plan: Plan, variants: Counts, used: Used) -> Iterator[_Group]:
+    """Variants that share a scene and about as many steps."""
+    for scene, own in scenes(plan.study, plan.cases, np.sort(variants)) if variants.size else ():
+        wanted = _wanted_steps(plan, scene, own, used.steps[own])
+        order = np.argsort(-wanted, kind="stable")
+        first = 0
+        for last in range(1, order.size + 1):
+            shared = FULL_SHARED if last - first >= LANES else SHARED
+            if last == order.size or shared * wanted[order[last]] < wanted[order[first]]:
+                part = own[order[first:last]]
+                yield _Group(scene, _modes(scene, part, used), int(np.ceil(wanted[order[first]])), part)
+                first = last
 
 
-def _says_nothing(model: SceneModel, sensor: Sensor) -> bool:
-    places = np.linspace(0.0, model.bodies[sensor.body].modal.length, PLACES)
-    here, *elsewhere = (
-        max(float(np.abs(channel.rows).max()) for channel in replace(sensor, at=at).channels(model, ()))
-        for at in (sensor.at, *map(float, places))
-    )
-    return here <= SILENT * max(elsewhere)
+def _wanted_steps(plan: Plan, scene: SceneModel, variants: Counts, used: Counts) -> Array:
+    """(n,) four times the steps that were used; 200 per first period where none were, or too few by order."""
+    values = LaneValues(scene.study, plan.cases.columns_of(variants), variants.size)
+    periods = values.time_scale(scene.carriages[0].name) * scene.first_omega / (2.0 * np.pi)
+    usual = np.maximum(LEAST_STEPS, STEPS_PER_PERIOD * periods)
+    if fixed_steps(scene.study, values):
+        return np.maximum(MORE_STEPS * used, usual)
+    return np.where(used == 0, usual, MORE_STEPS * used)
 
 
-def _finer_buckets(plan: Plan, own: list[Bucket], chosen: list[Counts]) -> list[Bucket]:
-    """Some variants of the buckets of one scene, with its finer model."""
-    scene = own[0].scene
-    model = build_model(in_full(scene), *scene.timing, plan.cases.paths)
-    numbers = np.concatenate(chosen)
-    used = np.concatenate([np.full(part.size, bucket.steps) for bucket, part in zip(own, chosen, strict=True)])
-    least = LEAST_STEPS if scene.fidelity is Fidelity.STATIC else MORE_STEPS * used
-    steps = np.maximum(least, _own(plan, model, numbers))
-    check_most_steps(model, steps)
-    order = np.argsort(-steps, kind="stable")
-    parts = [order[first : first + LANES] for first in range(0, order.size, LANES)]
-    return [
-        Bucket(SceneTables(model, int(steps[part].max()), plan.window, refinement=MORE_STEPS), numbers[part], "audit")
-        for part in parts
-    ]
+def _modes(scene: SceneModel, variants: Counts, used: Used) -> int:
+    """The largest number of modes that any variant used of the bodies whose modes are chosen."""
+    chosen, marched = automatic_bodies(scene), variants[used.steps[variants] > 0]
+    if not chosen or not marched.size:
+        return MODES_OF_STATICS
+    return max(MODES_OF_STATICS, (int(used.modes[marched].max()) - _fixed_modes(scene)) // len(chosen))
 
 
-def _own(plan: Plan, model: SceneModel, numbers: Counts) -> Counts:
-    """(n,) steps that the finer model would take by itself: they keep its many modes from ringing by their steps."""
-    columns = {path: column for path, column in plan.cases.columns_of(numbers).items() if path != "solver.steps"}
-    return steps_of(model, LaneValues(model.study, columns, numbers.size), allow_any_steps)[0]
+def _fixed_modes(scene: SceneModel) -> int:
+    """Modes of the bodies whose modes are not chosen."""
+    chosen = automatic_bodies(scene)
+    return sum(part.modal.omega.size for part in scene.bodies if part.name not in chosen)
 
 
-def in_full(scene: SceneModel) -> Study:
-    """The study of a scene with all terms, no envelopes, and twice the modes of every body in use."""
-    changes: dict[str, Any] = {"solver.fidelity": "auto", "solver.steps": "auto", "solver.static_correction": True}
+def _bucket(plan: Plan, group: _Group) -> Bucket:
+    """A group as part of a plan: nothing was told of it, and it is compared with nothing."""
+    model = build_model(in_full(group.scene, group.chosen), *group.scene.timing, plan.cases.paths)
+    steps, none = _safe_steps(plan, model, group), np.zeros(group.variants.size)
+    tables = SceneTables(model, steps, plan.window, refinement=MORE_STEPS)
+    told = Choice(*(none for _ in Choice._fields))
+    return Bucket(tables, group.variants, "audit", told, none + steps * model.body_modes, compared="not")
+
+
+def _safe_steps(plan: Plan, model: SceneModel, group: _Group) -> int:
+    """The steps of a group, or more where its many modes could ring otherwise; every four are cut from one."""
+    values = LaneValues(model.study, plan.cases.columns_of(group.variants), group.variants.size)
+    rules = safe_steps(model, values.time_scale(model.carriages[0].name)) | spring_steps(model, values)
+    if model.scheme.stride > 1:
+        rules |= {"every mode of a Richardson pair resolved": steps_to_resolve(model, values)}
+    least = float(np.minimum(np.max(list(rules.values())), MOST_STEPS))
+    return MORE_STEPS * int(np.ceil(max(least, group.steps) / MORE_STEPS))
+
+
+def in_full(scene: SceneModel, chosen: int) -> Study:
+    """The study of a scene with all terms, no envelopes, and twice the modes of every body in use; chosen: modes of
+    those bodies whose modes were chosen."""
+    changes: dict[str, Any] = {"solver.fidelity": "full", "solver.steps": "auto", "solver.static_correction": True}
+    automatic = automatic_bodies(scene)
     for part in scene.bodies:
-        found = _more_modes(scene.study.body[part.name])
+        own = chosen if part.name in automatic else AUTO_MODES
+        found = _more_modes(scene.study.body[part.name], own)
         changes |= {f"body.{part.name}.{key}": value for key, value in found.items()}
     return scene.study.with_values(changes | ({"envelope": {}} if scene.study.envelope else {}))
 
 
-def _more_modes(body: Body) -> dict[str, Any]:
+def _more_modes(body: Body, auto: int) -> dict[str, Any]:
     """Values that give a body twice its modes, or as many as it has; those beyond a list of damping ratios have its
-    last one."""
+    last one. auto: its modes where the study does not say how many."""
     if isinstance(body, Rigid):
         return {}
     found: dict[str, Any] = {}
-    asked = AUTO_MODES if body.modes == "auto" else int(body.modes)
+    asked = auto if body.modes == "auto" else int(body.modes)
     if isinstance(body, Reduced):
         whole = load_body(body.file).omega.size
         found["modes"] = "auto" if body.modes == "auto" else min(MORE_MODES * asked, whole)

@@ -31,7 +31,7 @@ class Felt(NamedTuple):
 
 def springs(load: Load) -> Felt:
     """What a load's springs do; without any the whole mass is felt."""
-    carriage, key = load.model.study.carriage[load.tie.name], f"carriage.{load.tie.name}"
+    carriage, key = load.route.model.study.carriage[load.route.tie.name], f"carriage.{load.route.tie.name}"
     none, wheel = np.zeros_like(load.angle), np.zeros_like(load.mass)
     if isinstance(carriage, OscillatorCarriage):
         wheel, sprung = load.values.of(f"{key}.wheel_mass"), load.values.of(f"{key}.mass")
@@ -41,8 +41,8 @@ def springs(load: Load) -> Felt:
     else:
         return Felt(load.mass + none, none, wheel, wheel, wheel)
     lag = damping * soft / np.maximum(sprung, SMALL)
-    turning = 1j * lag * load.omega
-    seen = (1.0 + turning) / (1.0 - soft * load.omega**2 + turning)
+    turning = 1j * lag * load.route.omega
+    seen = (1.0 + turning) / (1.0 - soft * load.route.omega**2 + turning)
     own = lag / np.sqrt(np.maximum(soft, SMALL))
     swing = np.minimum(np.abs(seen[0] - 1.0), MOST_SWING)
     return Felt(np.abs(sprung * seen + wheel), np.abs(sprung * (seen - 1.0)), swing, soft, own)
@@ -55,14 +55,13 @@ def bounce(load: Load, felt: Felt) -> Array:
     if not soft.any():
         return np.zeros_like(load.scale)
     angle = np.where(soft > 0.0, load.time / np.sqrt(np.maximum(soft, SMALL)), 1e9)
-    sloped = np.interp(load.shaken.places, load.grid, np.gradient(load.soft, load.grid))
-    drop = 0.0 if load.settled else float(np.interp(load.shaken.places[0], load.grid, load.soft))
-    sharp = bool(load.shaken.again) and not load.shaken.change.any()
-    jump = 2.0 * float(np.abs(sloped * load.shaken.speed)[[0, -1]].max()) if sharp else 0.0
-    kick = max(float(np.abs(load.material(load.soft)[0])), float(np.abs(sloped * load.shaken.change).max()))
-    swung = float(load.soft.max()) * resonant(load, load.shaken.square_harmonics, angle, felt.lag)
-    found = np.where(soft > 0.0, kick + jump * angle + drop * angle**2 + swung, 0.0)
-    return np.asarray(load.line.max(axis=1)[:, None] * load.mass * load.weight * found / load.time**2)
+    sloped = np.interp(load.shaken.places, load.route.grid, np.gradient(load.route.soft, load.route.grid))
+    stands = load.route.settled and not (load.shaken.once and load.shaken.once[0].tau > 0.0)
+    drop = 0.0 if stands else float(np.interp(load.shaken.places[0], load.route.grid, load.route.soft))
+    kick = max(float(np.abs(load.route.material(load.route.soft)[0])), float(np.abs(sloped * load.shaken.change).max()))
+    swung = float(load.route.soft.max()) * resonant(load, load.shaken.square_harmonics, angle, felt.lag)
+    found = np.where(soft > 0.0, kick + load.route.jolts * angle + drop * angle**2 + swung, 0.0)
+    return np.asarray(load.route.line.max(axis=1)[:, None] * load.mass * load.weight * found / load.time**2)
 
 
 def _contacts(load: Load, carriage: BodyCarriage, key: str) -> tuple[Array, Array]:
@@ -70,9 +69,9 @@ def _contacts(load: Load, carriage: BodyCarriage, key: str) -> tuple[Array, Arra
     first bending."""
     damping, stiffness = np.zeros_like(load.mass), 0.0
     for name, contact in carriage.contacts.items():
-        damping = damping + load.share * load.values.of(f"{key}.contacts.{name}.damping")
+        damping = damping + load.route.share * load.values.of(f"{key}.contacts.{name}.damping")
         stiffness += np.inf if contact.stiffness == "rigid" else contact.stiffness
-    assert load.tie.rides is not None
-    omega = load.model.bodies[load.tie.rides].modal.omega
+    assert load.route.tie.rides is not None
+    omega = load.route.model.bodies[load.route.tie.rides].modal.omega
     bends = 1.0 / omega[omega > 0.0][0] ** 2 if omega.any() else 0.0
-    return damping, moving_mass(load.model, load.values, load.carriage) / stiffness + bends
+    return damping, moving_mass(load.route.model, load.values, load.route.carriage) / stiffness + bends

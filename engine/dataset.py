@@ -12,7 +12,7 @@ from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
 from engine.plan import Plan
 from engine.sweep import Cases
-from results_schema.parts import Rows
+from results_schema.parts import Rows, joined
 from results_schema.variables import QUANTITY_UNITS, Variable, axes, declarations, expand
 
 if TYPE_CHECKING:
@@ -45,15 +45,7 @@ class Collector:
     @property
     def selected(self) -> Rows | None:
         """All kept histories, ascending by variant."""
-        if not self._selected:
-            return None
-        variants = np.concatenate([rows.variants for rows in self._selected])
-        order = np.argsort(variants)
-        names = self._selected[0].arrays
-        return Rows(
-            variants[order],
-            {name: np.concatenate([rows.arrays[name] for rows in self._selected])[order] for name in names},
-        )
+        return joined(self._selected)
 
 
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:

@@ -106,7 +106,7 @@ def envelope_tables(tables: SceneTables) -> tuple[EnvelopeTables, ...]:
     if not count:
         return ()
     longest = max(segment.steps for segment in tables.timeline.segments)
-    readings = MOST_READINGS if tables.refinement == 1 else MOST_PAIR_READINGS
+    readings = MOST_READINGS if tables.model.scheme.stride == 1 else MOST_PAIR_READINGS
     size = -(-count // -(-count // max(LEAST_PLACES, readings // longest)))
     return tuple(
         EnvelopeTables(

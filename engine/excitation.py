@@ -164,12 +164,11 @@ def _event(tau: float, before: _Piece | None, after: _Piece | None) -> Event:
 
 
 def _felt(events: list[Event], peaks: Array) -> Iterator[Event]:
-    """Events at which anything jumps."""
+    """Events at which anything jumps by more than rounding."""
+    least = SMALL * np.maximum(peaks[[0, 1, 2, 2]].max(axis=1, keepdims=True), 1e-300)
     for event in events:
-        if event.jumps.size and np.any(
-            event.jumps > SMALL * np.maximum(peaks[[0, 1, 2, 2]].max(axis=1, keepdims=True), 1e-300)
-        ):
-            yield event
+        if event.jumps.size and np.any(event.jumps > least):
+            yield event._replace(jumps=np.where(event.jumps > least, event.jumps, 0.0))
 
 
 def _sampled(own: Rider, body: ModalBody, modes: NDArray[np.int64], segments: list[Segment]) -> Array:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.plan import Bucket, Plan, make_plan
+from engine.bucket import Bucket
+from engine.plan import Plan, make_plan
 from engine.reduction import Reduction
 from engine.scene import Study
 from results_schema.errors import BadInput, Interrupted

@@ -1,7 +1,4 @@
-"""How many steps a variant needs, as a pure function of that variant alone.
-
-Until error estimates choose, "auto" is the full model with steps enough for every rule of `RULES`.
-"""
+"""How many steps a variant needs whatever its accuracy, as a pure function of that variant alone."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ from results_schema.errors import BadInput
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-STEPS_PER_PERIOD = 200
+STEPS_PER_PERIOD = 200  # where nothing is known of the accuracy
 LEAST_STEPS = 200
 ALIAS_MARGIN = 1.5
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit
@@ -27,7 +24,7 @@ LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its l
 # passage in narrow bands, conditionally stable schemes by 10 to 7000; from here on by 1.12 or less (rarely 1.18).
 LEAST_MARGIN = 1.1
 MOST_STEPS = 100_000_000  # over one passage or cycle
-_STAIR = 4  # step counts are LEAST_STEPS times 1, 2, 3, or 4 to 7 times a power of two: few tables, little waste
+_STAIR = 2  # step counts are LEAST_STEPS times 1, or 2 or 3 times a power of two: few tables, little waste
 
 
 @dataclass(frozen=True)
@@ -48,19 +45,27 @@ class Needs:
 
 
 def needed_steps(model: SceneModel, time_scale: Array) -> Needs:
-    """Steps per passage or cycle of variants whose scene time lasts ``time_scale`` (V,) s per unit."""
+    """Steps per passage or cycle of variants whose scene time lasts ``time_scale`` (V,) s per unit, where nothing is
+    known of the accuracy."""
     periods = time_scale * model.first_omega / (2.0 * math.pi)
-    highest = float(model.omega.max())
-    rules = {
-        f"{STEPS_PER_PERIOD} per first period": STEPS_PER_PERIOD * periods,
-        f"{LEAST_STEPS} per passage or cycle": np.full_like(time_scale, LEAST_STEPS),
-    }
+    return Needs({f"{STEPS_PER_PERIOD} per first period": STEPS_PER_PERIOD * periods} | safe_steps(model, time_scale))
+
+
+def safe_steps(model: SceneModel, time_scale: Array, finer: float = 1.0) -> dict[str, Array]:
+    """Steps (V,) per passage or cycle by the rules that no march may break, by rule; so that one with ``finer`` times
+    fewer may not either."""
+    rules = {f"{LEAST_STEPS} per passage or cycle": np.full_like(time_scale, LEAST_STEPS)}
     alias = alias_steps(model, time_scale)
     if alias.any():
-        rules["the alias rule of the highest mode"] = ALIAS_MARGIN * alias
+        rules["the alias rule of the highest mode"] = max(ALIAS_MARGIN, finer * LEAST_MARGIN) * alias
     if math.isfinite(model.scheme.stability_limit):
-        rules["the scheme's stability limit"] = LIMIT_MARGIN * highest * time_scale / model.scheme.stability_limit
-    return Needs(rules)
+        rules["the scheme's stability limit"] = finer * limit_steps(model, float(model.omega.max()), time_scale)
+    return rules
+
+
+def limit_steps(model: SceneModel, highest: float, time_scale: Array) -> Array:
+    """(V,) steps that stay inside the scheme's stability limit with a highest frequency, rad/s; 0 without a limit."""
+    return np.asarray(LIMIT_MARGIN * highest * time_scale / model.scheme.stability_limit)
 
 
 def free_steps(model: SceneModel) -> int:
@@ -69,20 +74,20 @@ def free_steps(model: SceneModel) -> int:
     return max(STEPS_PER_PERIOD, math.ceil(limit))
 
 
-def alias_steps(model: SceneModel, time_scale: Array) -> Array:
+def alias_steps(model: SceneModel, time_scale: Array, kept: int | None = None) -> Array:
     """(V,) least steps per passage or cycle of the alias rule for the masses that ride on their bodies; 0 without any.
 
     A mass sees the highest mode's wave pass at k_N s' while the scheme turns that mode by its own phase; together they
     must stay below half a turn per step, k_N s' h + phase(omega_N h) < pi, else the march may resonate with itself.
-    For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2).
+    For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2). kept: of all modes.
     """
     found = np.zeros_like(time_scale)
     joined = {spring.carriage for spring in model.springs if spring.rigid}
     for number, carriage in enumerate(model.carriages):
         if carriage.inertia != "force" or number in joined:
             body = model.bodies[carriage.body].modal
-            wave = float(body.wave_number.max()) * carriage.rider.top_speed
-            found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega.max()) * time_scale))
+            wave = float(body.wave_number[:kept].max()) * carriage.rider.top_speed
+            found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega[:kept].max()) * time_scale))
     return model.scheme.stride * found
 
 
@@ -101,11 +106,17 @@ def round_up(steps: Array) -> Counts:
     """The next step count of the stair, so that neighbouring variants share tables.
 
     >>> round_up(np.array([3.0, 200.0, 201.0, 1000.0, 1001.0]))
-    array([ 200,  200,  400, 1000, 1200])
+    array([ 200,  200,  400, 1200, 1200])
     """
     scaled = np.maximum(np.asarray(steps, dtype=np.float64), LEAST_STEPS) / LEAST_STEPS
     tread = 2.0 ** np.maximum(np.floor(np.log2(scaled / _STAIR) + 1e-12), 0.0)
     return np.rint(LEAST_STEPS * tread * np.ceil(scaled / tread - 1e-9)).astype(np.int64)
+
+
+def least_steps(model: SceneModel, time_scale: Array) -> Array:
+    """(V,) the fewest steps that neither the alias rule nor the scheme's stability limit refuses."""
+    inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
+    return np.asarray(np.maximum(inside, LEAST_MARGIN * alias_steps(model, time_scale)))
 
 
 def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
@@ -135,7 +146,7 @@ def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
 
 
 def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
-    least = _least_steps(model, time_scale)
+    least = LEAST_MARGIN * alias_steps(model, time_scale)
     worst = int(np.argmax(least / steps))
     if least[worst] > steps[worst]:
         raise BadInput(
@@ -148,15 +159,9 @@ def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
         )
 
 
-def _least_steps(model: SceneModel, time_scale: Array) -> Array:
-    """(V,) the fewest steps that are accepted because of the alias rule."""
-    return LEAST_MARGIN * alias_steps(model, time_scale)
-
-
 def _enough(model: SceneModel, time_scale: Array) -> str:
     """A number of steps that these two rules refuse for no variant."""
-    inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
-    enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, _least_steps(model, time_scale))))
+    enough = LIMIT_MARGIN * float(np.max(least_steps(model, time_scale)))
     stride = model.scheme.stride
     return f"steps = {stride * math.ceil(enough / stride)} or more"
 

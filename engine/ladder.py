@@ -1,8 +1,8 @@
 """The ladder of models, cheapest first: what each costs and what error it leaves, told before anything is marched.
 
 Per variant, from the lowest modes, their size at the track, mass, speed, damping and the springs of contacts
-(`neglect`); errors are of displacement, as parts of the largest static value, over the whole motion. For a pinned
-beam, alpha = v/v_critical and mu = m/(rho A L), they are about (mechanics section 8)
+(`neglect`); errors are those of the worst sensor, as parts of its largest static value, over the whole motion. For
+displacement on a pinned beam, alpha = v/v_critical and mu = m/(rho A L), they are about (mechanics section 8)
 
     static                     alpha/(1 - alpha) + pi^2 mu alpha^2/3
     force                      2 alpha sin(min(pi/2, pi mu/(4 alpha))) + pi^2 mu alpha^2/3
@@ -11,6 +11,7 @@ beam, alpha = v/v_critical and mu = m/(rho A L), they are about (mechanics secti
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,15 +22,14 @@ from engine.carriages import BodyCarriage, OscillatorCarriage
 from engine.fidelity import needed_steps, round_up
 from engine.lanes import LaneValues
 from engine.model import SceneModel
-from engine.moving_load import Load
+from engine.moving_load import Load, noticed
 from engine.neglect import left_out
 from engine.resonance import spring_steps
+from engine.route import MODES, Route, routes
 from engine.ties import Inertia
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
-
-STILL = 1e-6  # of the largest static value: places that move less, such as supports, say nothing
 
 _INERTIA: dict[Fidelity, Inertia] = {  # of the models below a tied carriage, cheapest first
     Fidelity.STATIC: "force",
@@ -41,8 +41,7 @@ _INERTIA: dict[Fidelity, Inertia] = {  # of the models below a tied carriage, ch
 
 class Rung(NamedTuple):
     """A model of some variants: its cost in modes x steps over one passage or cycle (V,), and the error that it leaves
-    (V,), as a part of the largest static displacement; NaN where nobody can tell: nothing weighs anything, or a
-    carriage rides on what rides itself."""
+    (V,), as a part of the largest static value of the worst sensor; NaN where nobody can tell (`model_errors`)."""
 
     fidelity: Fidelity
     cost: Array
@@ -63,36 +62,35 @@ def ladder(model: SceneModel, values: LaneValues) -> tuple[Rung, ...]:
     return tuple(Rung(rung, _cost(model, values, rung), error) for rung, error in errors.items())
 
 
-def model_errors(model: SceneModel, values: LaneValues) -> dict[Fidelity, Array]:
-    """Estimated error (V,) of every model below the carriages' own, the worst of all displacements that are read."""
+def model_errors(model: SceneModel, values: LaneValues, most: int = MODES) -> dict[Fidelity, Array]:
+    """Estimated error (V,) of every model below the carriages' own, of the worst of all sensors.
+
+    most: how many of the lowest modes are looked at. Without sensors on a body, of the displacement under its loads.
+    NaN where nobody can tell: nothing weighs anything, a carriage rides on what rides itself, or a sensor has no static
+    value to compare with (velocity, acceleration, contact forces, what is read aboard a carriage).
+    """
+    return errors_along(model, routes(model, most), values)
+
+
+def errors_along(model: SceneModel, along: tuple[Route, ...] | None, values: LaneValues) -> dict[Fidelity, Array]:
+    """`model_errors` for one of many parts of the variants of a scene, whose `route.routes` are known."""
     rungs = [rung for rung in _INERTIA if rung < full_fidelity(model)]
-    riding = {carriage.rides for carriage in model.carriages}
-    if any(carriage.body in riding for carriage in model.carriages):  # what it rides is not held by itself
+    if along is None:
         return {rung: np.full(values.size, np.nan) for rung in rungs}
-    loads = [(n, *load) for n, carriage in enumerate(model.carriages) for load in carriage.loads]
-    follows = len(loads) > 1 or any(getattr(c.rider.motion, "after", 0.0) > 0.0 for c in model.carriages)
-    parts: dict[int, list[tuple[Load, dict[Fidelity, Array]]]] = {}
-    for number, rider, share in loads:
-        body = model.carriages[number].body
-        load = Load(model, values, number, rider, share, _places(model, body), follows)
-        parts.setdefault(body, []).append((load, left_out(load)))
-    return {rung: np.max([_relative(on_body, rung) for on_body in parts.values()], axis=0) for rung in rungs}
+    found: dict[Fidelity, list[Array]] = {rung: [] for rung in rungs}
+    for body in {route.tie.body for route in along}:
+        loads = [Load(route, values) for route in along if route.tie.body == body]
+        left = [left_out(load) for load in loads]
+        for rung in rungs:
+            found[rung].append(of_largest([(load, errors[rung]) for load, errors in zip(loads, left, strict=True)]))
+    return {rung: np.max(on_bodies, axis=0) for rung, on_bodies in found.items()}
 
 
-def _relative(loads: list[tuple[Load, dict[Fidelity, Array]]], rung: Fidelity) -> Array:
-    """(V,) what a model leaves out of all loads on a body, over the largest static value of any."""
-    error = np.sum([errors[rung] for _, errors in loads], axis=0)
-    scale = np.max([load.scale for load, _ in loads], axis=0)
+def of_largest(parts: Sequence[tuple[Load, Array]]) -> Array:
+    """(V,) errors (J, V) by all loads on a body together, of its worst sensor, as parts of what it reads."""
+    error = np.sum([errors for _, errors in parts], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(scale >= STILL * scale.max(axis=0), error / scale, 0.0)
-    return np.asarray(np.max(part, axis=0))
-
-
-def _places(model: SceneModel, body: int) -> tuple[float | None, ...]:
-    """Where displacement is read on a body: places of its track, m; else None, under the loads."""
-    sensors, name = model.study.sensor.values(), model.bodies[body].name
-    read = {s.at for s in sensors if s.quantity == "displacement" and s.body == name and s.at is not None}
-    return tuple(sorted(read)) or (None,)
+        return np.asarray(np.max(error / noticed([load for load, _ in parts]), axis=0))
 
 
 def _cost(model: SceneModel, values: LaneValues, rung: Fidelity) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from engine.bodies.modal import ModalBody
 from engine.carriages import BodyCarriage, OscillatorCarriage
 from engine.kernels.schemes import Scheme
 from engine.scene import Study
+from engine.settings import SPRUNG
 from engine.standing import Place, Standing, stand
 from engine.ties import CarriageTie, DamperTie, Grip, Inertia, SpringTie
 from engine.timeline import Rider
@@ -47,7 +49,8 @@ class BodyPart:
 @dataclass(frozen=True, eq=False)
 class SceneModel:
     """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
-    them. contacts: the ways of the contacts of bodies that ride."""
+    them. contacts: the ways of the contacts of bodies that ride. swept: keys of numbers that differ from variant to
+    variant."""
 
     study: Study
     bodies: tuple[BodyPart, ...]
@@ -55,6 +58,7 @@ class SceneModel:
     dampers: tuple[DamperTie, ...]
     springs: tuple[SpringTie, ...] = ()
     contacts: tuple[Rider, ...] = ()
+    swept: tuple[str, ...] = ()
 
     @property
     def ties(self) -> int:
@@ -191,9 +195,14 @@ def build_model(
     on_contacts = tuple(spring for stands in standing.values() for spring in stands.springs)
     springs = (*_springs(study, first, swept), *on_contacts)
     carried = tuple(standing[n].carried(tie) if n in standing else tie for n, tie in enumerate(carriages))
-    model = SceneModel(study, tuple(parts), carried, tuple(dampers), springs, contacts)
+    model = SceneModel(study, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
     _check_rigid_modes(model)
     return model
+
+
+def simplified(model: SceneModel, changes: Mapping[str, Any]) -> SceneModel:
+    """The same scene with other values at dotted keys of its study, such as fewer modes. Raises BadInput."""
+    return build_model(model.study.with_values(changes), *model.timing, model.swept)
 
 
 def check_moves(study: Study) -> None:
@@ -224,7 +233,7 @@ def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
 
 def _sprung(study: Study, name: str) -> bool:
     """Whether a carriage's spring acts; below the full fidelity it is locked."""
-    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity in ("auto", "static")
+    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity in SPRUNG
 
 
 def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bucket import Bucket
 from engine.contacts import contact_forces
+from engine.cycles import counts_sampled, reduced
 from engine.envelopes import MOST_KEPT, envelope_names
-from engine.histories import counts_reduced
+from engine.estimates import Estimator, Observed, pair_errors
+from engine.improving import improvements
 from engine.kernels.layout import (
     BELOW_AT,
     DIVERGED_AT,
@@ -22,17 +26,17 @@ from engine.kernels.layout import (
 from engine.lanes import LaneValues, padded, weights
 from engine.march import Marched
 from engine.model import SceneModel
-from engine.plan import Bucket, Plan
-from engine.reduction import Cycle
-from engine.resolution import RESOLVED, phase_errors
-from engine.richardson import march_chosen, relative_error
+from engine.moving_load import STILL
+from engine.plan import Plan, reads_accelerations
+from engine.richardson import march_chosen
+from engine.signals import silent
 from engine.tables import SceneTables
-from results_schema.parts import Rows
+from results_schema.parts import Rows, joined
 from results_schema.status import Fidelity, Status
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Flat = dict[str, NDArray[np.generic]]
+Flat = dict[str, NDArray[Any]]
 
 
 def run_chunk(
@@ -40,40 +44,56 @@ def run_chunk(
 ) -> tuple[Flat, Rows | None]:
     """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept.
 
+    Those that miss their tolerance are marched again with more modes or steps, where the study leaves these open.
     Raises Halted when ``halted`` says so between two segments.
     """
-    tables = bucket.tables
-    counts = np.zeros(0, dtype=np.int64)
-    if plan.reduction is not None:
-        counts = counts_reduced(tables.timeline, plan.reduction.stations)
-    values = plan.values(bucket, padded(variants))
-    marched, gap = march_chosen(tables, values, counts, variants.size, halted)
-    envelopes = _envelopes(bucket, values, variants.size, halted)
+    flat = _computed(plan, bucket, variants, halted)
+    improved, rows = np.zeros(variants.size, dtype=np.bool_), []
+    for finer, lanes in improvements(plan, bucket, variants, flat):
+        better, more = run_chunk(plan, finer, variants[lanes], halted)
+        better["relative_cost"] = better["relative_cost"] + flat["relative_cost"][lanes]
+        for name, array in flat.items():
+            array[lanes] = better[name]
+        improved[lanes] = True
+        rows.append(more)
+    rows.append(_histories(plan, bucket, variants[~improved], halted))
+    return flat, joined([part for part in rows if part is not None])
+
+
+def _computed(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool]) -> Flat:
+    """The results (V, ...) of some variants of a bucket with their errors."""
+    tables, size = bucket.tables, variants.size
+    counts = counts_sampled(plan, tables)
+    marched, gap = march_chosen(tables, plan.values(bucket, padded(variants)), counts, size, halted)
+    envelopes = _envelopes(bucket, plan.values(bucket, padded(variants)), size, halted)
     values = plan.values(bucket, variants)
+    own = reduced(plan, tables, values, counts, marched.history)
     flat: Flat = {
         **_extremes(tables, marched),
         **_contact_forces(tables, marched),
         **envelopes,
         **_statics(tables, values),
-        **_reduced(plan, tables, values, counts, marched.history),
+        **own,
     }
     status, diverged_step = _status(tables.model, marched)
-    if gap is not None:
-        resolved = phase_errors(tables, values) <= RESOLVED
-        status = np.where(resolved, status, np.maximum(status, Status.UNRESOLVED)).astype(np.int8)
-        flat["error_steps"] = np.where(resolved, _relative(tables, marched, gap, flat), np.nan)
+    scale = _scale(tables, values, flat)
+    missed = None if gap is None else pair_errors(tables, values, gap, scale)
+    observed = Observed(tables, counts, marched.history, own)
+    errors = Estimator(plan, bucket, variants, scale, halted).errors(observed, missed)
+    status = np.maximum(status, errors.status(plan.study, values, bucket.chosen))
+    flat |= {f"error_{part}": column for part, column in errors._asdict().items()} | {"error_estimate": errors.total}
+    flat["relative_cost"] = bucket.cost / bucket.full_cost[bucket.of(variants)]
     for name, array in flat.items():
         if array.dtype == np.float64:
             array[status >= Status.NOT_CONVERGED] = np.nan
         flat[name] = array
-    flat |= {
-        "status": status,
+    return flat | {
+        "status": status.astype(np.int8),
         "diverged_step": diverged_step,
-        "fidelity_used": np.full(variants.size, int(tables.model.fidelity), dtype=np.int8),
-        "modes_used": np.full(variants.size, tables.model.body_modes, dtype=np.int32),
-        "steps_used": np.full(variants.size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
+        "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
+        "modes_used": np.full(size, tables.model.body_modes, dtype=np.int32),
+        "steps_used": np.full(size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
     }
-    return flat, _histories(plan, bucket, variants, halted)
 
 
 def _rests(tables: SceneTables) -> bool:
@@ -191,31 +211,17 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
     return found
 
 
-def _relative(tables: SceneTables, marched: Marched, gap: Array, flat: Flat) -> Array:
-    """(V,) estimated errors of the sensors, the largest relative one."""
-    statics = [np.asarray(flat[f"{sensor.name}_static"], dtype=np.float64) for sensor in tables.sensors]
-    return relative_error(tables, marched, gap, np.stack(statics))
-
-
-def _reduced(plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts, history: Array) -> Flat:
-    """The study's own results from the cycle."""
-    if plan.reduction is None:
-        return {}
-    unit = tables.static_at(counts)
-    loads = weights(tables.model, values)
-    static = unit.gravity[:, :, None] * values.of("gravity")
-    for r in range(loads.shape[0]):
-        static = static + unit.force[:, :, r, None] * loads[r]
-    first, last = tables.timeline.window
-    cycle = Cycle(
-        phase=(counts - first) / (last - first),
-        position=tables.timeline.positions(0, counts.astype(np.float64)),
-        history=history,
-        static=static,
-        static_slope=tables.static_slope_at(counts)[:, :, None] * loads[0],
-        motion=tables.model.carriages[0].rider.motion,
-    )
-    return dict(plan.reduction(cycle))
+def _scale(tables: SceneTables, values: LaneValues, flat: Flat) -> Array:
+    """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body; of a rate its
+    own largest; infinite where nothing is but rounding."""
+    columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
+    for sensor, usual in zip(tables.sensors, tables.static_scales, strict=True):
+        static = np.asarray(flat[f"{sensor.name}_static"], dtype=np.float64)
+        own = np.maximum(*(np.abs(np.asarray(flat[f"{sensor.name}_{end}"])) for end in ("max", "min")))
+        columns.append(own if sensor.offset_order else np.maximum(static, STILL * usual * weight))
+    found = np.stack(columns, axis=1) if columns else np.zeros((tables.model.ties, 0))
+    found[:, silent(tables.model, tables.sensors)] = np.inf
+    return np.where(found > 0.0, found, np.inf)
 
 
 def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool]) -> Rows | None:
@@ -223,7 +229,7 @@ def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[]
     kept = np.intersect1d(variants, plan.shown)
     if kept.size == 0:
         return None
-    tables = bucket.tables.with_accelerations if plan.reads_accelerations else bucket.tables
+    tables = bucket.tables.with_accelerations if reads_accelerations(plan.study) else bucket.tables
     counts = plan.counts_shown(bucket)
     values = plan.values(bucket, padded(kept))
     marched, _ = march_chosen(tables, values, counts, kept.size, halted)

@@ -9,34 +9,45 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.envelopes import EnvelopeTables, check_places, envelope_tables, places_read
-from engine.fidelity import Needs, check_even_steps, check_most_steps, needed_steps, round_up
+from engine.bodies.body import MAX_MODES
+from engine.bucket import Bucket
+from engine.checking import can_be_halved
+from engine.choice import Choice, automatic_bodies, choose, with_choice
+from engine.envelopes import check_places, places_read
+from engine.fidelity import (
+    Needs,
+    allow_any_steps,
+    check_even_steps,
+    check_most_steps,
+    needed_steps,
+    round_up,
+    safe_steps,
+)
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES, MARKS
 from engine.lanes import LANE_KEYS, LaneValues
-from engine.model import SceneModel, build_model, check_moves
+from engine.model import SceneModel, build_model, check_moves, simplified
 from engine.reduction import Reduction
 from engine.resolution import steps_to_resolve
 from engine.resonance import check_steps, spring_steps
 from engine.scene import Study
 from engine.sweep import Cases, expand
-from engine.tables import KEPT_BYTES, STATIC_STATIONS, SceneTables
-from engine.timeline import Window
+from engine.tables import KEPT_BYTES, SceneTables
+from engine.timeline import Window, coarsened
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import declarations
 
+Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
+Reasons = Callable[[Counts], str]
 
-PACE = 1.2e9  # modes x steps x variants per second and thread, for expected times only
-PAIR = 2.5  # times the work of one march: a Richardson pair, 1.5 of it by its steps; for expected times only
-PLACE, PLACE_MODES = 0.2, 8.0  # an envelope's place costs as that part of a march with so many more modes; likewise
-PAIR_PLACES = 2.5  # times that much again in a Richardson pair, whose histories of all places are made; likewise
 START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
@@ -48,50 +59,8 @@ MOST_MARK_BYTES = 32 * 2**20  # of one chunk's extremes along bodies
 MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
 STATIC_STEPS = 800  # stations of statics over one passage or cycle
+FULL_MODES = 20  # of the full model that costs are compared with
 SHOWN = 64  # variants whose histories are kept by default
-
-
-@dataclass(frozen=True, eq=False)
-class Bucket:
-    """Variants that share a scene and a step count; ``reason`` says which rule asked for that many."""
-
-    tables: SceneTables
-    variants: Counts
-    reason: str
-
-    @property
-    def scene(self) -> SceneModel:
-        """The shared scene."""
-        return self.tables.model
-
-    @property
-    def steps(self) -> int:
-        """Steps over one passage or cycle."""
-        return self.tables.steps
-
-    @cached_property
-    def envelopes(self) -> tuple[EnvelopeTables, ...]:
-        """The tables of the marches that watch the envelopes."""
-        return envelope_tables(self.tables)
-
-    @property
-    def seconds_per_variant(self) -> float:
-        """Expected time on one thread."""
-        if self.scene.fidelity is Fidelity.STATIC:
-            return 1e-9 * STATIC_STATIONS * len(self.tables.signals)
-        signals = 1.0 + 0.1 * len(self.tables.signals)
-        ties = self.scene.ties**1.2
-        marches, more = (1.0, 1.0) if self.scene.scheme.stride == 1 else (PAIR, PAIR_PLACES)
-        modes = self.scene.omega.size
-        work = modes * signals * ties
-        for part in self.envelopes:
-            work += modes * ties + (modes + PLACE_MODES) * PLACE * more * len(part.places) * (1.0 + 0.7 * (ties - 1.0))
-        return float(work * self.tables.timeline.steps * marches / PACE)
-
-    def forget(self) -> None:
-        """Drop the tables, when no chunk needs them any more."""
-        for tables in (self.tables, *self.envelopes):
-            tables.forget()
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +97,6 @@ class Plan:
         """Expected time of the march on one thread."""
         return float(sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets))
 
-    @cached_property
-    def reads_accelerations(self) -> bool:
-        """Whether the kind of study keeps the accelerations of the carriages."""
-        names = {variable.name for variable in declarations(self.study.kind)}
-        return "{carriage}_acceleration_across" in names
-
     def total_seconds(self, threads: int) -> float:
         """Expected wall time of a run: the march in whole blocks, tables and chunks, and starting up."""
         found = START_SECONDS
@@ -148,8 +111,9 @@ class Plan:
         return found
 
     def counts_shown(self, bucket: Bucket) -> Counts:
-        """Stations of the kept histories of a bucket, by their count."""
-        return counts_shown(bucket.tables.timeline, self.window, self.study.output.histories)
+        """Stations of the kept histories of a bucket, by their count; steps that were added give none."""
+        timeline = coarsened(bucket.tables.timeline, bucket.added)
+        return bucket.added * counts_shown(timeline, self.window, self.study.output.histories)
 
     @cached_property
     def stations_shown(self) -> int:
@@ -191,7 +155,7 @@ class Plan:
             lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
         watched = max(len(tables.signals) for tables in (bucket.tables, *bucket.envelopes))
         lanes = min(lanes, MOST_MARK_BYTES / (8 * MARKS * watched))
-        if bucket.tables.refinement > 1:  # a pair has all histories of a segment in memory
+        if bucket.scene.scheme.stride > 1:  # a pair has all histories of a segment in memory
             stations = 1.5 * max(segment.steps for segment in bucket.tables.timeline.segments)
             lanes = min(lanes, MOST_PAIR_BYTES / (8 * stations * watched))
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
@@ -223,16 +187,37 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     check_moves(study)
     cases = expand(study)
     check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction), reduction)
-    window: Window = "whole" if reduction is None else "last-cycle"
+    asked = _Asked("whole" if reduction is None else "last-cycle", check_steps, _least(study, reduction))
     buckets = tuple(
         bucket
         for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64))
-        for bucket in _buckets(scene, cases, variants, window, check_steps)
+        for bucket in _buckets(scene, cases, variants, asked)
     )
     check_places(study, (bucket.scene for bucket in buckets))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
     check_memory(study, plan.size, plan.disk_bytes, reduction)
     return plan
+
+
+class _Asked(NamedTuple):
+    """What a plan is asked besides its study: what is recorded, which fixed steps are refused, and the lowest model
+    that tells what the study reports."""
+
+    window: Window
+    check_steps: CheckSteps
+    least: Fidelity
+
+
+def _least(study: Study, reduction: Reduction | None) -> Fidelity:
+    """Statics have no accelerations, and no result that only motion makes."""
+    if reads_accelerations(study):
+        return Fidelity.FORCE
+    return Fidelity.STATIC if reduction is None else reduction.least_fidelity
+
+
+def reads_accelerations(study: Study) -> bool:
+    """Whether the kind of study keeps the accelerations of the carriages."""
+    return "{carriage}_acceleration_across" in {variable.name for variable in declarations(study.kind)}
 
 
 def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
@@ -316,39 +301,78 @@ def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
     yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)
 
 
-def _buckets(
-    scene: SceneModel, cases: Cases, variants: Counts, window: Window, check_steps: CheckSteps
-) -> Iterator[Bucket]:
-    """Variants of one scene by their step counts."""
-    values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
-    steps, reasons = steps_of(scene, values, check_steps)
-    pace = values.time_scale(scene.carriages[0].name)  # variants of like pace rise and fall together: fewer extremes
-    for part in _split(np.arange(variants.size), steps):
-        tables = SceneTables(scene, int(steps[part[0]]), window, refinement=scene.scheme.stride)
-        _check_readings(scene, tables)
-        yield Bucket(tables, variants[part[np.argsort(pace[part], kind="stable")]], reasons(part))
+def _buckets(scene: SceneModel, cases: Cases, variants: Counts, asked: _Asked) -> Iterator[Bucket]:
+    """Variants of one scene by their model, modes and step counts."""
+    columns = cases.columns_of(variants)
+    told = choose(scene, LaneValues(scene.study, columns, variants.size), asked.least, asked.window)
+    full_cost = _full_cost(scene, LaneValues(scene.study, columns, variants.size))
+    chosen = automatic_bodies(scene)
+    for own in _split(np.arange(variants.size), (told.fidelity * (MAX_MODES + 1) + told.modes).astype(np.int64)):
+        model = with_choice(scene, Fidelity(int(told.fidelity[own[0]])), int(told.modes[own[0]]))
+        values = LaneValues(model.study, cases.columns_of(variants[own]), own.size)
+        steps, reasons = _chosen_steps(model, values, told.of(own), asked.check_steps)
+        pace = values.time_scale(scene.carriages[0].name)  # of like pace they rise and fall together: fewer extremes
+        fixed = fixed_steps(model.study, values)
+        halved = can_be_halved(model, values, steps) if fixed else np.ones(own.size, dtype=np.bool_)
+        for part in _split(np.arange(own.size), 2 * steps + halved):
+            lanes = own[part[np.argsort(pace[part], kind="stable")]]
+            stride = model.scheme.stride if fixed else max(2, model.scheme.stride)  # all segments can be halved
+            tables = SceneTables(model, int(steps[part[0]]), asked.window, refinement=stride)
+            _check_readings(model, tables)
+            even = all(segment.steps % 2 == 0 for segment in tables.timeline.segments)
+            compared: Literal["half", "twice"] = "half" if halved[part[0]] and even else "twice"
+            yield Bucket(tables, variants[lanes], reasons(part), told.of(lanes), full_cost[lanes], chosen, compared)
 
 
-def steps_of(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Callable[[Counts], str]]:
-    """Steps of every variant over a passage or cycle, and what says why some of them need so many."""
+def fixed_steps(study: Study, values: LaneValues) -> bool:
+    """Whether the study says how many steps."""
+    return study.solver.steps != "auto" or "solver.steps" in values.columns
+
+
+def steps_of(
+    scene: SceneModel, values: LaneValues, check_steps: CheckSteps, wanted: Array | None = None
+) -> tuple[Counts, Reasons]:
+    """Steps of every variant over a passage or cycle where the tolerance does not choose them, and what says why some
+    of them need so many: the study, or rules of thumb. Raises BadInput.
+
+    wanted: (V,) in place of the number per first period that is taken where nothing is known.
+    """
     if scene.fidelity is Fidelity.STATIC:
         return np.full(values.size, STATIC_STEPS, dtype=np.int64), lambda part: "statics: nothing is marched"
-    time_scale = values.time_scale(scene.carriages[0].name)
-    if scene.study.solver.steps != "auto" or "solver.steps" in values.columns:
+    if fixed_steps(scene.study, values):
         steps = values.of("solver.steps").astype(np.int64)
         check_even_steps(scene, steps)
         check_most_steps(scene, steps)
         check_steps(scene, values, steps)
         return steps, lambda part: "as the study says"
-    distinct, inverse = np.unique(time_scale, return_inverse=True)
-    needs, own = needed_steps(scene, distinct), spring_steps(scene, values)
+    distinct, inverse = np.unique(values.time_scale(scene.carriages[0].name), return_inverse=True)
+    needs, own = needed_steps(scene, distinct).per_rule, spring_steps(scene, values)
+    if wanted is not None:
+        needs, own = safe_steps(scene, distinct), own | {"as wanted": wanted}
     if scene.scheme.stride > 1:
         own |= {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)}
-    if own:
-        needs = Needs({name: needed[inverse] for name, needed in needs.per_rule.items()} | own)
-        inverse = np.arange(values.size)
-    check_most_steps(scene, needs.total)
-    return round_up(needs.total)[inverse], lambda part: _reason(needs, inverse[part])
+    found = Needs({name: needed[inverse] for name, needed in needs.items()} | own)
+    check_most_steps(scene, found.total)
+    return round_up(found.total), lambda part: _reason(found, part)
+
+
+def _chosen_steps(
+    scene: SceneModel, values: LaneValues, told: Choice, check_steps: CheckSteps
+) -> tuple[Counts, Reasons]:
+    """Steps of every variant, chosen by its tolerance where the study leaves them open."""
+    if scene.fidelity is Fidelity.STATIC or scene.scheme.stride > 1 or fixed_steps(scene.study, values):
+        return steps_of(scene, values, check_steps)
+    check_most_steps(scene, told.steps)
+    return told.steps.astype(np.int64), lambda part: "rules for any march" if told.ruled[part].any() else "tolerance"
+
+
+def _full_cost(scene: SceneModel, values: LaneValues) -> Array:
+    """(V,) modes x steps of the carriages' own model with many modes and the steps that all its rules ask for."""
+    changes: dict[str, Any] = {f"body.{name}.modes": FULL_MODES for name in automatic_bodies(scene)}
+    full = simplified(scene, changes | {"solver.fidelity": "full", "solver.steps": "auto"})
+    columns = {path: column for path, column in values.columns.items() if path != "solver.steps"}
+    steps, _ = steps_of(full, LaneValues(full.study, columns, values.size), allow_any_steps)
+    return np.asarray(full.body_modes * steps, dtype=np.float64)
 
 
 def _check_static(scene: SceneModel, tables: SceneTables) -> None:

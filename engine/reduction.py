@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.lanes import LaneValues
 from engine.law import Motion
 from engine.scene import Study
+from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 
@@ -32,12 +34,37 @@ class Cycle:
     motion: Motion
 
 
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The results of V variants by two marches, by name. scale (V, J): the largest static value of every sensor.
+    values: the study's numbers in these variants."""
+
+    one: Mapping[str, NDArray[Any]]
+    other: Mapping[str, NDArray[Any]]
+    scale: Array
+    values: LaneValues
+
+    def gap(self, name: str) -> Array:
+        """|difference| of a result; 0 where neither has a number, NaN where only one has."""
+        one, other = (np.asarray(part[name], dtype=np.float64) for part in (self.one, self.other))
+        return np.where(np.isnan(one) & np.isnan(other), 0.0, np.abs(one - other))
+
+    def relative(self, gap: Array) -> Array:
+        """(V, J) a gap (V, J) in the sensors' units over the scale; NaN where that is 0 and the gap is not."""
+        flat = np.where(gap > 0.0, np.nan, gap)
+        return np.divide(gap, self.scale, out=flat, where=self.scale > 0.0)
+
+
 class Reduction(Protocol):
     """A study's results of one variant, from its cycle alone; called on chunks of variants."""
 
     @property
     def stations(self) -> int:
         """Stations per cycle that are wanted at least, where there are so many steps."""
+
+    @property
+    def least_fidelity(self) -> Fidelity:
+        """The lowest model that tells these results at all."""
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         """Names of the results with the dimensions beyond the variant."""
@@ -47,3 +74,7 @@ class Reduction(Protocol):
 
     def __call__(self, cycle: Cycle) -> dict[str, Array]:
         """The results, each (V, ...)."""
+
+    def differences(self, compared: Compared) -> Mapping[str, Array]:
+        """How far two answers are apart, in the unit of the tolerance, (V, J) by the result's name; NaN where only one
+        of them is a number."""

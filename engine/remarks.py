@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bucket import Bucket
 from engine.lanes import LaneValues, moving_mass, weight
-from engine.plan import Bucket, Plan
+from engine.plan import Plan
 
 Array = NDArray[np.float64]
 

@@ -55,16 +55,19 @@ def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) ->
     return np.asarray(stiffness * (1.0 / values.of(f"{spring.key}.mass") + contact))
 
 
-def spring_steps(model: SceneModel, values: LaneValues) -> dict[str, Array]:
-    """Steps (V,) per unit of scene time that the springs ask for, by rule; empty without any."""
+def spring_steps(
+    model: SceneModel, values: LaneValues, per_period: float | Array = STEPS_PER_PERIOD, finer: float = 1.0
+) -> dict[str, Array]:
+    """Steps (V,) per unit of scene time that the springs ask for, by rule; empty without any.
+
+    per_period: of a sprung mass. finer: times the steps that the scheme's limit asks for.
+    """
     if not model.springs:
         return {}
     check_free_vibration(model)
     turns = values.time_scale(model.carriages[0].name) / (2.0 * math.pi)
     rules = (
-        {}
-        if not model.sprung
-        else {f"{STEPS_PER_PERIOD} per period of a sprung mass": STEPS_PER_PERIOD * turns * bounce_omega(model, values)}
+        {} if not model.sprung else {"the period of a sprung mass": per_period * turns * bounce_omega(model, values)}
     )
     rules |= {
         f"{STEPS_PER_CONTACT_PERIOD} per period of a contact resonance": STEPS_PER_CONTACT_PERIOD
@@ -72,7 +75,7 @@ def spring_steps(model: SceneModel, values: LaneValues) -> dict[str, Array]:
         * contact_omega(model, values),
     }
     if math.isfinite(model.scheme.stability_limit):
-        rules["the scheme's stability limit with springs"] = LIMIT_MARGIN * _least_for_limit(model, values)
+        rules["the scheme's stability limit with springs"] = finer * LIMIT_MARGIN * _least_for_limit(model, values)
     return {name: model.scheme.stride * steps for name, steps in rules.items()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,8 @@ from engine.moving_load import Load
 Array = NDArray[np.float64]
 
 LASTS = 3.0  # over zeta omega: ringing that is older has gone
-THINNED = 32  # stations of a way at which decaying parts are looked at
+LEAST_GAIN = 1.2  # of a harmonic that counts as near resonance
+THINNED = 16  # stations of a way at which decaying parts are looked at
 
 
 class Ringing(NamedTuple):
@@ -28,33 +29,51 @@ class Ringing(NamedTuple):
     struck: Array
 
 
+class _Rung(NamedTuple):
+    """Ringing (K, V) with a mass, with what instant turns strike through the slope of the track and without; and of a
+    force alone."""
+
+    struck: Array
+    smooth: Array
+    light: Array
+
+
 def rings(load: Load, shift: Array) -> Ringing:
     """What rings while anything is recorded; shift (K, V): of the frequency, by the mass."""
+    lower = load.angle * (1.0 - shift)
+    bare, heavy = _repeated(load, load.angle, lower)
     here = [event for event in load.shaken.once if not event.gone]
-    bare, heavy = _repeated(load, load.angle), _repeated(load, load.angle * (1.0 - shift))
-    again, none = load.shaken.again, np.zeros_like(load.mass)
-    force = _after(load, here, none, 1.0) + _after(load, again, none, 1.0) * bare
-    mass = _after(load, here, load.mass, 1.0) + _after(load, again, load.mass, 1.0) * heavy
-    alike = _after(load, here, load.mass, 1.0) + _after(load, again, load.mass, 1.0) * bare
-    smooth = _after(load, here, load.mass, 0.0) + _after(load, again, load.mass, 0.0) * bare
-    driven = _driven(load, load.angle), _driven(load, load.angle * (1.0 - shift))
-    whole = mass if len(here) == len(load.shaken.once) else _after(load, load.shaken.once, load.mass, 1.0)
+    first, each = _left(load, _after(load, here)), _after(load, load.shaken.again)
+    light, mass = first.light + each.light * bare, first.struck + each.struck * heavy
+    alike, smooth = first.struck + each.struck * bare, first.smooth + each.smooth * bare
+    gone = len(here) < len(load.shaken.once)
+    whole = np.maximum(mass, _after(load, load.shaken.once).struck) if gone else mass
+    with_mass = _driven(load, lower)
     return Ringing(
-        np.maximum(force, driven[0]),
-        np.maximum(mass, driven[1]),
-        np.maximum(np.maximum(mass, whole), driven[1]),
-        np.maximum(alike - force, 0.0),
-        np.maximum(alike - smooth, 0.0),
+        np.maximum(light, _driven(load, load.angle)),
+        np.maximum(mass, with_mass),
+        np.maximum(whole, with_mass),
+        np.maximum(alike - light, 0.0),
+        alike - smooth,
     )
+
+
+def _left(load: Load, first: _Rung) -> _Rung:
+    """What is left of the start's ringing in what is recorded."""
+    if load.route.window == "whole":
+        return first
+    part = np.exp(-load.fading * (load.shaken.duration * (load.shaken.cycles - 1)))
+    return _Rung(*(part * size for size in first))
 
 
 def drift(load: Load, shift: Array) -> Array:
     """Largest e^(-zeta x) 2 sin(shift x/2) to the end: how far two ringings drift apart whose frequencies differ by
     a part of themselves."""
+    turns = load.angle * (load.shaken.duration * load.shaken.cycles)
     with np.errstate(divide="ignore", invalid="ignore"):
-        best = np.where(shift > 0.0, 2.0 * np.arctan2(shift, 2.0 * load.zeta) / shift, 0.0)
-    x = np.minimum(load.angle * load.shaken.duration * load.shaken.cycles, best)
-    return np.asarray(np.exp(-load.zeta * x) * 2.0 * np.sin(np.minimum(0.5 * shift * x, 0.5 * np.pi)))
+        best = np.where(shift > 0.0, np.arctan(0.5 * shift / load.zeta) / (0.5 * shift), 0.0)
+    x = np.minimum(turns, best)
+    return np.asarray(np.exp(-load.zeta * x) * 2.0 * np.sin(0.5 * shift * x))
 
 
 def square_near_by(load: Load) -> Array:
@@ -63,20 +82,23 @@ def square_near_by(load: Load) -> Array:
     if load.shaken.again or not load.shaken.once:
         return np.asarray(square.mean(axis=0)[:, None] + np.zeros_like(load.angle))
     tau, first = np.linspace(0.0, length, len(square) + 1), load.shaken.once[0].tau
-    lasts = LASTS / np.maximum(load.zeta * load.angle, 1e-12)
-    window = np.maximum(np.minimum(lasts, length - first), 1e-12)
-    total = np.concatenate([np.zeros((1, len(load.modes))), np.cumsum(square, axis=0)]) * tau[1]
-    ends = [np.interp(first + part, tau, row) for part, row in zip(window, total.T, strict=True)]
+    lasts = LASTS / np.maximum(load.fading, 1e-12)
+    window = np.clip(lasts, 1e-12, max(length - first, 1e-12))
+    step, modes = length / len(square), np.arange(len(load.modes))
+    total = np.concatenate([np.zeros((1, modes.size)), np.cumsum(square, axis=0)]) * step
     starts = np.array([np.interp(first, tau, row) for row in total.T])
-    return np.asarray((np.array(ends) - starts[:, None]) / window)
+    place = np.minimum(first + window, length) / step
+    before = np.minimum(place.astype(np.int64), len(square) - 1)  # as np.interp does, which is slower
+    ends = total[before, modes[:, None]] + (place - before) * square[before, modes[:, None]] * step
+    return np.asarray((ends - starts[:, None]) / window)
 
 
 def lifted(load: Load) -> Array:
     """(V,) largest part by which ringing changes with the square root of 1 + m phi^2 from its event on, while it
     lasts; of the mode that moves most."""
-    leading = int(np.argmax(load.shaken.peaks[0] / load.omega[:, 0]))
+    leading = int(np.argmax(load.shaken.peaks[0] / load.route.omega[:, 0]))
     square, found = load.shaken.square[:: STATIONS // THINNED, leading], np.zeros_like(load.mass)
-    rate = 0.0 if load.shaken.again else load.zeta[leading] * load.angle[leading]
+    rate = 0.0 if load.shaken.again else load.fading[leading]
     for event in (*load.shaken.once, *load.shaken.again):
         before = 1.0 + load.mass * event.square[leading]
         for place, now in enumerate(square if not event.gone else ()):
@@ -86,33 +108,51 @@ def lifted(load: Load) -> Array:
     return found
 
 
-def _after(load: Load, events: Iterable[Event], mass: Array, impulse: float) -> Array:
-    """(K, V) largest ringing after some events, with a mass that rides; impulse: 1 if a turn at an instant strikes
-    through the slope of the track, m v w', else 0."""
-    found = largest = np.zeros_like(load.angle)
-    before = 0.0
+def _after(load: Load, events: Sequence[Event]) -> _Rung:
+    """Largest ringing after some events. A turn at an instant strikes through the slope of the track too, m v w'."""
+    none = np.zeros_like(load.angle)
+    found, largest, before = _Rung(none, none, none), _Rung(none, none, none), 0.0
     for event in events:
-        found = found * np.exp(-load.zeta * load.angle * (event.tau - before))
-        moves = mass * event.square[:, None]
-        swings = np.sqrt(1.0 + moves)
-        jump, slope, bend, change = event.jumps[:, :, None]
-        struck = 1.0 + impulse * float(event.tau > 0.0) * moves / (1.0 + moves)  # not where the motion begins
-        turned = np.minimum(change / load.angle * swings, event.turn[:, None])
-        slower = struck * (slope + turned) + bend / load.angle * swings
-        found = found + np.hypot(swings * jump, swings * slower / load.angle)
-        largest, before = np.maximum(largest, found), event.tau
+        if event.tau > before:
+            faded = np.exp(-load.fading * (event.tau - before))
+            found = _Rung(*(part * faded for part in found))
+        found = _Rung(*(part + more for part, more in zip(found, _struck(load, event), strict=True)))
+        largest = _Rung(*(np.maximum(part, now) for part, now in zip(largest, found, strict=True)))
+        before = event.tau
     return largest
 
 
-def _repeated(load: Load, angle: Array) -> Array:
+def _struck(load: Load, event: Event) -> _Rung:
+    """What one event sets ringing."""
+    moves = load.mass * event.square[:, None]
+    jump, slope, bend, change = event.jumps[:, :, None]
+    bent, slower, swings = bend / load.angle, slope, np.sqrt(1.0 + moves)
+    light = _length(jump, (slope + bent) / load.angle)
+    if change.any():
+        turned = change / load.angle
+        light = _length(jump, (slope + np.minimum(turned, event.turn[:, None]) + bent) / load.angle)
+        slower = slope + np.minimum(turned * swings, event.turn[:, None])
+    struck = smooth = swings * _length(jump, (slower + bent * swings) / load.angle)
+    if event.tau > 0.0:  # not where the motion begins
+        struck = swings * _length(jump, ((1.0 + moves / (1.0 + moves)) * slower + bent * swings) / load.angle)
+    return _Rung(struck, smooth, light)
+
+
+def _length(one: Array, other: Array) -> Array:
+    """Square root of the sum of squares; `numpy.hypot` takes ten times as long."""
+    return np.sqrt(one**2 + other**2) if one.any() else other
+
+
+def _repeated(load: Load, *angles: Array) -> list[Array]:
     """(K, V) ringing after all cycles over that after one: |1 - z^n|/|1 - z| of what a cycle leaves of it, z."""
     cycles = load.shaken.cycles
     if cycles == 1:
-        return np.ones_like(angle)
-    fade = np.exp(-load.zeta * load.angle)
-    top = (1.0 - fade**cycles) ** 2 + 4.0 * fade**cycles * np.sin(0.5 * cycles * angle) ** 2
-    low = (1.0 - fade) ** 2 + 4.0 * fade * np.sin(0.5 * angle) ** 2
-    return np.asarray(np.clip(np.sqrt(top / np.maximum(low, 1e-30)), 1.0, cycles))
+        return [np.ones_like(angle) for angle in angles]
+    fade, faded = np.exp(-load.fading), np.exp(-cycles * load.fading)
+    tops = ((1.0 - faded) ** 2 + 4.0 * faded * np.sin(0.5 * cycles * angle) ** 2 for angle in angles)
+    lows = ((1.0 - fade) ** 2 + 4.0 * fade * np.sin(0.5 * angle) ** 2 for angle in angles)
+    parts = zip(tops, lows, strict=True)
+    return [np.clip(np.sqrt(top / np.maximum(low, 1e-30)), 1.0, cycles) for top, low in parts]
 
 
 def _driven(load: Load, angle: Array) -> Array:
@@ -122,11 +162,21 @@ def _driven(load: Load, angle: Array) -> Array:
 
 def resonant(load: Load, harmonics: Array, angle: Array, lag: Array) -> Array:
     """What oscillators that turn by an angle per cycle, with a lag of twice their damping ratios, add over all
-    cycles to the second derivatives by tau of harmonics (H, K) or (H,)."""
-    found = np.zeros_like(angle)
+    cycles to the second derivatives by tau of harmonics (H, K) or (H,): of each the gain beyond LEAST_GAIN, as less is
+    part of what follows the drive."""
+    low, high = (1.0 / np.sqrt(1.0 - side / LEAST_GAIN) for side in (-1.0, 1.0))
+    order = np.flatnonzero(angle < high * 2.0 * np.pi * len(harmonics))
+    order = order[np.argsort(angle.ravel()[order])]  # so that what is near a harmonic is next to each other
+    turned, mode = angle.ravel()[order], order // angle.shape[-1]
+    lagging, grown = (lag.ravel()[order] / turned) ** 2, (2.0 / load.shaken.cycles / turned) ** 2
+    found = np.zeros_like(turned)
     for number, amplitude in enumerate(harmonics, start=1):
-        part = 2.0 * np.pi * number / angle
-        grown = (2.0 / (angle * load.shaken.cycles)) ** 2
-        gain = 1.0 / np.sqrt((1.0 - part**2) ** 2 + (lag * part) ** 2 + grown)
-        found = found + amplitude[..., None] * (2.0 * np.pi * number) ** 2 * np.maximum(gain - 1.0, 0.0)
-    return found
+        drive = 2.0 * np.pi * number
+        near = slice(*np.searchsorted(turned, (low * drive, high * drive)))
+        part = (drive / turned[near]) ** 2
+        gain = 1.0 / np.sqrt((1.0 - part) ** 2 + drive**2 * lagging[near] + grown[near])
+        size = np.atleast_1d(amplitude)[mode[near]] * drive**2
+        found[near] += size * np.maximum(gain - LEAST_GAIN, 0.0)
+    everywhere = np.zeros(angle.size)
+    everywhere[order] = found
+    return everywhere.reshape(angle.shape)

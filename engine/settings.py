@@ -19,7 +19,8 @@ PARAMETERS: Mapping[str, Mapping[str, str]] = {
     "hht-alpha": {"alpha": "-0.05, say, from -1/3 to 0"},
     "generalized-alpha": {"rho_inf": "0.8, say, from 0 to 1"},
 }
-FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective")
+FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "full")
+SPRUNG = ("auto", "static", "full")  # those that know the springs of carriages
 MAX_STEPS = 100_000_000
 
 SchemeName = Annotated[str, AfterValidator(one_of(*SCHEMES))]
@@ -32,7 +33,8 @@ class Solver(Spec):
     beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step). alpha: of "hht-alpha",
     rho_inf: of "generalized-alpha".
     steps: over one whole passage or one whole cycle. tolerance: wanted where something is "auto".
-    audit: number of variants that are run again with all terms, more modes and more steps; "auto" is none.
+    audit: number of variants that are run again with all terms, more modes and more steps; "auto" is 1 % of
+    them, 16 to 256, or fewer where that would take long.
     """
 
     scheme: SchemeName = "average-acceleration"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +18,8 @@ from engine.ways import Way
 Array = NDArray[np.float64]
 
 Signal = Sensor | ContactForce
+
+SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
 
 
 def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
@@ -83,3 +88,21 @@ def _stacked(rows: list[Array], modes: int) -> Array:
     for channel, row in enumerate(rows):
         found[:, channel, : row.shape[1]] = row
     return found
+
+
+def silent(model: SceneModel, sensors: Iterable[Sensor]) -> NDArray[np.bool_]:
+    """(J,) sensors where no mode of their body says anything, such as the deflection at a support: what they read is
+    rounding, and has no relative error."""
+    return np.array(
+        [type(sensor) is Sensor and sensor.under is None and _says_nothing(model, sensor) for sensor in sensors],
+        dtype=np.bool_,
+    )
+
+
+def _says_nothing(model: SceneModel, sensor: Sensor) -> bool:
+    places = np.linspace(0.0, model.bodies[sensor.body].modal.length, PLACES)
+    here, *elsewhere = (
+        max(float(np.abs(channel.rows).max()) for channel in replace(sensor, at=at).channels(model, ()))
+        for at in (sensor.at, *map(float, places))
+    )
+    return here <= SILENT * max(elsewhere)

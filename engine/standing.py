@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from engine.bodies.modal import ModalBody
 from engine.carriages import BodyCarriage, Contact
 from engine.scene import Study
+from engine.settings import SPRUNG
 from engine.ties import CarriageTie, Grip, SpringTie
 from engine.timeline import AT_END, Rider
 from results_schema.errors import BadInput
@@ -72,7 +73,7 @@ def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) 
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
         rigid = contact.stiffness == "rigid"
         springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
-    acting = tuple(springs) if study.solver.fidelity in ("auto", "static") else ()
+    acting = tuple(springs) if study.solver.fidelity in SPRUNG else ()
     return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -17,10 +18,10 @@ from engine.grips import residual
 from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
-from engine.readings import Sensor
+from engine.readings import OF_SECTIONS, Sensor
 from engine.signals import Signal, build_signals, tabulate_missed, tabulate_watch
 from engine.ties import Grip
-from engine.timeline import Segment, Timeline, Window, build_timeline, refined
+from engine.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.track import tabulate_ties
 from engine.ways import Way, ways
 
@@ -82,7 +83,17 @@ class SceneTables:
         if self.refinement > 1:
             free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
         steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
-        return build_timeline(self.model.riders, steps, self.window, free)
+        stops = self._kinks if self.window == "whole" else ()  # histories of cycles want equal steps
+        return build_timeline(self.model.riders, steps, self.window, free, stops)
+
+    @property
+    def _kinks(self) -> Iterator[float]:
+        """Scene times at which a load passes a sensor whose influence line has a kink there: steps must not miss it."""
+        for sensor in self.sensors:
+            if sensor.under is None and sensor.quantity in OF_SECTIONS:
+                for carriage in self.model.carriages:
+                    for rider, _ in carriage.loads if carriage.body == sensor.body else ():
+                        yield from self.model.riders[rider].passes(sensor.at)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -94,7 +105,9 @@ class SceneTables:
     @cached_property
     def with_accelerations(self) -> SceneTables:
         """The same with the accelerations of the carriages read."""
-        return SceneTables(self.model, self.steps, self.window, "accelerations", self.refinement)
+        found = SceneTables(self.model, self.steps, self.window, "accelerations", self.refinement)
+        found.timeline = self.timeline
+        return found
 
     @cached_property
     def coarser(self) -> SceneTables:
@@ -103,6 +116,17 @@ class SceneTables:
             raise ValueError(f"refinement: expected an even number, received {self.refinement}")
         found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
         found._unrefined = self._unrefined
+        return found
+
+    def with_steps(self, model: SceneModel, by: int) -> SceneTables:
+        """The sensors of the same way in ``by`` times as many steps, or -``by`` times fewer, of a model that may keep
+        other modes; all segments must have steps that can be divided so."""
+        if by > 0:
+            found = SceneTables(model, self.steps * by, self.window, self.readings, self.refinement * by)
+            found.timeline = refined(self.timeline, by)
+            return found
+        found = SceneTables(model, -(-self.steps // -by), self.window, self.readings)
+        found.timeline = coarsened(self.timeline, -by)
         return found
 
     @property

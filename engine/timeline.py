@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -27,6 +27,7 @@ Counts = NDArray[np.int64]
 Window = Literal["whole", "last-cycle"]
 
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
+PROBED = 4000  # places of a motion per unit of its own time, between which it passes another one once at most
 _SAME = 1e-12  # events closer than this part of the scene are one
 AT_END = 1e-9  # of the body's length: a contact beyond an end by no more touches it, for its offset is rounded
 
@@ -118,17 +119,30 @@ class Rider:
         """The motion's own times at which it passes an end of the body."""
         low, high = (end + self.offset for end in self.motion.range())
         beyond = ((0.0, low < -self._slack), (self.length, high > self.length + self._slack))
-        ends = [place for place, passed in beyond if passed]
-        if not ends:
-            return
-        from scipy.optimize import brentq
+        for place, passed in beyond:
+            if passed:
+                yield from _passes(self.motion, place - self.offset)
 
-        tau = np.linspace(0.0, self.motion.duration, 4001)
-        places = self.motion.path(tau).S + self.offset
-        for end in ends:
-            own = end - self.offset
-            for i in np.flatnonzero(np.diff(np.signbit(places - end))):
-                yield float(brentq(lambda t, e=own: float(self.motion.path(t).S) - e, tau[i], tau[i + 1], xtol=1e-15))
+    def passes(self, place: float) -> Iterator[float]:
+        """Scene times at which it passes a place of the body."""
+        for tau in _passes(self.motion, place - self.offset):
+            yield self.delay + tau / self.pace
+
+
+@lru_cache(maxsize=256)
+def _passes(motion: Motion, place: float) -> tuple[float, ...]:
+    """A motion's own times at which it passes a place."""
+    low, high = motion.range()
+    if not low < place < high:
+        return ()
+    from scipy.optimize import brentq
+
+    tau = np.linspace(0.0, motion.duration, PROBED * math.ceil(motion.duration) + 1)
+    beyond = np.signbit(motion.path(tau).S - place)
+    return tuple(
+        float(brentq(lambda t: float(motion.path(t).S) - place, tau[i], tau[i + 1], xtol=1e-15))
+        for i in np.flatnonzero(np.diff(beyond))
+    )
 
 
 class Strike(NamedTuple):
@@ -213,10 +227,13 @@ class Timeline:
         return self.motion(rider, counts).S
 
 
-def build_timeline(riders: tuple[Rider, ...], steps: int, window: Window, free_steps: int = 200) -> Timeline:
+def build_timeline(
+    riders: tuple[Rider, ...], steps: int, window: Window, free_steps: int = 200, stops: Iterable[float] = ()
+) -> Timeline:
     """Cut the scene at its events and spread the steps.
 
     steps: wanted per unit of scene time. window: what is recorded. free_steps: per first period of free vibration.
+    stops: further scene times that must be step boundaries, at which nothing happens.
 
     >>> bed = Cruise(kind="cruise", start=-1.0, end=3.0, speed=1.0)
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
@@ -226,9 +243,9 @@ def build_timeline(riders: tuple[Rider, ...], steps: int, window: Window, free_s
     end = max(rider.end for rider in riders)
     hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
     recorded = (0.0, end)
-    seams: list[float] = []
+    seams = list(stops)
     if leading.motion.period is not None:
-        seams = [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
+        seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
         if window == "last-cycle":
             recorded = (leading.end - leading.motion.period / leading.pace, leading.end)
     segments: list[Segment] = []
@@ -263,6 +280,15 @@ def refined(timeline: Timeline, by: int) -> Timeline:
     segments = tuple(s._replace(steps=s.steps * by, first=s.first * by) for s in timeline.segments)
     first, last = timeline.window
     return replace(timeline, segments=segments, window=(first * by, last * by))
+
+
+def coarsened(timeline: Timeline, by: int) -> Timeline:
+    """The same timeline with ``by`` steps in one; every segment must have a multiple of so many. Raises ValueError."""
+    if any(segment.steps % by for segment in timeline.segments):
+        raise ValueError(f"by: expected a divisor of all segments' steps, received {by}")
+    segments = tuple(s._replace(steps=s.steps // by, first=s.first // by) for s in timeline.segments)
+    first, last = timeline.window
+    return replace(timeline, segments=segments, window=(first // by, last // by))
 
 
 def _between(riders: tuple[Rider, ...], ends: tuple[float, float], steps: int, count: int) -> list[Segment]:

@@ -153,7 +153,7 @@ def unreduced_model(
     exact. paces, delays: as of `engine.model.build_model`. Raises BadInput for a body without a whole model, and for
     a fidelity other than "auto".
     """
-    if study.solver.fidelity != "auto":
+    if study.solver.fidelity not in ("auto", "full"):
         where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'
         raise BadInput("the unreduced model is a full one", where=where, expected='"auto"', received=received)
     used = {study.body_of(sensor) for sensor in study.sensor}

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bucket import Bucket
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues, weights
 from engine.model import SceneModel, build_model
-from engine.plan import Bucket, Plan
+from engine.plan import Plan
 from engine.richardson import march_chosen
 from engine.scene import Study
 from engine.tables import SceneTables

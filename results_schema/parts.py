@@ -7,7 +7,7 @@ parts were computed from), the parts, and the SHA-256 of each part. A part count
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +31,16 @@ class Rows(NamedTuple):
 
     variants: np.ndarray
     arrays: Mapping[str, np.ndarray]
+
+
+def joined(parts: Sequence[Rows]) -> Rows | None:
+    """Rows of different variants as one, ascending; None of none. All must have the same arrays."""
+    if not parts:
+        return None
+    variants = np.concatenate([part.variants for part in parts])
+    order = np.argsort(variants)
+    names = parts[0].arrays
+    return Rows(variants[order], {name: np.concatenate([p.arrays[name] for p in parts])[order] for name in names})
 
 
 class PartStore(RunFolder):

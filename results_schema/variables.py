@@ -38,7 +38,7 @@ _RESERVED_WORDS = """
     harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
-    tolerance_asked worst_result left_out
+    tolerance_asked worst_result left_out relative_cost
 """
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
@@ -230,30 +230,43 @@ declare(
     Variable(
         "error_estimate",
         long_name="estimated relative error",
-        meaning="largest over the sensors of the largest estimated error over time, divided by the largest static "
-        "value of that sensor (velocity and acceleration: by their own largest value)",
+        meaning="sum of the parts from steps, modes and model, each the largest over the sensors over time, divided by "
+        "the largest static value of that sensor (velocity and acceleration: by their own largest value); NaN where a "
+        "part is not known",
         required=False,
         nan_allowed=True,
-        planned=True,
     ),
     Variable(
         "error_steps",
         long_name="part of the estimated relative error that comes from the time step",
-        meaning="of the finer march of a Richardson pair: largest over the sensors of a third of the largest "
-        "difference of both marches over time, divided by the largest static value of that sensor (velocity and "
-        "acceleration: by their own largest value); NaN where a mode is not resolved",
+        meaning="from the largest difference to a march with half or twice the steps, over time and of what the study "
+        "makes of it",
         required=False,
         nan_allowed=True,
     ),
-    *(
-        Variable(
-            f"error_{source}",
-            long_name=f"part of the estimated relative error that comes from the {what}",
-            required=False,
-            nan_allowed=True,
-            planned=True,
-        )
-        for source, what in (("modes", "number of modes"), ("fidelity", "choice of model"))
+    Variable(
+        "error_modes",
+        long_name="part of the estimated relative error that comes from the number of modes",
+        meaning="from the largest difference between marches with all and with half the modes, over time and of what "
+        "the study makes of it; 0 for statics, which know all modes",
+        required=False,
+        nan_allowed=True,
+    ),
+    Variable(
+        "error_fidelity",
+        long_name="part of the estimated relative error that comes from the choice of model",
+        meaning="what the model leaves out of the carriages' own, told before it runs; 0 for their own",
+        required=False,
+        nan_allowed=True,
+    ),
+    Variable(
+        "relative_cost",
+        long_name="cost over that of the full model",
+        meaning="modes x steps of all marches of the variant, also those that it is compared with and first ones that "
+        "missed the tolerance, over those of the carriages' own model with 20 modes and the steps that all rules ask "
+        "for",
+        required=False,
+        nan_allowed=True,
     ),
 )
 
@@ -466,6 +479,15 @@ declare(
     _audited("worst_result", "result with the largest difference", "and its sensor", dtype="str"),
     _audited("modes_used", "number of modes of the audit", "", dtype="int32"),
     _audited("steps_used", "number of steps of the audit", "over one passage or cycle", dtype="int32"),
+    Variable(
+        "variant_status",
+        ("sample",),
+        "int8",
+        long_name="status of the variant",
+        meaning="that of the study: no tolerance is promised but to those that are ok",
+        flags=Status,
+        lead="none",
+    ),
     Variable(
         "left_out",
         (),

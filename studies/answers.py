@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from studies.choices import told_choices
 from studies.results import Results
 from studies.study import kind_named
 from studies.telling import told_envelopes
@@ -25,12 +26,13 @@ def figures(dataset: xr.Dataset) -> list[Figure]:
 
 
 def findings_of(results: Results) -> list[str]:
-    """What the kind of study finds, then what the envelopes say."""
-    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results)]
+    """What the kind of study finds, then what the envelopes say, then what every variant took."""
+    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results), *told_choices(results)]
 
 
 def figures_of(results: Results) -> list[Figure]:
-    """The figures of the kind of study, then the envelopes."""
-    from studies.pictures import envelopes
+    """The figures of the kind of study, then the envelopes, then what every variant took, cost and left out."""
+    from studies.pictures import choice, envelopes, estimates
 
-    return [*kind_named(results.study.kind).figures(results), *envelopes.pictures(results)]
+    own = kind_named(results.study.kind).figures(results)
+    return [*own, *envelopes.pictures(results), *choice.pictures(results), *estimates.pictures(results)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,15 @@ from results_schema.status import Status
 from results_schema.variables import axes, declarations
 from studies.measuring import Work, described
 from studies.results import Results
-from studies.words import counted
+from studies.words import counted, scientific
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from engine.audit import Sample
     from engine.lanes import LaneValues
     from engine.plan import Plan
+    from engine.reduction import Compared, Reduction
     from engine.scene import Study
 
 Array = NDArray[np.float64]
@@ -29,6 +31,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 GROUP = "/audit"
 EXTREMES = ("max", "min")
+AT_REST = 1e-9  # of what a sensor reads: statics of less are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,23 +49,12 @@ class Pair:
     silent: NDArray[np.bool_]
     values: LaneValues
 
-    def gap(self, name: str) -> Array:
-        """|difference| of a result; 0 where neither has a number, NaN where only one has."""
-        one, other = (np.asarray(part[name], dtype=np.float64) for part in (self.reported, self.again))
-        return np.where(np.isnan(one) & np.isnan(other), 0.0, np.abs(one - other))
+    @property
+    def compared(self) -> Compared:
+        """Both, as the study's reduction compares them."""
+        from engine.reduction import Compared
 
-    def relative(self, gap: Array) -> Array:
-        """(n, J) a gap (n, J) in the sensors' units over the scale; NaN where that is 0 and the gap is not."""
-        flat = np.where(gap > 0.0, np.nan, gap)
-        return np.divide(gap, self.scale, out=flat, where=self.scale > 0.0)
-
-
-@runtime_checkable
-class Audited(Protocol):
-    """A kind of study with results besides extremes that an audit compares."""
-
-    def differences(self, pair: Pair) -> Mapping[str, Array]:
-        """Relative differences (n, J) by the result's name; NaN where they are unknown."""
+        return Compared(self.reported, self.again, self.scale, self.values)
 
 
 class Again:
@@ -88,28 +80,31 @@ def refuse_audit(study: Study) -> None:
         raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
 
 
-def planned_audit(plan: Plan) -> Plan | None:
-    """How the study is to be audited, if it is. Raises BadInput."""
-    from engine.audit import audit_plan, audited
+def planned_audit(plan: Plan) -> Sample | None:
+    """The variants that are to be audited, if any are. Raises BadInput."""
+    from engine.audit import sampled
 
-    variants = audited(plan)
-    return audit_plan(plan, variants) if variants.size else None
+    sample = sampled(plan)
+    return sample if sample.variants.size else None
 
 
-def audit_group(plan: Plan, finer: Plan | None, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
+def audit_group(plan: Plan, sample: Sample | None, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
     """The group of an archive by its path; {} where nothing is audited, or no audited variant has values.
 
-    finer: of `planned_audit`. dataset: the study's own. Raises Interrupted.
+    sample: of `planned_audit`. dataset: the study's own. Raises Interrupted.
     """
+    if sample is None:
+        return {}
+    from engine.audit import Used, audit_plan
+
+    used = Used(*(_flat(plan, dataset, name, np.arange(plan.size)) for name in ("modes_used", "steps_used")))
+    kept = _flat(plan, dataset, "status", sample.variants) < int(Status.NOT_CONVERGED)
+    finer = audit_plan(plan, sample._replace(variants=sample.variants[kept]), used)
     if finer is None:
         return {}
     picked = np.sort(np.concatenate([bucket.variants for bucket in finer.buckets]))
-    kept = picked[_flat(plan, dataset, "status", picked) < int(Status.NOT_CONVERGED)]
-    if not kept.size:
-        return {}
-    again = {name: array[np.isin(picked, kept)] for name, array in _march(finer, picked, work).items()}
-    pair = _pair(plan, dataset, kept, again, _silent(finer, picked)[np.isin(picked, kept)])
-    return {GROUP: _dataset(plan, dataset, kept, pair, picked.size - kept.size)}
+    pair = _pair(plan, dataset, picked, _march(finer, picked, work), _silent(finer, picked))
+    return {GROUP: _dataset(plan, dataset, picked, pair, int(np.count_nonzero(~kept)))}
 
 
 def _march(finer: Plan, variants: Counts, work: Work) -> dict[str, NDArray[Any]]:
@@ -133,7 +128,7 @@ def _flat(plan: Plan, dataset: xr.Dataset, name: str, variants: Counts) -> NDArr
 
 def _silent(finer: Plan, variants: Counts) -> NDArray[np.bool_]:
     """(n, J) sensors that read but rounding."""
-    from engine.audit import silent
+    from engine.signals import silent
 
     found = np.zeros((variants.size, len(finer.study.sensor)), dtype=np.bool_)
     for bucket in finer.buckets:
@@ -152,31 +147,30 @@ def _pair(plan: Plan, dataset: xr.Dataset, variants: Counts, again: Arrays, sile
 
 
 def _scale(sensors: Iterable[str], again: Arrays) -> Array:
-    """(n, J) the largest static value of every sensor; of one without any, velocity and acceleration, its own."""
+    """(n, J) the largest static value of every sensor; of one that statics leave at rest, but for rounding, its own."""
     columns = []
     for name in sensors:
         static = np.asarray(again[f"{name}_static"], dtype=np.float64)
         own = np.maximum(*(np.abs(again[f"{name}_{end}"]) for end in EXTREMES))
-        columns.append(np.where(static > 0.0, static, own))
+        columns.append(np.where(static > AT_REST * own, static, own))
     return np.stack(columns, axis=1)
 
 
-def _differences(pair: Pair, kind: object) -> dict[str, Array]:
-    """(n, J) by the names of results: extremes of all sensors, and what the kind of study adds."""
+def _differences(pair: Pair, reduction: Reduction | None) -> dict[str, Array]:
+    """(n, J) by the names of results: extremes of all sensors, and what the kind of study makes of its cycles."""
+    compared = pair.compared
     found = {
-        end: pair.relative(np.stack([pair.gap(f"{sensor}_{end}") for sensor in pair.sensors], axis=1))
+        end: compared.relative(np.stack([compared.gap(f"{sensor}_{end}") for sensor in pair.sensors], axis=1))
         for end in EXTREMES
     }
-    found |= dict(kind.differences(pair)) if isinstance(kind, Audited) else {}
+    found |= {} if reduction is None else dict(reduction.differences(compared))
     return {name: np.where(pair.silent, 0.0, gaps) for name, gaps in found.items()}
 
 
 def _dataset(plan: Plan, dataset: xr.Dataset, variants: Counts, pair: Pair, left_out: int) -> xr.Dataset:
     import xarray as xr
 
-    from studies.study import kind_named
-
-    found = _differences(pair, kind_named(plan.study.kind))
+    found = _differences(pair, plan.reduction)
     gaps = np.stack(list(found.values()), axis=1).reshape(variants.size, -1)  # results, then sensors
     names = [_named(name, sensor) for name in found for sensor in pair.sensors]
     known = pair.again["status"] < int(Status.NOT_CONVERGED)
@@ -187,6 +181,7 @@ def _dataset(plan: Plan, dataset: xr.Dataset, variants: Counts, pair: Pair, left
         "worst_result": np.array([names[place] for place in np.nan_to_num(gaps).argmax(axis=1)]),
         "modes_used": pair.again["modes_used"],
         "steps_used": pair.again["steps_used"],
+        "variant_status": _flat(plan, dataset, "status", variants),
         "left_out": np.array(left_out),
     }
     declared = {variable.name: variable for variable in declarations(GROUP)}
@@ -213,11 +208,12 @@ def _estimated(plan: Plan, dataset: xr.Dataset, variants: Counts) -> Array:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What an audit found.
+    """What an audit found among the variants that the archive calls ok.
 
     asked: the tolerance, the smallest where it varies. worst: the largest observed error beside its tolerance, NaN
     where none is known; place: its number in the group. missed: variants beyond their tolerance. unknown: those
-    without a number.
+    without a number. marked: variants to which the archive itself gives another status than ok, and so no promise;
+    marked_worst: the largest observed error among them, NaN where none is known.
     """
 
     count: int
@@ -227,26 +223,31 @@ class Verdict:
     place: int
     missed: int
     unknown: int
+    marked: int
+    marked_worst: float
 
     @property
     def held(self) -> bool:
-        """Whether every audited variant is known to be within its tolerance."""
+        """Whether every audited variant that the archive calls ok is known to be within its tolerance."""
         return not (self.missed or self.unknown)
 
     @classmethod
     def of(cls, group: xr.Dataset) -> Verdict:
         """The verdict of the archive's group."""
         observed, tolerance = (np.asarray(group[name].values) for name in ("observed_error", "tolerance_asked"))
+        ours = np.asarray(group["variant_status"].values) == int(Status.OK)
         known = np.isfinite(observed)
-        place = int(np.argmax(np.where(known, observed / tolerance, -1.0)))
+        place = int(np.argmax(np.where(known & ours, observed / tolerance, -1.0)))
         return cls(
-            count=observed.size,
+            count=int(np.count_nonzero(ours)),
             left_out=int(group["left_out"]),
             asked=float(tolerance.min()),
-            worst=float(observed[place]),
+            worst=float(observed[place]) if ours[place] else np.nan,
             place=place,
-            missed=int(np.count_nonzero(observed[known] > tolerance[known])),
-            unknown=int(np.count_nonzero(~known)),
+            missed=int(np.count_nonzero(observed[known & ours] > tolerance[known & ours])),
+            unknown=int(np.count_nonzero(~known & ours)),
+            marked=int(np.count_nonzero(~ours)),
+            marked_worst=float(observed[known & ~ours].max(initial=-1.0)) if (known & ~ours).any() else np.nan,
         )
 
 
@@ -255,31 +256,28 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     if group is None:
         return []
     verdict = Verdict.of(group)
-    said = f"asked {_error(verdict.asked)}, audit of {counted(verdict.count, 'variant')} found "
-    if np.isfinite(verdict.worst):
-        at = results.at(results.index_of(int(group["sample"].values[verdict.place])))
-        result = str(group["worst_result"].values[verdict.place])
-        said += f"at most {_error(verdict.worst)}, worst{f' at {at}' if at else ''} ({result})"
-    else:
-        said += "no number to compare"
-    told = [said]
-    if verdict.left_out:
-        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit had no values")
+    told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:
         told.append(f"the tolerance was not held: {verdict.missed} of {counted(verdict.count, 'variant')} missed it")
     if verdict.unknown:
         told.append(f"{counted(verdict.unknown, 'variant')} could not be compared, which counts as not held")
+    if verdict.marked:
+        found = f"; there it found at most {scientific(verdict.marked_worst)}" if verdict.marked_worst >= 0.0 else ""
+        also = "further " if verdict.count else ""
+        told.append(f"audit of {counted(verdict.marked, f'{also}variant')} that the archive marks itself{found}")
+    if verdict.left_out:
+        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit had no values")
     return told
 
 
-def _error(value: float) -> str:
-    """A relative error with two digits.
-
-    >>> _error(1e-3), _error(2.14e-4), _error(0.0)
-    ('1e-3', '2.1e-4', '0')
-    """
-    mantissa, exponent = f"{value:.1e}".split("e")
-    return f"{mantissa.removesuffix('.0')}e{int(exponent)}" if value else "0"
+def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
+    """The sentence on variants that the archive calls ok."""
+    said = f"asked {scientific(verdict.asked)}, audit of {counted(verdict.count, 'variant')} found "
+    if not np.isfinite(verdict.worst):
+        return f"{said}no number to compare"
+    at = results.at(results.index_of(int(group["sample"].values[verdict.place])))
+    result = str(group["worst_result"].values[verdict.place])
+    return f"{said}at most {scientific(verdict.worst)}, worst{f' at {at}' if at else ''} ({result})"
 
 
 def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
@@ -288,6 +286,7 @@ def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
     place = dict(zip(results.dims, results.index_of(int(group["sample"].values[verdict.place])), strict=True))
     return {
         "variants": verdict.count,
+        "marked": verdict.marked,
         "left_out": verdict.left_out,
         "not_compared": verdict.unknown,
         "tolerance": verdict.asked,

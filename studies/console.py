@@ -127,6 +127,7 @@ def show_outcome(outcome: Outcome) -> None:
     """What a run found: the range of every result and the variants there, statuses, the archive."""
     from studies import summary
     from studies.audit import told_audit
+    from studies.choices import told_choices
     from studies.results import Results
 
     results = outcome.results
@@ -141,8 +142,9 @@ def show_outcome(outcome: Outcome) -> None:
         for found in summary.ranges(results)
     ]
     table(results.attrs["title"], ("result", "smallest", "where", "largest", "where"), rows)
-    audit = told_audit(outcome.audit, Results.of(results)) if outcome.audit is not None else []
-    say(*_about_statuses(summary.counts(results), summary.noun(results)), *audit, _about_work(outcome))
+    found = Results.of(results)
+    told = [*told_choices(found), *told_audit(outcome.audit, found)]
+    say(*_about_statuses(summary.counts(results), summary.noun(results)), *told, _about_work(outcome))
 
 
 def show_throughput(found: Throughput) -> None:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.audit import audit_plan, audit_seconds, audited, spread_quasi_randomly, suggested_size
+from engine.audit import audit_seconds, sampled
+from engine.bucket import Bucket
 from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
-from engine.plan import Bucket, Plan, base_scene, explain
+from engine.plan import Plan, base_scene
 from engine.remarks import remarks
 from engine.sweep import Cases, expand
-from results_schema.errors import BadInput
+from studies import chosen, simpler
 from studies.measuring import disk_bytes
-from studies.simpler import HEADINGS, simpler_models
 from studies.words import counted, number, unit_text
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
-BUCKETS_SHOWN = 30
+CHOSEN = "The choice per variant; cost is modes x steps, checks included, over the full model's"
 SIMPLER = "What simpler models would leave out of displacement, over the largest static one"
 
 
@@ -51,8 +51,9 @@ class Preview:
 def preview(plan: Plan, threads: int) -> Preview:
     """The explanation of a plan for so many threads; computes nothing large."""
     tables = (
-        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan), _work(plan)),
-        Table(SIMPLER, HEADINGS, simpler_models(plan)),
+        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan)),
+        Table(CHOSEN, chosen.HEADINGS, chosen.choices(plan)),
+        Table(SIMPLER, simpler.HEADINGS, simpler.simpler_models(plan)),
     )
     cost = (
         f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
@@ -62,18 +63,13 @@ def preview(plan: Plan, threads: int) -> Preview:
 
 
 def _audit(plan: Plan) -> str:
-    """What the audit costs; where the study leaves it open, one of a reasonable size."""
-    wanted = plan.study.solver.audit
-    try:
-        variants = spread_quasi_randomly(plan.cases, suggested_size(plan)) if wanted == "auto" else audited(plan)
-    except BadInput:  # the finer plan would need too many steps, which only matters to who asks for it
+    """What the audit costs."""
+    if plan.study.solver.audit == 0:
         return " No audit."
-    if not variants.size:
-        return ""
-    more = f"about {duration(audit_seconds(audit_plan(plan, variants)))} more"
-    if wanted == "auto":
-        return f" No audit; audit = {variants.size} takes {more}."
-    return f" The audit of {counted(variants.size, 'variant')} takes {more}."
+    variants, seconds = audit_seconds(plan, sampled(plan))
+    if not variants:
+        return " No audit: it would take too long; audit = N asks for one of N variants all the same."
+    return f" The audit of {counted(variants, 'variant')} takes about {duration(seconds)} more."
 
 
 def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
@@ -192,36 +188,6 @@ def _ratios_of(plan: Plan, bucket: Bucket, name: str) -> Iterator[tuple[str, Arr
         yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
     if plan.study.carriage[name].inertial:
         yield "mass over the body's mass", moving_mass(scene, values, 0) / scene.leading_body.modal.mass
-
-
-def _work(plan: Plan) -> Table:
-    """One row per bucket; where there are many, one per combination of model, modes and reason."""
-    rows = [_Work(**{key: cast(Any, row[key]) for key in _Work._fields}) for row in explain(plan)]
-    if len(rows) > BUCKETS_SHOWN:
-        groups: dict[tuple[str, int, str], list[_Work]] = {}
-        for row in rows:
-            groups.setdefault((row.fidelity, row.modes, row.reason), []).append(row)
-        merged = [_joined(group) for group in groups.values()]
-    else:
-        merged = [_joined([row]) for row in rows]
-    return Table("Work", ("variants", "model", "modes", "steps per passage or cycle", "because"), merged)
-
-
-class _Work(NamedTuple):
-    """A row of `engine.plan.explain`."""
-
-    variants: int
-    fidelity: str
-    modes: int
-    steps: int
-    reason: str
-
-
-def _joined(rows: Sequence[_Work]) -> tuple[str, ...]:
-    steps = [row.steps for row in rows]
-    shown = f"{min(steps):,}" if min(steps) == max(steps) else f"{min(steps):,} to {max(steps):,}"
-    first = rows[0]
-    return f"{sum(row.variants for row in rows):,}", first.fidelity, str(first.modes), shown, first.reason
 
 
 def span(values: NDArray[Any]) -> str:

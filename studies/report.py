@@ -26,7 +26,7 @@ from studies.answers import figures_of, findings_of
 from studies.audit import told_audit
 from studies.figures import Figure, png, svg
 from studies.pictures import audit as audited
-from studies.pictures import unreduced
+from studies.pictures import estimates, unreduced
 from studies.results import Results
 from studies.study import kind_named
 from studies.summary import noun, ranges
@@ -98,6 +98,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     figures = [
         *figures_of(results),
         *audited.pictures(results, source.groups.get(audit.GROUP)),
+        *estimates.compared(source.groups.get(audit.GROUP)),
         *unreduced.pictures(results, source.groups.get(GROUP)),
     ]
     page = page_of(source, results, figures)

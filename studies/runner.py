@@ -94,7 +94,7 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
 
     check_unreduced(run.study)
     plan = make_plan(run.study, reduction=kind.reduction(run.study))
-    finer = planned_audit(plan)
+    sample = planned_audit(plan)
     files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
     worth_knowing = tuple(remarks(plan))
     with (PartStore.discard_foreign if run.options.overwrite else PartStore)(run.archive, plan.key) as store:
@@ -102,7 +102,7 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
         _march(plan, store, done, run)
         run.stop.check()
         root = _finished_dataset(plan, store)
-        audit = audit_group(plan, finer, root, Work(run.options.threads, run.stop))
+        audit = audit_group(plan, sample, root, Work(run.options.threads, run.stop))
         groups = model_groups(plan.base) | unreduced_group(plan, root, run.stop.check) | audit
         seconds = _write(run, root, plan.key, groups)
         store.remove()

@@ -109,6 +109,16 @@ def percent(part: float, digits: int = 2) -> str:
     return f"{number(100.0 * part, digits)} %"
 
 
+def scientific(value: float) -> str:
+    """A relative error with two digits.
+
+    >>> scientific(1e-3), scientific(2.14e-4), scientific(0.0)
+    ('1e-3', '2.1e-4', '0')
+    """
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa.removesuffix('.0')}e{int(exponent)}" if value else "0"
+
+
 def counted(count: int, noun: str) -> str:
     """A number with its noun.
 

@@ -31,11 +31,12 @@ STAGES = {
     "bodies.rigid_body bodies.imported_body bodies.imported_checks bodies.imported_line bodies.imported_model "
     "bodies.imported_rows bodies.build",
     "scenes as arrays": "timeline ties standing model ways grips statics track readings contacts signals lanes "
-    "influence coupled fidelity tables envelopes resonance resolution excitation moving_load ringing bouncing neglect "
-    "ladder",
-    "all work of a study": "reduction plan histories remarks audit",
-    "the run": "starting march quasistatic richardson ode transition comparison outcome dataset execution "
-    "unreduced_track unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march unreduced_comparison",
+    "influence coupled fidelity tables envelopes resonance resolution excitation route moving_load ringing bouncing "
+    "neglect ladder omitted choice checking bucket",
+    "all work of a study": "reduction plan histories cycles remarks audit",
+    "the run": "starting march quasistatic richardson ode transition comparison estimates improving outcome dataset "
+    "execution unreduced_track unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march "
+    "unreduced_comparison",
 }
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {
     "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",

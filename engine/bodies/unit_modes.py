@@ -27,6 +27,7 @@ from engine.bodies.modal import Array
 _BLOCK = 256  # rows per matrix product: with blocks of one size a row's bits do not depend on the other rows
 _CHUNK = 16 * _BLOCK  # stations at a time: the polynomials stay in the cache
 _LAST_BIT = 1e-17
+SHARED = 36  # modes that a body is decomposed into at least: studies ask for few and for many of the same one
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,18 @@ class UnitModes:
                 result[here] = _series(local, table)
         return result
 
+    def lowest(self, count: int) -> UnitModes:
+        """The lowest modes alone, without polynomials that only higher ones need."""
+        tables = tuple(tuple(_trimmed(table[:, :count]) for table in tables) for tables in self.tables)
+        return UnitModes(self.nodes, self.omega[:count], self.integral[:count], tables)
+
+
+def _trimmed(table: Array) -> Array:
+    """A series (P, N) without its last polynomials as far as they are rounding, but for two."""
+    sizes = np.abs(table).max(axis=1)
+    last = int(np.max(np.flatnonzero(sizes > _LAST_BIT * sizes.max()), initial=1))
+    return np.ascontiguousarray(table[: last + 1])
+
 
 def _series(local: Array, table: Array) -> Array:
     """Legendre series `table` (P, N) at `local` (S,) in [-1, 1], as (S, N)."""
@@ -78,9 +91,16 @@ def _legendre(x: Array, terms: int) -> Array:
     return basis
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def unit_modes(restraints: tuple[Restraint, ...], modes: int) -> UnitModes:
-    """Modes of the dimensionless beam; cached, as the lanes of a study often share them."""
+    """Modes of the dimensionless beam. Up to `SHARED` they are the lowest of so many, which are computed once."""
+    if modes < SHARED:
+        return _decomposed(restraints, SHARED).lowest(modes)
+    return _decomposed(restraints, modes)
+
+
+@lru_cache(maxsize=64)
+def _decomposed(restraints: tuple[Restraint, ...], modes: int) -> UnitModes:
     space = _CurvatureSpace.between(restraints, modes)
     rigid_lines = rigid_body_modes(restraints)
     rigid = space.deflection[:, :2] @ rigid_lines.T

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
+from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
 from studies import indices, theory
 from studies.results import VARIANT, Results, extreme
@@ -19,9 +20,8 @@ from studies.words import counted, listed, percent, quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.reduction import Cycle
+    from engine.reduction import Compared, Cycle
     from engine.scene import Study
-    from studies.audit import Pair
     from studies.figures import Figure
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
@@ -78,6 +78,7 @@ class AsymmetryReduction:
     """lag, loop_area, odd_rms, even_excess of every sensor from the last cycle."""
 
     stations: int = 400
+    least_fidelity: Fidelity = Fidelity.FORCE  # statics lag nowhere
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {variable.name: variable.dims for variable in RESULTS}
@@ -95,6 +96,14 @@ class AsymmetryReduction:
         legs = indices.folded(motion.cruise_part(), *fields)
         found = indices.asymmetry(legs, 1.0 if motion.end > motion.start else -1.0)
         return {name: value.T for name, value in found._asdict().items()}
+
+    def differences(self, compared: Compared) -> dict[str, Array]:
+        """Lag over the length of the cruise; odd and even parts, which are parts of the static range."""
+        motion = f"carriage.{next(iter(compared.values.study.carriage))}.motion"
+        start, end, turn = (compared.values.of(f"{motion}.{key}") for key in ("start", "end", "turn"))
+        cruise = np.abs(end - start) * (1.0 - 2.0 * turn)
+        lag = compared.gap("lag") / cruise[:, None]
+        return {"lag": lag, "odd_rms": compared.gap("odd_rms"), "even_excess": compared.gap("even_excess")}
 
 
 class Asymmetry:
@@ -133,14 +142,6 @@ class Asymmetry:
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return dataset
-
-    def differences(self, pair: Pair) -> dict[str, Array]:
-        """For an audit: lag over the length of the cruise; odd and even parts, which are parts of the static range."""
-        motion = f"carriage.{next(iter(pair.values.study.carriage))}.motion"
-        start, end, turn = (pair.values.of(f"{motion}.{key}") for key in ("start", "end", "turn"))
-        cruise = np.abs(end - start) * (1.0 - 2.0 * turn)
-        lag = pair.gap("lag") / cruise[:, None]
-        return {"lag": lag, "odd_rms": pair.gap("odd_rms"), "even_excess": pair.gap("even_excess")}
 
     def findings(self, results: Results) -> list[str]:
         left = theory.remainder_of_start(results)

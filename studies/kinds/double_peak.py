@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
+from results_schema.status import Fidelity
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
@@ -20,9 +21,8 @@ from studies.words import MINUS, counted, listed, number, percent
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.reduction import Cycle
+    from engine.reduction import Compared, Cycle
     from engine.scene import Study
-    from studies.audit import Pair
     from studies.figures import Figure
 
 Array = NDArray[np.float64]
@@ -95,6 +95,7 @@ class DoublePeakReduction:
     """Peaks and harmonics of every sensor from the last cycle."""
 
     stations: int = 400
+    least_fidelity: Fidelity = Fidelity.STATIC
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {variable.name: variable.dims for variable in RESULTS}
@@ -113,6 +114,12 @@ class DoublePeakReduction:
             "odd_even_ratio": indices.odd_even_ratio(amplitudes).T,
             "harmonic": amplitudes.T,
         }
+
+    def differences(self, compared: Compared) -> dict[str, Array]:
+        """Harmonics, and the values of peaks where both have as many. A bump near the least prominence is a peak in one
+        and none in the other without being an error; the harmonics see what matters of it."""
+        harmonics = compared.gap("harmonic").max(axis=2)
+        return {"peak_value": compared.relative(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
 
 
 class DoublePeak:
@@ -153,12 +160,6 @@ class DoublePeak:
         }
         return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
 
-    def differences(self, pair: Pair) -> dict[str, Array]:
-        """For an audit: harmonics, and the values of peaks where both have as many. A bump near the least prominence is
-        a peak in one and none in the other without being an error; the harmonics see what matters of it."""
-        harmonics = pair.gap("harmonic").max(axis=2)
-        return {"peak_value": pair.relative(_peak_gap(pair)), "harmonic": pair.relative(harmonics)}
-
     def findings(self, results: Results) -> list[str]:
         said = []
         for sensor in list(results.sensors)[:MOST_SENSORS]:
@@ -175,15 +176,19 @@ class DoublePeak:
 KIND = DoublePeak()
 
 
-def _peak_gap(pair: Pair) -> Array:
-    """(n, J) the largest difference of peaks in the order of their phases, begun where both fit best: a peak at the
-    beginning of the cycle may stand at its end in the other."""
-    one, other = (np.asarray(part["peak_value"], dtype=np.float64) for part in (pair.reported, pair.again))
-    count = np.isfinite(one).sum(axis=2)
-    found = np.zeros(count.shape)
-    for place in zip(*np.nonzero(count == np.isfinite(other).sum(axis=2)), strict=True):
-        values, again = one[place][: count[place]], other[place][: count[place]]
-        found[place] = min((np.abs(values - np.roll(again, k)).max() for k in range(count[place])), default=0.0)
+def _peak_gap(compared: Compared) -> Array:
+    """(V, J) the largest difference of peaks in the order of their phases, begun where both fit best: a peak at the
+    beginning of the cycle may stand at its end in the other. Of more than are kept only the highest is compared."""
+    one, other = (np.asarray(part["peak_value"], dtype=np.float64) for part in (compared.one, compared.other))
+    number, again = (np.asarray(part["peaks_per_cycle"], dtype=np.float64) for part in (compared.one, compared.other))
+    found = np.zeros(number.shape)
+    for count in range(1, indices.PEAKS + 1):
+        here = (number == count) & (again == count)
+        values, others = one[here][:, :count], other[here][:, :count]
+        gaps = [np.abs(values - np.roll(others, k, axis=1)).max(axis=1) for k in range(count)]
+        found[here] = np.min(gaps, axis=0)
+    many = (number > indices.PEAKS) & (again > indices.PEAKS)
+    found[many] = np.abs(np.max(one[many], axis=1) - np.max(other[many], axis=1))
     return found
 
 

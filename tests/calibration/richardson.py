@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bucket import Bucket
 from engine.fidelity import allow_any_steps
 from engine.lanes import LaneValues, weight
 from engine.march import march
-from engine.plan import Bucket, make_plan
+from engine.plan import make_plan
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_pair, relative_error
 from engine.tables import SceneTables
@@ -92,7 +93,9 @@ def drawn(random: np.random.Generator) -> tuple[Bucket, LaneValues]:
     }
     bed = beam(modes=int(random.integers(3, 13)), supports=SUPPORTS[random.integers(len(SUPPORTS))])
     sensors = SENSORS[str(random.choice(list(SENSORS)))]
-    given = study(bed, carriages, sensor=sensors, sweep=sweep, solver={"scheme": "richardson", "steps": 200})
+    given = study(
+        bed, carriages, sensor=sensors, sweep=sweep, solver={"scheme": "richardson", "steps": 200, "fidelity": "full"}
+    )
     plan = make_plan(given, check_steps=allow_any_steps)
     bucket = plan.buckets[0]
     return bucket, plan.values(bucket, bucket.variants)

@@ -73,7 +73,7 @@ def test_a_pinned_beam_has_the_closed_forms(grid: tuple[Array, Array]) -> None:
     for rung, formula in formulas.items():
         ratio = found[rung] / formula
         assert np.all((ratio > 0.95) & (ratio < 4.0)), rung
-        assert 1.2 < np.median(ratio) < 2.5, rung
+        assert 1.1 < np.median(ratio) < 2.5, rung
 
 
 def test_statics_are_right_when_slow() -> None:
@@ -108,10 +108,13 @@ def test_nothing_is_left_out_by_the_full_model(grid: tuple[Array, Array]) -> Non
 
 
 def test_costs_are_modes_times_steps(grid: tuple[Array, Array]) -> None:
-    plan = make_plan(crossing(*grid))
-    (full,) = costs(plan)[-1:]
-    for bucket in plan.buckets:
-        np.testing.assert_array_equal(full.cost[bucket.variants], 12.0 * bucket.steps)
+    """At least 200 steps per first period, and per passage; rounded up by less than a quarter, but for the high modes
+    under a mass."""
+    full = costs(make_plan(crossing(*grid)))[-1]
+    least = 12.0 * 200.0 * np.maximum(1.0 / (2.0 * grid[0]), 1.0)
+    assert np.all(full.cost >= least)
+    slow = grid[0] < 0.02
+    assert np.all(full.cost[slow] < 1.5 * least[slow])
     fixed_steps = make_plan(crossing(*grid, steps=3000))
     assert all(np.all(rung.cost == 36000.0) for rung in costs(fixed_steps)[1:])
 
@@ -249,13 +252,14 @@ def test_variants_do_not_know_their_neighbours(grid: tuple[Array, Array]) -> Non
 
 def test_marches_agree() -> None:
     """A small fixed sample of the calibration: every model marched, over the full one."""
-    found = sample(10, 5)
+    found = sample(10, 5, slowest=0.01)
     for rung, most in ((STATIC, 3.0), (FORCE, 4.0), (BARE, 5.0)):
-        parts = [m for m in found if rung in m.told]
-        ratio = compared(*(np.concatenate([getattr(m, side)[rung] for m in parts]) for side in ("told", "true")))
-        assert ratio.size > 80
-        assert np.mean(ratio >= 1.0) >= 0.93, rung
-        assert np.median(ratio) < most, rung
+        for sensor in ("displacement", "moment"):
+            parts = [m for m in found if rung in m.told and m.sensor == sensor]
+            ratio = compared(*(np.concatenate([getattr(m, side)[rung] for m in parts]) for side in ("told", "true")))
+            assert ratio.size > 80
+            assert np.mean(ratio >= 1.0) >= 0.93, (rung, sensor)
+            assert np.median(ratio) < most, (rung, sensor)
 
 
 def test_the_place_that_is_read_counts() -> None:

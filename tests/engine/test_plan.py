@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from engine.execution import run
-from engine.fidelity import MOST_STEPS, alias_steps, round_up
+from engine.fidelity import MOST_STEPS, alias_steps, allow_any_steps, round_up
+from engine.lanes import LaneValues
 from engine.plan import Plan, explain, make_plan
+from engine.plan import steps_of as steps_by_rules
 from engine.scene import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study
@@ -57,33 +60,37 @@ SPEEDS = [0.02, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0]
 
 def test_auto_steps_of_a_force() -> None:
     """200 per first period and 200 per passage, rounded up to the stair; nothing about aliases."""
-    plan = make_plan(swept("carriage.car.motion.speed", SPEEDS, force(1.0, cruise(0.0, 1.0, 1.0))))
+    steps, reason = ruled(swept("carriage.car.motion.speed", SPEEDS, force(1.0, cruise(0.0, 1.0, 1.0))))
     wanted = np.array([max(200.0, 200.0 * OMEGA_1 / (2.0 * math.pi) / speed) for speed in SPEEDS])
-    steps = steps_of(plan)
     assert steps.tolist() == round_up(wanted).tolist()
     assert np.all(steps >= wanted)
     assert np.all(steps <= 2.0 * wanted)
-    reasons = {int(v): bucket.reason for bucket in plan.buckets for v in bucket.variants}
-    assert reasons[0] == "200 per first period"
-    assert reasons[6] == "200 per passage or cycle"
+    assert reason(np.array([0])) == "200 per first period"
+    assert reason(np.array([6])) == "200 per passage or cycle"
+
+
+def ruled(given: Study) -> tuple[NDArray[np.int64], Callable[[NDArray[np.int64]], str]]:
+    """Steps of all variants by the rules that hold where nothing is known of their accuracy, and their reasons."""
+    plan = make_plan(given)
+    values = LaneValues(given, plan.cases.columns_of(np.arange(plan.size)), plan.size)
+    return steps_by_rules(plan.base, values, allow_any_steps)
 
 
 def test_auto_steps_of_a_mass() -> None:
     """1.5 times the alias rule where that is most."""
     modes = 30
-    plan = make_plan(swept("carriage.car.motion.speed", SPEEDS, mass(0.1, cruise(0.0, 1.0, 1.0)), beam(modes=modes)))
+    given = swept("carriage.car.motion.speed", SPEEDS, mass(0.1, cruise(0.0, 1.0, 1.0)), beam(modes=modes))
+    steps, reason = ruled(given)
     rules = {
         "200 per first period": [200.0 * OMEGA_1 / (2.0 * math.pi) / speed for speed in SPEEDS],
         "200 per passage or cycle": [200.0] * len(SPEEDS),
         "the alias rule of the highest mode": [1.5 * least_alias_steps(speed, modes) for speed in SPEEDS],
     }
     wanted = np.max(list(rules.values()), axis=0)
-    assert steps_of(plan).tolist() == round_up(wanted).tolist()
-    reasons = {int(v): bucket.reason for bucket in plan.buckets for v in bucket.variants}
-    assert "the alias rule of the highest mode" in reasons.values()
-    for v, reason in reasons.items():
-        if len([u for u in reasons if steps_of(plan)[u] == steps_of(plan)[v]]) == 1:
-            assert rules[reason][v] == wanted[v]
+    assert steps.tolist() == round_up(wanted).tolist()
+    reasons = [reason(np.array([v])) for v in range(len(SPEEDS))]
+    assert "the alias rule of the highest mode" in reasons
+    assert [rules[name][v] for v, name in enumerate(reasons)] == wanted.tolist()
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from engine.execution import run
 from engine.motions import Cruise, OutAndBack, Sinusoidal
 from engine.plan import make_plan
-from engine.reduction import Cycle
+from engine.reduction import Compared, Cycle
 from engine.scene import Study
 from engine.timeline import MOST_STATIONS, Rider, build_timeline
 from results_schema.errors import BadInput
+from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.reference import closed_forms
 
@@ -121,6 +122,7 @@ class Kept:
     """A reduction that keeps what it is given."""
 
     stations = 64
+    least_fidelity = Fidelity.STATIC
 
     def __init__(self) -> None:
         self.cycles: list[Cycle] = []
@@ -130,6 +132,9 @@ class Kept:
 
     def sizes(self, study: Study) -> Mapping[str, int]:
         return {"sensor": len(study.sensor)}
+
+    def differences(self, compared: Compared) -> dict[str, Array]:
+        return {}
 
     def __call__(self, cycle: Cycle) -> dict[str, Array]:
         self.cycles.append(cycle)
@@ -147,7 +152,7 @@ def test_cycle_of_a_reduction(way: dict[str, Any]) -> None:
     given = study(beam(modes=3), carriages, sensor=SENSORS, solver={"steps": 512})
     reduced = run(given, reduction=kept)
     whole = run(Study(**(given.data | {"output": {"histories": "all"}})))
-    [cycle] = kept.cycles
+    cycle = kept.cycles[0]
     stations = cycle.phase.size
     assert 64 <= stations < 512
     np.testing.assert_allclose(cycle.phase, np.arange(stations) / stations, rtol=0, atol=1e-15)
@@ -174,7 +179,7 @@ def test_static_slope_of_a_reduction() -> None:
     kept = Kept()
     given = study(beam(modes=3), force(2.0, swing(0.5, 0.4, 0.7, 1)), sensor=SENSORS, solver={"steps": 128})
     run(given, reduction=kept)
-    [cycle] = kept.cycles
+    cycle = kept.cycles[0]
     influence, h = closed_forms.influence_pinned, 1e-5
     compared = 0
     for n, x in enumerate(cycle.position):
@@ -206,11 +211,15 @@ class Nothing:
     """A reduction that wants the last cycle and computes nothing."""
 
     stations = 100
+    least_fidelity = Fidelity.STATIC
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {}
 
     def sizes(self, study: Study) -> Mapping[str, int]:
+        return {}
+
+    def differences(self, compared: Compared) -> dict[str, Array]:
         return {}
 
     def __call__(self, cycle: Cycle) -> dict[str, Array]:

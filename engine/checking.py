@@ -1,0 +1,86 @@
+"""What a march is compared with to know its error: the same with other steps, and with other modes besides.
+
+A march of second order misses a third of what separates it from one with half its steps, or four thirds of what
+separates it from one with twice as many; one of first order all of it, or twice. What half the modes miss is at least
+twice what all of them miss, as that falls with the number of modes or faster; of hardly any modes some more tell.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.rigid import Rigid
+from engine.choice import FEW, fewer_modes
+from engine.fidelity import least_steps
+from engine.lanes import LaneValues
+from engine.model import SceneModel, simplified
+from engine.resonance import contact_omega
+from engine.tables import SceneTables
+from results_schema.errors import BadInput
+
+Counts = NDArray[np.int64]
+
+SURE_ORDER = 2  # of schemes that are of higher order in smooth scenes only
+OF_MORE = 1.5  # times what some more modes change is what few of them miss
+
+
+class Checks(NamedTuple):
+    """The marches that a march is compared with.
+
+    steps: with half or twice its steps; of their difference the march misses the part ``missed``. None where the march
+    makes its own estimate. modes: with other modes and its own steps, or half of them where ``steps`` has so; of the
+    difference to the march with as many steps it misses the part ``modes_missed``. None where there are none.
+    """
+
+    steps: SceneTables | None
+    missed: float
+    modes: SceneTables | None
+    modes_missed: float
+
+    def cost(self, own: SceneTables) -> float:
+        """Modes x steps of these marches over those of the march itself."""
+        parts = [part for part in (self.steps, self.modes) if part is not None]
+        return sum(part.steps * part.model.body_modes for part in parts) / (own.steps * own.model.body_modes)
+
+    def forget(self) -> None:
+        """Drop the tables."""
+        for tables in (self.steps, self.modes):
+            if tables is not None:
+                tables.forget()
+
+
+def checks_of(tables: SceneTables, compared: Literal["half", "twice"]) -> Checks:
+    """The comparisons of a march, with half its steps or with twice as many."""
+    model, missed = _with_other_modes(tables.model)
+    if tables.model.scheme.stride > 1:
+        return Checks(None, 0.0, None if model is None else tables.with_steps(model, 1), missed)
+    grown = 2.0 ** min(tables.model.scheme.order, SURE_ORDER)
+    ratio, part = (-2, 1.0 / (grown - 1.0)) if compared == "half" else (2, grown / (grown - 1.0))
+    modes = None if model is None else tables.with_steps(model, min(ratio, 1))
+    return Checks(tables.with_steps(tables.model, ratio), part, modes, missed)
+
+
+def can_be_halved(model: SceneModel, values: LaneValues, steps: Counts) -> NDArray[np.bool_]:
+    """(V,) whether half of these steps still keep the rules that no march may break."""
+    distinct, inverse = np.unique(values.time_scale(model.carriages[0].name), return_inverse=True)
+    contact = values.time_scale(model.carriages[0].name) * contact_omega(model, values) / (2.0 * np.pi)
+    return np.asarray(0.5 * steps >= np.maximum(least_steps(model, distinct)[inverse], contact))
+
+
+def _with_other_modes(model: SceneModel) -> tuple[SceneModel | None, float]:
+    """The scene with half the modes of every body, or some more where there are few; None where it has no such one."""
+    changes: dict[str, Any] = {}
+    few = max(part.modal.omega.size for part in model.bodies) < FEW
+    for part in model.bodies:
+        body, size = model.study.body[part.name], part.modal.omega.size
+        if not isinstance(body, Rigid):
+            wanted = fewer_modes(size) if few else max(size // 2, min(size, part.modal.rigid_modes + 1))
+            changes |= {f"body.{part.name}.modes": wanted}
+    try:
+        other = simplified(model, changes)
+    except BadInput:  # a list of damping ratios has no more of them
+        return None, 0.0
+    return (None, 0.0) if other.body_modes == model.body_modes else (other, OF_MORE if few else 1.0)

@@ -1,0 +1,49 @@
+"""What a study makes of sampled histories, and the stations at which they are sampled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.histories import counts_reduced
+from engine.lanes import LaneValues, weights
+from engine.plan import Plan
+from engine.reduction import Cycle
+from engine.tables import SceneTables
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+STATIONS = 256  # of a whole run, at which histories are compared
+
+
+def counts_sampled(plan: Plan, tables: SceneTables) -> Counts:
+    """Stations by their count: those that the study's reduction wants, or some over the whole run, which a march with
+    half the steps has too."""
+    if plan.reduction is not None:
+        return counts_reduced(tables.timeline, plan.reduction.stations)
+    first, last = tables.timeline.window
+    return np.arange(first, last + 1, 2 * max(1, (last - first) // (2 * STATIONS)))
+
+
+def reduced(
+    plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts, history: Array
+) -> dict[str, NDArray[np.generic]]:
+    """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
+    if plan.reduction is None:
+        return {}
+    unit = tables.static_at(counts)
+    loads = weights(tables.model, values)
+    static = unit.gravity[:, :, None] * values.of("gravity")
+    for r in range(loads.shape[0]):
+        static = static + unit.force[:, :, r, None] * loads[r]
+    first, last = tables.timeline.window
+    cycle = Cycle(
+        phase=(counts - first) / (last - first),
+        position=tables.timeline.positions(0, counts.astype(np.float64)),
+        history=history,
+        static=static,
+        static_slope=tables.static_slope_at(counts)[:, :, None] * loads[0],
+        motion=tables.model.carriages[0].rider.motion,
+    )
+    return dict(plan.reduction(cycle))

@@ -1,0 +1,87 @@
+"""Variants whose error turned out larger than their tolerance, and what they are marched again with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.body import MAX_MODES
+from engine.bucket import Bucket
+from engine.choice import FINER, LEVELS, MOST_CHOSEN
+from engine.fidelity import safe_steps
+from engine.lanes import LaneValues
+from engine.model import simplified
+from engine.plan import Plan, fixed_steps
+from results_schema.status import Status
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+PART = 0.4  # of what the model leaves of the tolerance, for steps and for modes each
+LEAST_PART = 0.05  # of the tolerance itself, likewise
+MOST_COST = 6.0  # times the full model's: what misses the tolerance then says so
+ROUNDS = 3  # of improving
+AT_ONCE = 8  # times the steps before the next look
+NEXT = (*LEVELS, 32, 48, MAX_MODES)  # numbers of modes to go on with
+
+
+def improvements(
+    plan: Plan, bucket: Bucket, variants: Counts, flat: Mapping[str, NDArray[Any]]
+) -> Iterator[tuple[Bucket, Counts]]:
+    """Buckets with more modes or steps, and which of the variants (numbers below V) they are for."""
+    status = flat["status"]
+    wanting = np.flatnonzero((status == Status.TOLERANCE_MISSED) | (status == Status.UNRESOLVED))
+    if bucket.rounds >= ROUNDS or bucket.checks is None or not wanting.size or bucket.scene.scheme.stride > 1:
+        return
+    values = plan.values(bucket, variants[wanting])
+    tolerance = values.of("solver.tolerance")
+    allowed = np.maximum(PART * (tolerance - flat["error_fidelity"][wanting]), LEAST_PART * tolerance)
+    modes = _modes(bucket, flat["error_modes"][wanting] / allowed)
+    steps = np.ones(wanting.size, dtype=np.int64)
+    if not fixed_steps(plan.study, values):
+        steps = _times(np.sqrt(flat["error_steps"][wanting] / allowed))
+    for wanted in np.unique(modes):
+        lanes = np.flatnonzero(modes == wanted)
+        by = np.maximum(steps[lanes], _safe(plan, bucket, int(wanted), variants[wanting[lanes]]))
+        for times in np.unique(by):
+            if (wanted or times > 1) and _bounded(bucket, int(wanted), int(times), variants[wanting[lanes]]):
+                yield bucket.finer(int(wanted), int(times)), wanting[lanes[by == times]]
+
+
+def _bounded(bucket: Bucket, modes: int, by: int, variants: Counts) -> bool:
+    """Whether so many modes and times the steps are worth their cost for any of the variants."""
+    grown = by * max(1.0, modes * len(bucket.chosen) / bucket.scene.body_modes)
+    cheapest = float(np.min(bucket.cost * grown / bucket.full_cost[bucket.of(variants)]))
+    return bucket.steps * by <= MOST_CHOSEN and cheapest <= MOST_COST
+
+
+def _times(ratio: Array) -> Counts:
+    """(V,) powers of two that are no less than these ratios, up to `AT_ONCE`; 2 where they are unknown."""
+    known = np.clip(np.where(np.isnan(ratio), 2.0, ratio), 1.0, AT_ONCE)
+    return np.asarray(np.exp2(np.ceil(np.log2(known) - 1e-9)), dtype=np.int64)
+
+
+def _modes(bucket: Bucket, ratio: Array) -> Counts:
+    """(V,) the next number of modes that such a ratio of error to what is allowed asks for; 0: as many as now."""
+    if not bucket.chosen:
+        return np.zeros(ratio.size, dtype=np.int64)
+    now = max(part.modal.omega.size for part in bucket.scene.bodies if part.name in bucket.chosen)
+    wanted = now * np.clip(np.sqrt(np.where(np.isnan(ratio), 1.0, ratio)), 1.0, 4.0)
+    place = np.minimum(np.searchsorted(NEXT, np.where(ratio > 1.0, np.maximum(wanted, now + 1), now)), len(NEXT) - 1)
+    found = np.asarray(NEXT)[place]
+    return np.asarray(np.where((ratio > 1.0) & (found > now), found, 0), dtype=np.int64)
+
+
+def _safe(plan: Plan, bucket: Bucket, modes: int, variants: Counts) -> Counts:
+    """(V,) times the steps that so many modes need whatever their accuracy."""
+    if not modes:
+        return np.ones(variants.size, dtype=np.int64)
+    model = simplified(bucket.scene, {f"body.{name}.modes": modes for name in bucket.chosen})
+    values = LaneValues(model.study, plan.cases.columns_of(variants), variants.size)
+    if fixed_steps(model.study, values):
+        return np.ones(variants.size, dtype=np.int64)
+    least = np.max([*safe_steps(model, values.time_scale(model.carriages[0].name), FINER).values()], axis=0)
+    return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(least / bucket.steps, 1.0)) - 1e-9)), dtype=np.int64)
