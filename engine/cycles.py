@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from engine.histories import counts_reduced
 from engine.lanes import LaneValues, weights
-from engine.plan import Plan
+from engine.plan import STATIONS, Plan
 from engine.reduction import Cycle
 from engine.tables import SceneTables
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-
-STATIONS = 256  # of a whole run, at which histories are compared
 
 
 def counts_sampled(plan: Plan, tables: SceneTables) -> Counts:

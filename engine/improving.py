@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
-from engine.choice import FINER, LEVELS, MOST_CHOSEN
-from engine.fidelity import safe_steps
+from engine.choice import FINER, LEVELS, MOST_CHOSEN, usual_steps
+from engine.fidelity import STEPS_PER_PERIOD, safe_steps
 from engine.lanes import LaneValues
 from engine.model import simplified
 from engine.plan import Plan, fixed_steps
@@ -22,7 +22,7 @@ Counts = NDArray[np.int64]
 
 PART = 0.4  # of what the model leaves of the tolerance, for steps and for modes each
 LEAST_PART = 0.05  # of the tolerance itself, likewise
-MOST_COST = 6.0  # times the full model's: what misses the tolerance then says so
+MOST_COST = 6.0  # times the full model's at a tolerance of 1e-3 or more: what still misses it says so
 ROUNDS = 3  # of improving
 AT_ONCE = 8  # times the steps before the next look
 NEXT = (*LEVELS, 32, 48, MAX_MODES)  # numbers of modes to go on with
@@ -47,15 +47,18 @@ def improvements(
         lanes = np.flatnonzero(modes == wanted)
         by = np.maximum(steps[lanes], _safe(plan, bucket, int(wanted), variants[wanting[lanes]]))
         for times in np.unique(by):
-            if (wanted or times > 1) and _bounded(bucket, int(wanted), int(times), variants[wanting[lanes]]):
-                yield bucket.finer(int(wanted), int(times)), wanting[lanes[by == times]]
+            own = wanting[lanes[by == times]]
+            own = own[_is_worth(bucket, int(wanted), int(times), plan.values(bucket, variants[own]), variants[own])]
+            if (wanted or times > 1) and own.size:
+                yield bucket.finer(int(wanted), int(times)), own
 
 
-def _bounded(bucket: Bucket, modes: int, by: int, variants: Counts) -> bool:
-    """Whether so many modes and times the steps are worth their cost for any of the variants."""
+def _is_worth(bucket: Bucket, modes: int, by: int, values: LaneValues, variants: Counts) -> NDArray[np.bool_]:
+    """(V,) whether so many modes and times the steps are worth their cost."""
+    most = MOST_COST * np.maximum(1.0, usual_steps(values) / STEPS_PER_PERIOD)
     grown = by * max(1.0, modes * len(bucket.chosen) / bucket.scene.body_modes)
-    cheapest = float(np.min(bucket.cost * grown / bucket.full_cost[bucket.of(variants)]))
-    return bucket.steps * by <= MOST_CHOSEN and cheapest <= MOST_COST
+    cost = bucket.cost * grown / bucket.full_cost[bucket.of(variants)]
+    return np.asarray((cost <= most) & (bucket.steps * by <= MOST_CHOSEN))
 
 
 def _times(ratio: Array) -> Counts:

@@ -5,7 +5,7 @@ Scene, step count and bucket of a variant are functions of that variant alone, s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -48,7 +48,9 @@ Counts = NDArray[np.int64]
 CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
 Reasons = Callable[[Counts], str]
 
-START_SECONDS, BUCKET_SECONDS, STATION_SECONDS = 2.5, 0.02, 2e-5  # besides marching, for expected times only
+START_SECONDS, BUCKET_SECONDS = 2.5, 0.02  # besides marching, for expected times only
+STATION_SECONDS, STATION_MODE_SECONDS = 3e-6, 2e-7  # of a station's tables, and of each mode in them; likewise
+CHECKED = 2.0  # times the tables of a march with those that it is compared with; likewise
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
@@ -60,6 +62,7 @@ MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richard
 MOST_MEMORY = 16 * 2**30
 STATIC_STEPS = 800  # stations of statics over one passage or cycle
 FULL_MODES = 20  # of the full model that costs are compared with
+STATIONS = 256  # of a whole run, about, at which histories are compared
 SHOWN = 64  # variants whose histories are kept by default
 
 
@@ -106,7 +109,8 @@ class Plan:
             again = timeline.repeats and bucket.tables.cycle_bytes <= KEPT_BYTES
             tabulated = min(timeline.steps, bucket.steps) if again else timeline.steps
             found += bucket.seconds_per_variant * lanes / threads
-            found += BUCKET_SECONDS + STATION_SECONDS * tabulated * bucket.scene.ties
+            station = STATION_SECONDS + STATION_MODE_SECONDS * bucket.scene.body_modes
+            found += BUCKET_SECONDS + CHECKED * station * tabulated * bucket.scene.ties
             found += READING_SECONDS * tabulated * places_read(self.study)
         return found
 
@@ -150,9 +154,8 @@ class Plan:
         """Variants of one task, by time and memory."""
         task = float(np.clip(self.seconds / TASKS, LEAST_TASK_SECONDS, TASK_SECONDS))
         lanes = task / bucket.seconds_per_variant
-        if self.reduction is not None:
-            rows = min(2 * self.reduction.stations, bucket.steps)
-            lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
+        rows = min(2 * (STATIONS if self.reduction is None else self.reduction.stations), bucket.steps)
+        lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
         watched = max(len(tables.signals) for tables in (bucket.tables, *bucket.envelopes))
         lanes = min(lanes, MOST_MARK_BYTES / (8 * MARKS * watched))
         if bucket.scene.scheme.stride > 1:  # a pair has all histories of a segment in memory
@@ -222,7 +225,7 @@ def reads_accelerations(study: Study) -> bool:
 
 def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
-    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 4 + 2 * places_read(study)
+    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
     if reduction is not None:
         sizes = reduction.sizes(study)
         found += sum(prod(sizes[dim] for dim in dims) for dims in reduction.outputs(study).values())
@@ -414,18 +417,3 @@ def _shown(study: Study, size: int) -> Counts:
     if wanted != "auto" or size <= SHOWN:
         return np.arange(size, dtype=np.int64)
     return np.unique(np.rint(np.linspace(0, size - 1, SHOWN)).astype(np.int64))
-
-
-def explain(plan: Plan) -> list[Mapping[str, object]]:
-    """One row per bucket for people: variants, fidelity, modes, steps and why."""
-    return [
-        {
-            "variants": int(bucket.variants.size),
-            "fidelity": bucket.scene.fidelity.name.lower().replace("_", "-"),
-            "modes": bucket.scene.body_modes,
-            "steps": bucket.steps,
-            "reason": bucket.reason,
-            "seconds": bucket.seconds_per_variant * bucket.variants.size,
-        }
-        for bucket in plan.buckets
-    ]

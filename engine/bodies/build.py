@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +24,10 @@ from engine.bodies.rigid import Rigid
 from engine.bodies.rigid_body import rigid_body
 from results_schema.errors import BadInput
 
+MOST_KEPT = 64  # bodies that are not built again
+_BUILT: OrderedDict[str, Built] = OrderedDict()
+_BUILDING = threading.Lock()
+
 
 @dataclass(frozen=True, eq=False)
 class Built:
@@ -33,7 +39,18 @@ class Built:
 
 
 def build_body(body: Body) -> Built:
-    """A body of a study in modal coordinates. Raises BadInput, with the key within the body as its place."""
+    """A body of a study in modal coordinates, the same object for the same body: scenes of a sweep share it. Raises
+    BadInput, with the key within the body as its place."""
+    key = f"{type(body).__name__} {body.content} {body.model_dump_json()}"
+    with _BUILDING:
+        built = _BUILT.pop(key, None) or _built(body)
+        _BUILT[key] = built
+        if len(_BUILT) > MOST_KEPT:
+            _BUILT.popitem(last=False)
+    return built
+
+
+def _built(body: Body) -> Built:
     built = BUILDERS[type(body)](body)
     modes = built.modal.omega.size
     if isinstance(body.damping_ratio, tuple) and len(body.damping_ratio) < modes:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.audit import Verdict
 from studies.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
 from studies.results import PACES, Axis, Results
 from studies.words import axis_title, counted
@@ -25,10 +24,9 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
     axis = results.axis(*PACES) or next((axis for axis in results.axes if len(axis.values) > 1), None)
     if group is None or axis is None or not np.isfinite(group["observed_error"].values).any():
         return []
-    verdict = Verdict.of(group)
     caption = (
-        f"{counted(verdict.count, 'variant')} computed again with all terms, twice the modes and at least four times "
-        "the steps. The largest difference of what they report, of extremes over the largest static value."
+        f"{counted(group.sizes['sample'], 'variant')} computed again with all terms, twice the modes and at least four "
+        "times the steps. The largest difference of what they report, of extremes over the largest static value."
     )
     return [draw("audit", "Errors that the audit observed", caption, HEIGHT, partial(_draw, group, axis))]
 

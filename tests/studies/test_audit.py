@@ -5,17 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
-import engine
 import studies
 from engine.lanes import LaneValues
 from engine.plan import make_plan
+from engine.reduction import Compared
 from engine.scene import Study
 from results_schema.archive import open_archive
 from results_schema.errors import BadInput
@@ -28,6 +27,8 @@ from studies.audit import (
     Pair,
     Verdict,
     _differences,
+    _scale,
+    as_json,
     audit_group,
     planned_audit,
     refuse_audit,
@@ -221,22 +222,30 @@ def test_what_the_kinds_add_is_relative_as_it_should_be() -> None:
         "odd_rms": np.full((2, 1), 0.3),
         "even_excess": np.full((2, 1), 0.7),
     }
-    found = asymmetry.KIND.differences(Pair(("midspan",), reported, once_more, scale, loud, values))
+    kind = asymmetry.KIND.reduction(scene)
+    found = kind.differences(Compared(reported, once_more, scale, values))
     np.testing.assert_allclose(found["lag"], [[0.1], [0.1]], rtol=1e-12)
     np.testing.assert_allclose([found["odd_rms"][0, 0], found["even_excess"][1, 0]], [0.3, 0.7])
     ends = {f"midspan_{end}": np.array([1.0, 2.0]) for end in ("max", "min")}
     whole = Pair(("midspan",), reported | ends, once_more | ends, scale, loud, values)
-    every = _differences(whole, asymmetry.KIND)
+    every = _differences(whole, kind)
     np.testing.assert_array_equal(every["lag"], found["lag"])
     assert set(every) == {"max", "min", "lag", "odd_rms", "even_excess"} and not every["max"].any()
-    assert not _differences(replace(whole, silent=~loud), asymmetry.KIND)["odd_rms"].any()
+    assert not _differences(replace(whole, silent=~loud), kind)["odd_rms"].any()
+
+
+def test_harmonics_and_peaks_count_over_the_static_value() -> None:
+    scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
+    scale, values = np.array([[2.0], [4.0]]), LaneValues(scene, {}, 2)
+    number = np.array([[2.0], [1.0]])
     reported = {"peak_value": np.array([[[1.0, 2.0]], [[1.0, np.nan]]]), "harmonic": np.zeros((2, 1, 3))}
     once_more = {
         "peak_value": np.array([[[1.2, 2.1]], [[1.4, np.nan]]]),
         "harmonic": np.array([[[0.0, -0.6, 0.2]], [[0.8, np.nan, 0.0]]]),
     }
     reported["harmonic"][1, 0, 1] = np.nan
-    found = double_peak.KIND.differences(Pair(("midspan",), reported, once_more, scale, loud, values))
+    compared = Compared(reported | {"peaks_per_cycle": number}, once_more | {"peaks_per_cycle": number}, scale, values)
+    found = double_peak.KIND.reduction(scene).differences(compared)
     np.testing.assert_allclose(found["peak_value"], [[0.1], [0.1]])
     np.testing.assert_allclose(found["harmonic"], [[0.3], [0.2]])
 
@@ -244,37 +253,34 @@ def test_what_the_kinds_add_is_relative_as_it_should_be() -> None:
 def test_peaks_fit_round_the_cycle_and_differ_in_number_without_error() -> None:
     one = np.array([[[1.0, 2.0, 3.0, np.nan]], [[1.0, 2.0, np.nan, np.nan]], [[np.nan] * 4]])
     other = np.array([[[3.1, 1.0, 2.0, np.nan]], [[1.0, 2.0, 0.5, np.nan]], [[np.nan] * 4]])
-    pair = SimpleNamespace(reported={"peak_value": one}, again={"peak_value": other})
-    np.testing.assert_allclose(_peak_gap(pair), [[0.1], [0.0], [0.0]], atol=1e-12)  # type: ignore[arg-type]
+    here, there = (
+        {"peak_value": values, "peaks_per_cycle": np.isfinite(values).sum(axis=2)} for values in (one, other)
+    )
+    compared = Compared(here, there, np.ones((3, 1)), LaneValues(crossing(POOR, {}), {}, 3))
+    np.testing.assert_allclose(_peak_gap(compared), [[0.1], [0.0], [0.0]], atol=1e-12)
 
 
 def test_what_has_no_number_is_known_not_to_have_one() -> None:
     values = LaneValues(crossing(POOR, {}), {}, 3)
     reported = {"lag": np.array([[1.0], [np.nan], [np.nan]])}
-    pair = Pair(
-        ("midspan",),
-        reported,
-        {"lag": np.array([[1.5], [np.nan], [2.0]])},
-        np.array([[2.0], [0.0], [0.0]]),
-        np.zeros((3, 1), dtype=np.bool_),
-        values,
-    )
-    np.testing.assert_array_equal(pair.gap("lag"), [[0.5], [0.0], [np.nan]])
-    np.testing.assert_array_equal(pair.relative(np.array([[0.5], [0.0], [1.0]])), [[0.25], [0.0], [np.nan]])
+    once_more = {"lag": np.array([[1.5], [np.nan], [2.0]])}
+    compared = Compared(reported, once_more, np.array([[2.0], [0.0], [0.0]]), values)
+    np.testing.assert_array_equal(compared.gap("lag"), [[0.5], [0.0], [np.nan]])
+    np.testing.assert_array_equal(compared.relative(np.array([[0.5], [0.0], [1.0]])), [[0.25], [0.0], [np.nan]])
 
 
 def test_variants_without_values_are_left_out_and_counted() -> None:
     plan = make_plan(crossing(RICH, FINE | {"audit": 4, "steps": 2000}))
-    dataset, finer = studies.run(plan.study), planned_audit(plan)
-    whole = audit_group(plan, finer, dataset, Work(1))[GROUP]
+    dataset, sample = studies.run(plan.study), planned_audit(plan)
+    whole = audit_group(plan, sample, dataset, Work(1))[GROUP]
     status = dataset["status"].copy()
     status.values.reshape(-1)[int(whole["sample"][1])] = Status.DIVERGED
-    less = audit_group(plan, finer, dataset.assign(status=status), Work(1))[GROUP]
+    less = audit_group(plan, sample, dataset.assign(status=status), Work(1))[GROUP]
     assert int(less["left_out"]) == 1
     xr.testing.assert_identical(less["observed_error"], whole["observed_error"].isel(sample=[0, 2, 3]))
     told = told_audit(less, Results.of(dataset))
-    assert told[1] == "1 further variant picked for the audit had no values"
-    assert audit_group(plan, finer, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
+    assert told[-1] == "1 further variant picked for the audit had no values"
+    assert audit_group(plan, sample, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
     assert audit_group(plan, None, dataset, Work(1)) == {} and told_audit(None, Results.of(dataset)) == []
 
 
@@ -314,6 +320,48 @@ def test_rounding_has_no_relative_error(supports: str, at: float, quantity: str,
         assert (float(found["observed_error"][0]) > 0.0) == bool(more) and Verdict.of(found).held
 
 
+def test_what_the_archive_marks_itself_is_told_apart() -> None:
+    """A miss of a variant whose status says so is no broken promise, and neither is what comes after a separation."""
+    plan = make_plan(crossing(RICH, {"audit": 6, "steps": 2000, "tolerance": 1e-9}))
+    dataset, sample = studies.run(plan.study), planned_audit(plan)
+    status = xr.full_like(dataset["status"], Status.OK)
+    status.values.reshape(-1)[[1, 2, 5]] = Status.SEPARATED, Status.UNRESOLVED, Status.TOLERANCE_MISSED
+    group = audit_group(plan, sample, dataset.assign(status=status), Work(1))[GROUP]
+    verdict = Verdict.of(group)
+    assert (verdict.count, verdict.marked, verdict.missed, verdict.held) == (3, 3, 3, False)
+    observed, ours = group["observed_error"].values, np.array([0, 3, 4])
+    assert verdict.worst == observed[ours].max() and verdict.marked_worst == observed[[1, 2, 5]].max()
+    assert verdict.place in ours and list(group["variant_status"].values) == [0, 1, 2, 0, 0, 3]
+    told = told_audit(group, Results.of(dataset))
+    assert told[1] == "the tolerance was not held: 3 of 3 variants missed it"
+    assert told[2].startswith("audit of 3 further variants that the archive marks itself; there it found at most ")
+    marked = group.assign(variant_status=xr.full_like(group["variant_status"], Status.SEPARATED))
+    (told_alone,) = told_audit(marked, Results.of(dataset))
+    assert Verdict.of(marked).held and told_alone.startswith("audit of 6 variants that the archive marks itself")
+    assert np.isnan(Verdict.of(marked).worst) and as_json(marked, Results.of(dataset))["marked"] == 6
+
+
+def test_it_is_on_by_default_and_has_more_than_what_was_used(tmp_path: Path) -> None:
+    """Every variant with twice the modes and four times the steps that the archive says it took."""
+    given = crossing(beam(modes="auto", damping_ratio=0.02), {"tolerance": 1e-2})
+    found = outcome(given, tmp_path)
+    group, flat = group_of(found), group_of(found)["sample"].values
+    assert sorted(flat) == list(range(6))
+    used = {name: found.results[name].values.reshape(-1)[flat] for name in ("modes_used", "steps_used", "status")}
+    assert (group["modes_used"] >= 2 * used["modes_used"]).all()
+    assert (group["steps_used"] >= 4 * used["steps_used"]).all()
+    np.testing.assert_array_equal(group["variant_status"], used["status"])
+    assert Verdict.of(group).held and Verdict.of(group).worst < 1e-2
+    estimates = found.results["error_estimate"].values.reshape(-1)[flat]
+    np.testing.assert_array_equal(group["estimated_error"], estimates)
+
+
+def test_a_sensor_that_statics_leave_at_rest_counts_by_itself() -> None:
+    """A static value that is but rounding is nothing to divide by."""
+    arrays = {"x_static": np.array([1e-14, 0.0, 2.0]), "x_max": np.array([0.5, 0.5, 3.0]), "x_min": -np.ones(3)}
+    np.testing.assert_array_equal(_scale(["x"], arrays), [[1.0], [1.0], [2.0]])
+
+
 def test_every_variant_has_its_tolerance(tmp_path: Path) -> None:
     swept = {"tolerance": {"of": "solver.tolerance", "values": [1e-9, 0.5]}}
     found = outcome(crossing(RICH, {"audit": 2, "steps": 2000}, sweep=swept), tmp_path)
@@ -323,9 +371,9 @@ def test_every_variant_has_its_tolerance(tmp_path: Path) -> None:
 
 
 def test_estimates_stand_beside(tmp_path: Path) -> None:
-    pairs = outcome(crossing(beam(modes=4), {"audit": 2, "scheme": "richardson", "steps": 3000}), tmp_path)
+    pairs = outcome(crossing(beam(modes=4), {"audit": 2, "scheme": "richardson", "steps": 10_000}), tmp_path)
     estimated = group_of(pairs)["estimated_error"].values
-    own = pairs.results["error_steps"].values.reshape(-1)[group_of(pairs)["sample"].values]
+    own = pairs.results["error_estimate"].values.reshape(-1)[group_of(pairs)["sample"].values]
     np.testing.assert_array_equal(estimated, own)
     assert np.isfinite(estimated).all()
 
@@ -368,16 +416,15 @@ def test_without_an_audit_nothing_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write(tmp_path)
+    write(tmp_path, SMALL.replace('steps = "auto"', 'steps = "auto"\naudit = 0'))
     assert main(["run", "small.toml", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["audit"] is None
     assert GROUP not in open_archive("small.nc").groups
     assert main(["check", "small.toml"]) == 0
-    assert "No audit; audit = 16 takes about" in capsys.readouterr().out
-    assert engine.load("small.toml").solver.audit == "auto"
+    assert capsys.readouterr().out.rstrip().endswith("No audit.")
 
 
 def test_a_check_does_not_refuse_what_only_an_audit_could_not_do() -> None:
     """Four times the steps of a very slow cruise would be too many; nobody has asked for them."""
-    slow = study(beam(), mass(0.5, cruise(0.0, 1.0, 1e-5)))
-    assert "No audit" in preview(make_plan(slow), 1).cost
+    slow = study(beam(), mass(0.5, cruise(0.0, 1.0, 1e-5)), solver={"steps": 50_000_000})
+    assert "No audit: it would take too long" in preview(make_plan(slow), 1).cost

@@ -287,6 +287,7 @@ def group(estimated: list[float], observed: list[float], worst: list[str] | None
             "tolerance_asked": ("sample", np.full(len(observed), 1e-3)),
             "worst_result": ("sample", np.array(worst or ["midspan_max"] * len(observed))),
             "left_out": ((), 0),
+            "variant_status": ("sample", np.zeros(len(observed), dtype=np.int8)),
             "modes_used": ("sample", np.full(len(observed), 8)),
             "steps_used": ("sample", np.full(len(observed), 800)),
         },
