@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bodies.beam import Beam
 from engine.bodies.body import AUTO_MODES, MAX_MODES, Body
 from engine.bodies.frame import MAX_FIXED_INTERFACE_MODES, Frame
 from engine.bodies.reduced import Reduced
@@ -40,10 +41,15 @@ LEAST_STEPS = 800  # of a variant that marched none
 MODES_OF_STATICS = 3  # whose double is marched for a variant that marched none: statics err by the slowest modes
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-SHARED, FULL_SHARED = 8, 2  # times the steps that a variant takes to share tables; once there are `LANES` of them
+SHARED, FULL_SHARED = (
+    8,
+    2,
+)  # times the steps that a variant takes to share tables, which cost more; once there are `MOST`
 GROUP_SECONDS = 0.05  # besides tables and marching, for expected times only
 STATION_SECONDS = 3e-6  # of tables; likewise
-MODE_SECONDS = 2e-7  # of tables for each mode; likewise
+MODE_SECONDS = 2e-7  # of each mode of frames in tables; likewise
+SERIES_SECONDS = 3e-8  # of modes squared in tables, where beams have them as series; likewise
+TABLE_BYTES = 128  # of a mode at a station of tables, at most
 
 
 class Used(NamedTuple):
@@ -72,16 +78,21 @@ class _Group(NamedTuple):
 
     def seconds(self, plan: Plan) -> float:
         """Expected time on one thread; no body with more modes is made for that."""
-        tables, ties = SceneTables(self.scene, self.steps, plan.window), self.scene.ties
-        automatic = len(automatic_bodies(self.scene))
-        modes = MORE_MODES * (self.chosen * automatic + _fixed_modes(self.scene)) + self.scene.omega.size
-        modes -= self.scene.body_modes  # what is left are those of sprung masses
-        timeline = tables.timeline
-        once = timeline.repeats and tables.cycle_bytes <= KEPT_BYTES
+        ties, timeline = self.scene.ties, SceneTables(self.scene, self.steps, plan.window).timeline
+        modes = self.modes
+        once = timeline.repeats and TABLE_BYTES * self.steps * modes * ties <= KEPT_BYTES
         stations = min(timeline.steps, self.steps) if once else timeline.steps
+        series = any(isinstance(body, Beam) for body in self.scene.study.body.values())
+        table = STATION_SECONDS + (SERIES_SECONDS * modes**2 if series else MODE_SECONDS * modes)
         lanes = LANES * -(-self.variants.size // LANES)
         march = modes * (1.0 + 0.1 * len(plan.study.sensor)) * ties**1.2 * timeline.steps * lanes / PACE
-        return float(GROUP_SECONDS + (STATION_SECONDS + MODE_SECONDS * modes) * stations * ties + march)
+        return float(GROUP_SECONDS + table * stations * ties + march)
+
+    @property
+    def modes(self) -> int:
+        """About as many as are marched, with those of sprung masses."""
+        own = self.chosen * len(automatic_bodies(self.scene)) + _fixed_modes(self.scene)
+        return MORE_MODES * own + self.scene.omega.size - self.scene.body_modes
 
 
 def expected(plan: Plan) -> Used:
@@ -163,7 +174,7 @@ def _groups(plan: Plan, variants: Counts, used: Used) -> Iterator[_Group]:
         order = np.argsort(-wanted, kind="stable")
         first = 0
         for last in range(1, order.size + 1):
-            shared = FULL_SHARED if last - first >= LANES else SHARED
+            shared = FULL_SHARED if last - first >= MOST else SHARED
             if last == order.size or shared * wanted[order[last]] < wanted[order[first]]:
                 part = own[order[first:last]]
                 yield _Group(scene, _modes(scene, part, used), int(np.ceil(wanted[order[first]])), part)

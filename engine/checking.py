@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from engine.bodies.rigid import Rigid
 from engine.choice import FEW, fewer_modes
 from engine.fidelity import least_steps
+from engine.kernels.layout import Alpha
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
 from engine.resonance import contact_omega
@@ -23,6 +24,7 @@ from results_schema.errors import BadInput
 
 Counts = NDArray[np.int64]
 
+ALPHA_DOUBT = 1.5  # times that for alpha schemes, which leave their asymptotic range sooner than Newmark's
 SURE_ORDER = 2  # of schemes that are of higher order in smooth scenes only
 OF_MORE = 1.5  # times what some more modes change is what few of them miss
 
@@ -58,7 +60,8 @@ def checks_of(tables: SceneTables, compared: Literal["half", "twice"]) -> Checks
     if tables.model.scheme.stride > 1:
         return Checks(None, 0.0, None if model is None else tables.with_steps(model, 1), missed)
     grown = 2.0 ** min(tables.model.scheme.order, SURE_ORDER)
-    ratio, part = (-2, 1.0 / (grown - 1.0)) if compared == "half" else (2, grown / (grown - 1.0))
+    doubt = ALPHA_DOUBT if isinstance(tables.scheme, Alpha) else 1.0
+    ratio, part = (-2, doubt / (grown - 1.0)) if compared == "half" else (2, doubt * grown / (grown - 1.0))
     modes = None if model is None else tables.with_steps(model, min(ratio, 1))
     return Checks(tables.with_steps(tables.model, ratio), part, modes, missed)
 

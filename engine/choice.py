@@ -36,6 +36,7 @@ FEW, MORE = 4, 3  # fewer modes than these are compared with so many more, other
 UNKNOWN = 12  # modes where nothing is known of their error
 USUAL = 1e-3  # the tolerance at which `STEPS_PER_PERIOD` is right where nothing is known
 CELL = 0.05  # width of the lattice's cells, as a part of a number
+UNFELT = 0.05  # of the tolerance: ringing that need not be resolved
 MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 LEAST_PART = 0.1  # of the tolerance that steps may take where nothing holds it
 UNHELD = 1e15  # price of an error, beyond that of any march
@@ -52,7 +53,7 @@ class Choice(NamedTuple):
     tolerance; and the errors that these leave, NaN where nobody can tell.
 
     decay: the error of all these modes over that of as many as `checking` compares them with. ruled: 1 where the steps
-    are more than the tolerance asks for, by the rules that no march may break.
+    are more than the tolerance asks for, by the rules that no march may break. felt: modes that ring noticeably.
     """
 
     fidelity: Array
@@ -63,6 +64,7 @@ class Choice(NamedTuple):
     error_steps: Array
     decay: Array
     ruled: Array
+    felt: Array
 
     def of(self, lanes: Counts | NDArray[np.bool_]) -> Choice:
         """Some of them."""
@@ -186,7 +188,7 @@ class _Options:
         tolerance, time = values.of("solver.tolerance"), values.time_scale(self.scene.carriages[0].name)
         none = np.zeros(values.size)
         if model is Fidelity.STATIC:
-            choice = Choice(none + model, none, none, error, none, none, none, none)
+            choice = Choice(none + model, none, none, error, none, none, none, none, none)
             return _Option(choice, np.where(error <= MOST_SIMPLER * tolerance, 0.0, np.inf))
         kept, ours = level or MODES_LOOKED_AT, error * float(len(self.models) > 1)
         left, (sizes, slips) = told.modes(kept), told.ringing(kept)
@@ -198,7 +200,8 @@ class _Options:
         missed = missed_by(sizes, slips, self._unit(time) / steps)
         fewer = told.modes(fewer_modes(kept)) if level else none
         decay = np.divide(left, fewer, out=np.ones_like(left), where=fewer > left)
-        choice = Choice(none + model, none + level, steps, error, left, missed, decay, (rules > wanted).astype(float))
+        ruled = (rules > wanted).astype(float)
+        choice = Choice(none + model, none + level, steps, error, left, missed, decay, ruled, told.felt(tolerance))
         holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (wanted < most)
         price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
         last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
@@ -239,7 +242,8 @@ class _Options:
         wanted, rules = usual_steps(values) * periods, self._rules(self.models[-1], level, values)
         steps = round_up(np.maximum(np.minimum(wanted, MOST_CHOSEN), rules)).astype(np.float64)
         ruled = (rules > wanted).astype(float)
-        return Choice(none + self.models[-1], none + level, steps, none, nothing, nothing, none + 1.0, ruled)
+        felt = none + np.inf
+        return Choice(none + self.models[-1], none + level, steps, none, nothing, nothing, none + 1.0, ruled, felt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,6 +265,14 @@ class _Told:
     def modes(self, level: int) -> Array:
         """(V,) error of keeping so many modes of every body."""
         return np.asarray(np.sum([load.modes(level) for load in self.loads], axis=0))
+
+    def felt(self, tolerance: Array) -> Array:
+        """(V,) number of the lowest modes beyond which all ringing together is less than `UNFELT` of the tolerance."""
+        found = [
+            np.max(np.where(load.tails > UNFELT * tolerance, load.load.modes[:, None] + 1, 1), axis=0)
+            for load in self.loads
+        ]
+        return np.asarray(np.max(found, axis=0), dtype=np.float64)
 
     def ringing(self, level: int) -> tuple[Array, Array]:
         """What the step may spoil (R, V), and by which part per square of it, with so many modes of every body."""

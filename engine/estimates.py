@@ -1,8 +1,8 @@
 """The errors of marched variants, from what changes when they are marched with other steps and other modes.
 
 Differences are of whole histories, sampled at common stations, and of what the study makes of them (mechanics section
-6: not of two extremes). Where every mode that a march keeps is resolved (`resolution`), it misses the part of such a
-difference that `checking` tells; elsewhere nothing but the whole difference bounds its error.
+6: not of two extremes). Where every mode that rings noticeably is resolved (`resolution`), a march misses the part of
+such a difference that `checking` tells; elsewhere nothing but the whole difference bounds its error.
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ class Estimator:
         partner, steps = own, missed
         if checks.steps is not None:
             other = self._march(checks.steps, own)
-            resolved = phase_errors(max(checks.steps, own.tables, key=lambda t: t.steps), self._values) <= RESOLVED
+            finer = max(checks.steps, own.tables, key=lambda tables: tables.steps)
+            resolved = phase_errors(finer, self._values, told.felt) <= RESOLVED
             steps = self._apart(own, other) * np.where(resolved, checks.missed, max(1.0, checks.missed))
             partner = other if other.tables.steps < own.tables.steps else own
         assert steps is not None

@@ -22,7 +22,7 @@ Counts = NDArray[np.int64]
 
 PART = 0.4  # of what the model leaves of the tolerance, for steps and for modes each
 LEAST_PART = 0.05  # of the tolerance itself, likewise
-MOST_COST = 6.0  # times the full model's at a tolerance of 1e-3 or more: what still misses it says so
+MOST_COST = 10.0  # times the full model's at a tolerance of 1e-3 or more: what still misses it says so
 ROUNDS = 3  # of improving
 AT_ONCE = 8  # times the steps before the next look
 NEXT = (*LEVELS, 32, 48, MAX_MODES)  # numbers of modes to go on with
@@ -43,22 +43,24 @@ def improvements(
     steps = np.ones(wanting.size, dtype=np.int64)
     if not fixed_steps(plan.study, values):
         steps = _times(np.sqrt(flat["error_steps"][wanting] / allowed))
-    for wanted in np.unique(modes):
-        lanes = np.flatnonzero(modes == wanted)
-        by = np.maximum(steps[lanes], _safe(plan, bucket, int(wanted), variants[wanting[lanes]]))
-        for times in np.unique(by):
-            own = wanting[lanes[by == times]]
-            own = own[_is_worth(bucket, int(wanted), int(times), plan.values(bucket, variants[own]), variants[own])]
-            if (wanted or times > 1) and own.size:
-                yield bucket.finer(int(wanted), int(times)), own
+    for more in (*np.unique(modes[modes > 0])[::-1], 0):
+        lanes = np.flatnonzero(modes == more)
+        own, most = variants[wanting[lanes]], _most_times(bucket, int(more), plan, variants[wanting[lanes]])
+        by = np.maximum(np.minimum(steps[lanes], most), _safe(plan, bucket, int(more), own))
+        modes[lanes[by > most]] = 0  # what is not worth its cost may still take more steps
+        for times in np.unique(by[by <= most]):
+            if more or times > 1:
+                yield bucket.finer(int(more), int(times)), wanting[lanes[by == times]]
 
 
-def _is_worth(bucket: Bucket, modes: int, by: int, values: LaneValues, variants: Counts) -> NDArray[np.bool_]:
-    """(V,) whether so many modes and times the steps are worth their cost."""
-    most = MOST_COST * np.maximum(1.0, usual_steps(values) / STEPS_PER_PERIOD)
-    grown = by * max(1.0, modes * len(bucket.chosen) / bucket.scene.body_modes)
-    cost = bucket.cost * grown / bucket.full_cost[bucket.of(variants)]
-    return np.asarray((cost <= most) & (bucket.steps * by <= MOST_CHOSEN))
+def _most_times(bucket: Bucket, modes: int, plan: Plan, variants: Counts) -> Counts:
+    """(V,) powers of two by which the steps may grow, with so many modes, for what that is worth; 0 where not even as
+    many as now are."""
+    worth = MOST_COST * np.maximum(1.0, usual_steps(plan.values(bucket, variants)) / STEPS_PER_PERIOD)
+    grown = max(1.0, modes * len(bucket.chosen) / bucket.scene.body_modes)
+    ratio = worth * bucket.full_cost[bucket.of(variants)] / (bucket.cost * grown)
+    ratio = np.minimum(ratio, MOST_CHOSEN / bucket.steps)
+    return np.where(ratio < 1.0, 0, np.exp2(np.floor(np.log2(np.maximum(ratio, 1.0)) + 1e-9))).astype(np.int64)
 
 
 def _times(ratio: Array) -> Counts:

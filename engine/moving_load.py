@@ -83,11 +83,19 @@ class Load:
 
     def at_places(self, amplitude: Array) -> Array:
         """(J, V) what modal amplitudes (K, V) per unit of drive mean at most in every sensor, in its unit."""
-        return np.asarray(self.route.rows @ amplitude * self.weight)
+        return np.asarray(_product(self.route.rows, amplitude) * self.weight)
 
     def through_mass(self, amplitude: Array, mass: Array) -> Array:
         """(J, V) what sensors read of other modes when modes ring with amplitudes (K, V) under a mass (K, V), kg."""
-        return np.asarray(self.route.coupled @ (amplitude * mass) * self.weight)
+        return np.asarray(_product(self.route.coupled, amplitude * mass) * self.weight)
+
+
+def _product(rows: Array, columns: Array) -> Array:
+    """rows (J, K) times columns (K, V), each column by itself: a library's product may round one by its neighbours."""
+    found = np.zeros((rows.shape[0], columns.shape[1]))
+    for row, column in zip(rows.T, columns, strict=True):
+        found += row[:, None] * column
+    return found
 
 
 def noticed(loads: Sequence[Load]) -> Array:

@@ -87,6 +87,12 @@ class Omitted:
         rows = np.eye(self.load.modes.size)[:, :, None] * np.ones(self.load.time.size)
         return np.stack([self._relative(self.load.at_places(row)).max(axis=0) for row in rows])
 
+    @cached_property
+    def tails(self) -> Array:
+        """(K, V) at most what every mode and all above it ring, as a part of static values."""
+        rings = self._read * self.ringing
+        return np.asarray(np.cumsum(rings[::-1], axis=0)[::-1])
+
     def stepped(self, kept: int) -> tuple[Array, Array]:
         """What the step may spoil, as parts of static values (R, V), and by which part per square of the step, 1/s^2:
         the ringing of the kept modes, and what follows the drive."""

@@ -21,8 +21,11 @@ Array = NDArray[np.float64]
 RESOLVED = 1.3  # rad: the largest phase error of any kept mode in the finer march; `tests.calibration.richardson`
 
 
-def phase_errors(tables: SceneTables, values: LaneValues) -> Array:
-    """(V,) the largest phase error in rad that a mode of the march gathers before its damping forgets it."""
+def phase_errors(tables: SceneTables, values: LaneValues, felt: Array | None = None) -> Array:
+    """(V,) the largest phase error in rad that a mode of the march gathers before its damping forgets it.
+
+    felt: (V,) number of the lowest modes of every body that are looked at; all without.
+    """
     timeline = tables.timeline
     scale = values.time_scale(tables.model.carriages[0].name)
     moving = [segment for segment in timeline.segments if not segment.free]
@@ -33,7 +36,7 @@ def phase_errors(tables: SceneTables, values: LaneValues) -> Array:
     if free:
         rest = _free_seconds(tables.model)
         longest, gathered = np.maximum(longest, rest / free), gathered + rest * (rest / free) ** 2
-    return _worst(tables.model, values, gathered, longest**2)
+    return _worst(tables.model, values, gathered, longest**2, felt)
 
 
 def steps_to_resolve(model: SceneModel, values: LaneValues) -> Array:
@@ -44,13 +47,15 @@ def steps_to_resolve(model: SceneModel, values: LaneValues) -> Array:
     return np.sqrt(_worst(model, values, duration * unit**2, unit**2) / RESOLVED)
 
 
-def _worst(model: SceneModel, values: LaneValues, gathered: Array, square: Array) -> Array:
+def _worst(model: SceneModel, values: LaneValues, gathered: Array, square: Array, felt: Array | None = None) -> Array:
     """(V,) largest omega^3/12 times what has gathered, in s^3: over the run, or h^2 times what the mode remembers."""
     worst = np.zeros(values.size)
     for part in model.bodies:
         rates = values.damping_rates(part.name, part.modal.omega)
         memory = np.divide(2.0, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
         behind = part.modal.omega[:, None] ** 3 / 12.0 * np.minimum(gathered, memory * square)
+        if felt is not None:
+            behind = np.where(np.arange(part.modal.omega.size)[:, None] < felt, behind, 0.0)
         worst = np.maximum(worst, behind.max(axis=0))
     return np.maximum(worst, bounce_omega(model, values) ** 3 / 12.0 * gathered)
 

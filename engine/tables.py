@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,7 +30,7 @@ Counts = NDArray[np.int64]
 SegmentKey = tuple[float, float, int, tuple[bool, ...]]
 Missed = list[Array]  # of one segment: residual flexibility between ties, and of the signals; or empty
 
-KEPT_BYTES = 96 * 2**20  # tables kept per scene; older ones are built again
+KEPT_BYTES = 96 * 2**20  # tables kept per scene; those beyond are built again
 STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
 SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
@@ -68,8 +67,8 @@ class SceneTables:
     window: Window
     readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
     refinement: int = 1
-    _kept: OrderedDict[SegmentKey, SegmentTable] = field(default_factory=OrderedDict)
-    _missed: OrderedDict[SegmentKey, Missed] = field(default_factory=OrderedDict)
+    _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
+    _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
@@ -149,13 +148,12 @@ class SceneTables:
         unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
         key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.steps, segment.active)
         with self._lock:
-            found = self._kept.pop(key, None)
+            found = self._kept.get(key)
             if found is None:
                 shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
                 found = self._build(shifted, self._missed_of(key))
-            self._kept[key] = found
-            while len(self._kept) > 1 and sum(table.bytes for table in self._kept.values()) > KEPT_BYTES:
-                self._kept.popitem(last=False)
+                if sum(table.bytes for table in self._kept.values()) + found.bytes <= KEPT_BYTES:
+                    self._kept[key] = found  # and no other goes: marches ask for all in turn, the oldest first
         return found
 
     def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
@@ -173,11 +171,10 @@ class SceneTables:
 
     def _missed_of(self, key: SegmentKey) -> Missed:
         """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate
-        than the rows, and much less memory. Empty where they are not known; older ones are dropped."""
-        found = self._missed.pop(key, [])
-        self._missed[key] = found
-        while len(self._missed) > 1 and sum(part.nbytes for one in self._missed.values() for part in one) > KEPT_BYTES:
-            self._missed.popitem(last=False)
+        than the rows, and much less memory. Empty where they are not known."""
+        found = self._missed.get(key, [])
+        if sum(part.nbytes for one in self._missed.values() for part in one) <= KEPT_BYTES:
+            self._missed[key] = found
         return found
 
     def _ways(self, segment: Segment) -> tuple[Way, ...]:

@@ -120,8 +120,10 @@ def test_tables_are_shared_by_steps_of_one_size() -> None:
     used = Used(np.full(40, 3), np.where(np.arange(40) < 20, 10_000, 1000))
     assert [bucket.steps for bucket in again(plan, np.arange(40), used)] == [40_000, 4000]
     used = Used(np.full(40, 3), np.linspace(8000, 2000, 40).astype(np.int64))
-    assert 1 < len(again(plan, np.arange(40), used)) <= 3
-    assert len(again(plan, np.arange(0, 40, 4), used)) == 1
+    assert [bucket.steps for bucket in again(plan, np.arange(40), used)] == [32_000]
+    many = masses(600, CROSSING)
+    used = Used(np.full(600, 3), np.linspace(8000, 2000, 600).astype(np.int64))
+    assert 1 < len(again(many, np.arange(600), used)) <= 3
 
 
 def test_few_fixed_steps_do_not_let_the_audit_ring() -> None:

@@ -110,10 +110,8 @@ FINER = 8  # times the steps of the truth
 HONEST = 0.9  # of the truth that an estimate must be at least
 
 SCENES = {
-    "crossing": full(DAMPED, mass(0.2, CROSSING)),
     "one mode": full(beam(modes=1), mass(0.2, CROSSING)),
     "two modes": full(beam(modes=2, damping_ratio=0.01), mass(0.2, CROSSING)),
-    "three modes": full(beam(modes=3), mass(0.2, CROSSING)),
     "twice the steps": full(DAMPED, mass(0.2, CROSSING), 200),
     "no static correction": full(DAMPED, mass(0.2, CROSSING), solver={"static_correction": False}),
     "bending moment": full(DAMPED, mass(0.2, CROSSING), sensor=MOMENT),

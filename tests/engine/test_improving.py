@@ -77,8 +77,7 @@ def test_all_marches_are_paid_for(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.all(found.relative_cost.values > once.relative_cost.values + own / cost_of_full / 2.0)
 
 
-@pytest.mark.parametrize("wanted", ["all", "auto", {"every": 4}])
-@pytest.mark.parametrize("after", [0.0, 1.0])
+@pytest.mark.parametrize(("wanted", "after"), [("all", 1.0), ("auto", 0.0), ({"every": 4}, 1.0), ({"every": 3}, 0.0)])
 def test_histories_of_improved_variants(wanted: Any, after: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are those of the better march, at the stations that the first one had."""
     given = improved(output={"histories": wanted}, carriage={"car": mass(0.3, CROSSING | {"after": after})})
@@ -141,6 +140,12 @@ def test_status_by_errors(parts: tuple[float, float, float], status: Status) -> 
     given = study(OPEN, mass(0.3, CROSSING))
     found = errors(*parts).status(given, LaneValues(given, {}, 1), ("bed",))
     assert found.tolist() == [status]
+
+
+def test_without_sensors_nothing_is_estimated() -> None:
+    found = run(study(OPEN, mass(0.3, CROSSING), sensor={}))
+    assert int(found.status) == Status.UNRESOLVED and np.isnan(float(found.error_estimate))
+    assert np.isfinite(float(found.car_contact_force_max))
 
 
 def test_what_cannot_be_estimated_is_unresolved(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -64,6 +64,7 @@ _AUDITED = {
     ("int32", False): np.array([8, 12, 24], dtype=np.int32),
     ("str", False): np.array(["midspan_max", "lag of é", ""]),
     ("int64", False): np.array(2),
+    ("int8", False): np.array([0, 1, 3], dtype=np.int8),
 }
 
 

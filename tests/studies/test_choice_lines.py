@@ -18,10 +18,9 @@ BED = beam(modes="auto", damping_ratio=0.05)
 OUT_AND_BACK = mass(0.3, shuttle(0.1, 0.9, 0.3, 0.1, 4))
 SWUNG = mass(0.3, swing(0.5, 0.4, 0.15, 4))
 LINES: dict[str, tuple[str, Table, Reduction, str, float, float]] = {
-    "lag by speed": ("asymmetry", OUT_AND_BACK, AsymmetryReduction(), "carriage.car.motion.speed", 0.03, 0.5),
-    "lag by mass": ("asymmetry", OUT_AND_BACK, AsymmetryReduction(), "carriage.car.mass", 0.01, 1.0),
+    "lag by speed": ("asymmetry", OUT_AND_BACK, AsymmetryReduction(), "carriage.car.motion.speed", 0.05, 0.5),
     "lag by damping": ("asymmetry", OUT_AND_BACK, AsymmetryReduction(), "body.bed.damping_ratio", 0.02, 0.1),
-    "peaks by pace": ("double-peak", SWUNG, DoublePeakReduction(), "carriage.car.motion.frequency", 0.03, 0.25),
+    "peaks by pace": ("double-peak", SWUNG, DoublePeakReduction(), "carriage.car.motion.frequency", 0.05, 0.25),
     "peaks by mass": ("double-peak", SWUNG, DoublePeakReduction(), "carriage.car.mass", 0.01, 1.0),
 }
 
@@ -46,3 +45,16 @@ def test_no_jumps_where_the_choice_changes(name: str) -> None:
     assert values[0].size >= 2
     for jump in reduction.differences(sides(kind, carriage, reduction, path, values)).values():
         assert np.all(jump <= 2.0 * given.solver.tolerance)
+
+
+@pytest.mark.xfail(strict=True, reason="a peak near phase 0 of a cycle that has not settled depends on the stations")
+def test_peaks_where_the_cycle_is_closed() -> None:
+    """Two numbers of steps tell the same peaks, within what both say of their errors."""
+    pace = mass(0.3, swing(0.5, 0.4, 0.228777, 2))
+    bed = beam(modes=12, damping_ratio=0.02)
+    one, two = (
+        run(study(bed, pace, kind="double-peak", solver={"steps": steps}), reduction=DoublePeakReduction())
+        for steps in (3200, 2400)
+    )
+    gap = np.nanmax(np.abs(one.peak_value.values - two.peak_value.values)) / float(one.midspan_static)
+    assert gap <= 2.0 * float(one.error_estimate + two.error_estimate)

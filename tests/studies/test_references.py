@@ -27,7 +27,7 @@ UNIT_BODY: dict[str, Any] = {
     "supports": "pinned-pinned",
     "modes": 6,
 }
-MODES_ONLY = {"static_correction": False}
+MODES_ONLY = {"static_correction": False, "fidelity": "full", "tolerance": 2e-5}
 
 
 def unit_study(kind: str, mu: float, body: dict[str, Any], motion: dict[str, Any], **tables: Any) -> engine.Study:
