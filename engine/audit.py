@@ -41,10 +41,8 @@ LEAST_STEPS = 800  # of a variant that marched none
 MODES_OF_STATICS = 3  # whose double is marched for a variant that marched none: statics err by the slowest modes
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-SHARED, FULL_SHARED = (
-    8,
-    2,
-)  # times the steps that a variant takes to share tables, which cost more; once there are `MOST`
+SHARED = 8  # times the steps that a variant takes to share tables, which cost more than that
+FULL_SHARED = 2  # the same once `MOST` share them
 GROUP_SECONDS = 0.05  # besides tables and marching, for expected times only
 STATION_SECONDS = 3e-6  # of tables; likewise
 MODE_SECONDS = 2e-7  # of each mode of frames in tables; likewise

@@ -7,7 +7,9 @@ twice what all of them miss, as that falls with the number of modes or faster; o
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,16 +76,22 @@ def can_be_halved(model: SceneModel, values: LaneValues, steps: Counts) -> NDArr
 
 
 def _with_other_modes(model: SceneModel) -> tuple[SceneModel | None, float]:
-    """The scene with half the modes of every body, or some more where there are few; None where it has no such one."""
-    changes: dict[str, Any] = {}
-    few = max(part.modal.omega.size for part in model.bodies) < FEW
-    for part in model.bodies:
-        body, size = model.study.body[part.name], part.modal.omega.size
-        if not isinstance(body, Rigid):
-            wanted = fewer_modes(size) if few else max(size // 2, min(size, part.modal.rigid_modes + 1))
-            changes |= {f"body.{part.name}.modes": wanted}
-    try:
-        other = simplified(model, changes)
-    except BadInput:  # a list of damping ratios has no more of them
-        return None, 0.0
-    return (None, 0.0) if other.body_modes == model.body_modes else (other, OF_MORE if few else 1.0)
+    """The scene with half the modes of every body, or some more where there are few; None where it has no such one. And
+    the part of the difference that is missed."""
+    if max(part.modal.omega.size for part in model.bodies) < FEW:
+        with suppress(BadInput):  # a list of damping ratios has no more of them
+            more = _with_modes(model, {part.name: fewer_modes(part.modal.omega.size) for part in model.bodies})
+            if more.body_modes > model.body_modes:
+                return more, OF_MORE
+    least = {part.name: min(part.modal.omega.size, part.modal.rigid_modes + 1) for part in model.bodies}
+    halved = {part.name: max(part.modal.omega.size // 2, least[part.name]) for part in model.bodies}
+    other = _with_modes(model, halved)
+    return (None, 0.0) if other.body_modes == model.body_modes else (other, 1.0)
+
+
+def _with_modes(model: SceneModel, counts: Mapping[str, int]) -> SceneModel:
+    """The scene with so many modes of its bodies, as far as they have any to choose."""
+    bodies = model.study.body
+    return simplified(
+        model, {f"body.{n}.modes": count for n, count in counts.items() if not isinstance(bodies[n], Rigid)}
+    )

@@ -195,7 +195,7 @@ def test_a_hundredth_is_audited() -> None:
 
 
 def test_half_as_many_until_that_takes_no_longer_than_it_may() -> None:
-    plan = masses(40, shuttle(0.2, 0.8, 0.005, 0.1, 60))
+    plan = masses(40, shuttle(0.2, 0.8, 0.3, 0.1, 4))
     sample = sampled(plan)
     whole = audit_seconds(plan, sample._replace(seconds=np.inf))
     assert whole[0] == 16
