@@ -220,13 +220,13 @@ class _Options:
         """(V,) steps that the rules ask for which no march may break, for any variant of a cell."""
         time, scene = values.time_scale(self.scene.carriages[0].name), self.whole
         kept = [part.modal.omega[: level or None] for part in scene.bodies]
-        found = np.maximum(LEAST_STEPS, FINER * limit_steps(scene, max(float(omega[-1]) for omega in kept), time))
+        found = FINER * limit_steps(scene, max(float(omega[-1]) for omega in kept), time)
         if model > Fidelity.FORCE:
             found = np.maximum(found, FINER * LEAST_MARGIN * alias_steps(scene, time, level or None))
         if model is Fidelity.TIED:
             sprung = self._with(level)
             found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
-        return np.asarray((1.0 + CELL) * found)
+        return np.asarray(np.maximum((1.0 + CELL) * found, LEAST_STEPS))
 
     def _with(self, level: int) -> SceneModel:
         """The carriages' own model with so many modes."""

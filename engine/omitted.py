@@ -25,7 +25,7 @@ from engine.ringing import rings
 
 Array = NDArray[np.float64]
 
-MODES_LOOKED_AT = 36
+MODES_LOOKED_AT = 30
 COUPLED = 0.5  # of the largest inertia of a load on what omitted modes leave soft: it acts for a short time only
 SOFTENED = 0.7  # times the phase by which ringing drifts on a body that is softer than its kept modes tell
 TURNED = 2.0  # times its size: the most that ringing with a wrong phase can miss

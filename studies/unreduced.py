@@ -31,6 +31,8 @@ MOST_NAMES = 4
 
 def check_unreduced(study: Study) -> None:
     """Refuse what cannot be computed again, before anything is. Raises BadInput."""
+    if not study.output.unreduced:
+        return
     from engine.unreduced_comparison import check_unreduced as check
 
     check(study)

@@ -27,7 +27,7 @@ from engine.bodies.modal import Array
 _BLOCK = 256  # rows per matrix product: with blocks of one size a row's bits do not depend on the other rows
 _CHUNK = 16 * _BLOCK  # stations at a time: the polynomials stay in the cache
 _LAST_BIT = 1e-17
-SHARED = 36  # modes that a body is decomposed into at least: studies ask for few and for many of the same one
+SHARED = 30  # modes that a body is decomposed into at least: studies ask for few and for many of the same one
 
 
 @dataclass(frozen=True, eq=False)
