@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
 from engine.checking import can_be_halved
-from engine.choice import Choice, automatic_bodies, choose, with_choice
+from engine.choice import Choice, automatic_bodies, with_choice
+from engine.choosing import choose
 from engine.envelopes import check_places, places_read
 from engine.fidelity import (
     Needs,

@@ -1,0 +1,202 @@
+"""Every combination of model, modes and steps that a scene may get, with its price, and the cheapest that holds.
+
+All three errors are estimates (`ladder`, `omitted`); of all combinations whose sum is within the tolerance the one with
+the fewest modes x steps is taken, so that a tighter tolerance never gets a cheaper one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.choice import FINER, LEVELS, MOST_CHOSEN, Choice, automatic_bodies, fewer_modes, usual_steps, with_choice
+from engine.fidelity import LEAST_MARGIN, LEAST_STEPS, alias_steps, limit_steps, round_up
+from engine.ladder import errors_along, full_fidelity
+from engine.lanes import LaneValues
+from engine.model import SceneModel, simplified
+from engine.moving_load import Load, noticed
+from engine.omitted import MODES_LOOKED_AT, Omitted, longest_step, missed_by
+from engine.resonance import spring_steps
+from engine.route import Route, routes
+from engine.timeline import Window
+from results_schema.status import Fidelity
+
+Array = NDArray[np.float64]
+
+CELL = 0.05  # width of the lattice's cells on which variants are looked at, as a part of a number
+UNKNOWN = 12  # modes where nothing is known of their error
+UNFELT = 0.05  # of the tolerance: ringing that need not be resolved
+MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
+LEAST_PART = 0.1  # of the tolerance that steps may take where nothing holds it
+UNHELD = 1e15  # price of an error, beyond that of any march
+UNKNOWN_PRICE = 1e300  # of the carriages' own model where nothing can be told, beyond any error's
+MOST_FINER = 12.0  # times the steps where nothing is known, for the sake of the tolerance
+CHOSEN = (Fidelity.STATIC, Fidelity.FORCE, Fidelity.MASS)  # besides the carriages' own model
+
+
+class _Option(NamedTuple):
+    """One combination of model, modes and steps for V variants, and its price in modes x steps; more than any other's
+    where it does not hold the tolerance, by its error."""
+
+    choice: Choice
+    price: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Options:
+    """Everything that may be chosen for a scene."""
+
+    scene: SceneModel
+    least: Fidelity
+    window: Window
+    _models: dict[int, SceneModel] = field(default_factory=dict)
+
+    @cached_property
+    def whole(self) -> SceneModel:
+        """The scene with as many modes as are looked at."""
+        names = automatic_bodies(self.scene)
+        changes = {f"body.{name}.modes": MODES_LOOKED_AT for name in names}
+        return simplified(self.scene, changes) if names else self.scene
+
+    @cached_property
+    def levels(self) -> tuple[int, ...]:
+        """Numbers of modes to choose from; 0 where none is chosen."""
+        names = automatic_bodies(self.scene)
+        if not names:
+            return (0,)
+        rigid = max(part.modal.rigid_modes for part in self.whole.bodies if part.name in names)
+        return tuple(level for level in LEVELS if level > rigid)
+
+    @cached_property
+    def models(self) -> tuple[Fidelity, ...]:
+        """Models to choose from, cheapest first."""
+        full = full_fidelity(self.scene)
+        if self.scene.study.solver.fidelity != "auto":
+            return (self.scene.fidelity,)
+        simpler = [model for model in CHOSEN if self.least <= model < full]
+        if not self.scene.study.solver.static_correction:  # statics know the kept modes alone
+            simpler = [model for model in simpler if model is not Fidelity.STATIC]
+        if any(carriage.rides is not None for carriage in self.scene.carriages):
+            simpler = [model for model in simpler if model is Fidelity.STATIC]
+        return (*simpler, full)
+
+    @cached_property
+    def along(self) -> tuple[Route, ...] | None:
+        """The routes of all loads over the whole bodies."""
+        return routes(self.whole, MODES_LOOKED_AT, self.window)
+
+    def choose(self, values: LaneValues) -> Choice:
+        """The choice for some variants."""
+        if self.along is None:
+            return self._unknown(values)
+        errors, told = errors_along(self.whole, self.along, values), Told.of(self.along, values)
+        options = [
+            self._option(model, errors.get(model, np.zeros(values.size)), level, told, values)
+            for model in self.models
+            for level in (self.levels if model is not Fidelity.STATIC else self.levels[:1])
+        ]
+        price = np.stack([option.price for option in options])
+        cheapest = np.argmin(price, axis=0)
+        columns = (np.stack(column) for column in zip(*(option.choice for option in options), strict=True))
+        return Choice(*(np.take_along_axis(column, cheapest[None], axis=0)[0] for column in columns))
+
+    def _option(self, model: Fidelity, error: Array, level: int, told: Told, values: LaneValues) -> _Option:
+        """One combination for some variants."""
+        tolerance, time = values.of("solver.tolerance"), values.time_scale(self.scene.carriages[0].name)
+        none = np.zeros(values.size)
+        if model is Fidelity.STATIC:
+            choice = Choice(none + model, none, none, error, none, none, none, none, none)
+            return _Option(choice, np.where(error <= MOST_SIMPLER * tolerance, 0.0, np.inf))
+        kept, ours = level or MODES_LOOKED_AT, error * float(len(self.models) > 1)
+        left, (sizes, slips) = told.modes(kept), told.ringing(kept)
+        allowed = tolerance - ours - (left if level else 0.0)
+        step = longest_step(sizes, slips, np.maximum(allowed, LEAST_PART * tolerance), time / LEAST_STEPS)
+        most = np.minimum(MOST_FINER * np.maximum(usual_steps(values) * self._periods(time), LEAST_STEPS), MOST_CHOSEN)
+        wanted, rules = np.minimum(self._unit(time) / step, most), self._rules(model, level, values)
+        steps = round_up(np.maximum(wanted, rules)).astype(np.float64)
+        missed = missed_by(sizes, slips, self._unit(time) / steps)
+        fewer = told.modes(fewer_modes(kept)) if level else none
+        decay = np.divide(left, fewer, out=np.ones_like(left), where=fewer > left)
+        ruled = (rules > wanted).astype(float)
+        choice = Choice(none + model, none + level, steps, error, left, missed, decay, ruled, told.felt(tolerance))
+        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (wanted < most)
+        price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
+        last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
+        return _Option(choice, np.where(np.isnan(price), last, price))
+
+    def _unit(self, time: Array) -> Array:
+        """(V,) s over which steps count; free vibration has as many per first period."""
+        free = any(getattr(rider.motion, "after", 0.0) > 0.0 for rider in self.scene.riders)
+        return np.maximum(time, 2.0 * np.pi / self.scene.first_omega) if free else time
+
+    def _periods(self, time: Array) -> Array:
+        """(V,) first periods over which steps count."""
+        return np.asarray(self._unit(time) * self.scene.first_omega / (2.0 * np.pi))
+
+    def _rules(self, model: Fidelity, level: int, values: LaneValues) -> Array:
+        """(V,) steps that the rules ask for which no march may break, for any variant of a cell."""
+        time, scene = values.time_scale(self.scene.carriages[0].name), self.whole
+        kept = [part.modal.omega[: level or None] for part in scene.bodies]
+        found = FINER * limit_steps(scene, max(float(omega[-1]) for omega in kept), time)
+        if model > Fidelity.FORCE:
+            found = np.maximum(found, FINER * LEAST_MARGIN * alias_steps(scene, time, level or None))
+        if model is Fidelity.TIED:
+            sprung = self._with(level)
+            found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
+        return np.asarray(np.maximum((1.0 + CELL) * found, LEAST_STEPS))
+
+    def _with(self, level: int) -> SceneModel:
+        """The carriages' own model with so many modes."""
+        if level not in self._models:
+            self._models[level] = with_choice(self.scene, full_fidelity(self.scene), level)
+        return self._models[level]
+
+    def _unknown(self, values: LaneValues) -> Choice:
+        """Where nothing is known: the full model, and steps by the tolerance alone."""
+        periods = self._periods(values.time_scale(self.scene.carriages[0].name))
+        nothing, none = np.full(values.size, np.nan), np.zeros(values.size)
+        level = UNKNOWN if automatic_bodies(self.scene) else 0
+        wanted, rules = usual_steps(values) * periods, self._rules(self.models[-1], level, values)
+        steps = round_up(np.maximum(np.minimum(wanted, MOST_CHOSEN), rules)).astype(np.float64)
+        ruled = (rules > wanted).astype(float)
+        felt = none + np.inf
+        return Choice(none + self.models[-1], none + level, steps, none, nothing, nothing, none + 1.0, ruled, felt)
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What is known beforehand of V variants: loads on their routes, and what marches leave out of them."""
+
+    loads: tuple[Omitted, ...]
+
+    @classmethod
+    def of(cls, along: tuple[Route, ...], values: LaneValues) -> Told:
+        """From the routes of all loads."""
+        loads = [Load(route, values) for route in along]
+        found = []
+        for load in loads:
+            on_body = [other for other in loads if other.route.tie.body == load.route.tie.body]
+            found.append(Omitted(load, noticed(on_body)))
+        return cls(tuple(found))
+
+    def modes(self, level: int) -> Array:
+        """(V,) error of keeping so many modes of every body."""
+        return np.asarray(np.sum([load.modes(level) for load in self.loads], axis=0))
+
+    def felt(self, tolerance: Array) -> Array:
+        """(V,) number of the lowest modes beyond which all ringing together is less than `UNFELT` of the tolerance."""
+        found = [
+            np.max(np.where(load.tails > UNFELT * tolerance, load.load.modes[:, None] + 1, 1), axis=0)
+            for load in self.loads
+        ]
+        return np.asarray(np.max(found, axis=0), dtype=np.float64)
+
+    def ringing(self, level: int) -> tuple[Array, Array]:
+        """What the step may spoil (R, V), and by which part per square of it, with so many modes of every body."""
+        parts = [load.stepped(level) for load in self.loads]
+        sizes, slips = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return sizes, slips
