@@ -13,6 +13,7 @@ from engine.fidelity import STEPS_PER_PERIOD
 from engine.ladder import full_fidelity
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
+from engine.timeline import Window
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
@@ -23,6 +24,15 @@ FEW, MORE = 4, 3  # fewer modes than these are compared with so many more, other
 USUAL = 1e-3  # the tolerance at which `STEPS_PER_PERIOD` is right where nothing is known
 FINER = 2.0  # times the steps that are safe: half of them must be so too
 MOST_CHOSEN = 1e6  # steps over a passage or cycle for the sake of the tolerance; what asks for more misses it
+
+
+class Asked(NamedTuple):
+    """What a study asks of a choice: the lowest model that tells what it reports, what is recorded, and the part of
+    what whole histories are off by that the reported is."""
+
+    least: Fidelity
+    window: Window
+    reported: float
 
 
 class Choice(NamedTuple):

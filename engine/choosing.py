@@ -9,12 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.choice import Choice
+from engine.choice import Asked, Choice
 from engine.lanes import LaneValues
 from engine.model import SceneModel
 from engine.options import CELL, Options
-from engine.timeline import Window
-from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -22,11 +20,10 @@ Counts = NDArray[np.int64]
 AT_ONCE = 4096  # variants that are looked at together
 
 
-def choose(scene: SceneModel, values: LaneValues, least: Fidelity, window: Window) -> Choice:
-    """The choice for some variants of a scene. least: the lowest model that tells what the study asks. window: what
-    is recorded."""
+def choose(scene: SceneModel, values: LaneValues, asked: Asked) -> Choice:
+    """The choice for some variants of a scene."""
     cells, inverse = _lattice(values)
-    options = Options(scene, least, window)
+    options = Options(scene, asked)
     with np.errstate(over="ignore"):  # infinitely slow variants
         parts = [options.choose(part) for part in _pieces(cells)]
     return Choice(*(np.concatenate(column) for column in zip(*parts, strict=True))).of(inverse)

@@ -1,8 +1,9 @@
 """The errors of marched variants, from what changes when they are marched with other steps and other modes.
 
-Differences are of whole histories, sampled at common stations, and of what the study makes of them (mechanics section
-6: not of two extremes). Where every mode that rings noticeably is resolved (`resolution`), a march misses the part of
-such a difference that `checking` tells; elsewhere nothing but the whole difference bounds its error.
+Differences are of what the study reports, extremes and what its kind makes of histories, but no less than a part of
+what the whole histories differ by at common stations (mechanics section 6: two extremes alone may agree by chance).
+Where every mode that rings noticeably is resolved (`resolution`), a march misses the part of such a difference that
+`checking` tells; elsewhere nothing but the whole difference bounds its error.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 from engine.bucket import Bucket
 from engine.checking import Checks
 from engine.cycles import counts_sampled, reduced
+from engine.kernels.layout import LARGEST, SMALLEST
 from engine.lanes import LaneValues, padded
-from engine.plan import Plan, fixed_steps
+from engine.march import Marched
+from engine.plan import Plan, fixed_steps, reads_accelerations
 from engine.reduction import Compared
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_chosen
@@ -29,6 +32,7 @@ from results_schema.status import Fidelity, Status
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
+HISTORY_PART = 0.3  # of what histories differ by that extremes may be off without differing
 DOUBTED = 1.5  # times what the ratio that is told beforehand makes of a difference of modes
 LEAST_PART, COUPLED_PART = 0.1, 0.6  # of such a difference that is missed at least, without and with a mass
 
@@ -61,13 +65,21 @@ def pair_errors(tables: SceneTables, values: LaneValues, gap: Array, scale: Arra
     return np.where(phase_errors(tables, values) <= RESOLVED, worst, np.nan)
 
 
+def extremes_of(tables: SceneTables, marched: Marched) -> Array:
+    """(V, J, 2) largest and smallest value of every sensor; 0 where it never counts."""
+    found = marched.marks[: len(tables.sensors)][:, [LARGEST, SMALLEST]]
+    return np.ascontiguousarray(np.where(np.isinf(found), 0.0, found).transpose(2, 0, 1))
+
+
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What a march of V variants left: histories (H, J, V) at stations (H,) by their count, results (V, ...)."""
+    """What a march of V variants left: histories (H, J, V) at stations (H,) by their count, extremes (V, J, 2), results
+    (V, ...)."""
 
     tables: SceneTables
     counts: Counts
     history: Array
+    extremes: Array
     results: dict[str, NDArray[np.generic]]
 
 
@@ -127,11 +139,11 @@ class Estimator:
         marched, _ = march_chosen(tables, values, counts, self.variants.size, self.halted)
         values = LaneValues(tables.model.study, self._values.columns, self.variants.size)
         results = reduced(self.plan, tables, values, counts, marched.history)
-        return Observed(tables, counts, marched.history, results)
+        return Observed(tables, counts, marched.history, extremes_of(tables, marched), results)
 
     def _apart(self, one: Observed, other: Observed) -> Array:
-        """(V,) the largest difference of histories and results; NaN where one of them is no number, and without
-        sensors."""
+        """(V,) the largest difference of extremes and results, no less than a part of that of histories (all of it if
+        they are the result). NaN where one is no number, and without sensors."""
         if not self.scale.shape[1]:
             return np.full(self.variants.size, np.nan)
         finer, coarser = (one, other) if one.tables.steps >= other.tables.steps else (other, one)
@@ -140,7 +152,9 @@ class Estimator:
         with np.errstate(invalid="ignore"):  # of those that have diverged
             gap = np.abs(finer.history[here] - coarser.history[there])
         off = np.isnan(finer.history[here]) & np.isnan(coarser.history[there])  # of a sensor that moves along
-        found = [np.max(np.where(off, 0.0, gap), axis=0).T / self.scale]
+        part = 1.0 if reads_accelerations(self.plan.study) else HISTORY_PART
+        found = [part * np.max(np.where(off, 0.0, gap), axis=0).T / self.scale]
+        found.append(np.max(np.abs(one.extremes - other.extremes), axis=2) / self.scale)
         if self.plan.reduction is not None:
             compared = Compared(one.results, other.results, self.scale, self._values)
             differences = self.plan.reduction.differences(compared).values()

@@ -13,7 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.choice import FINER, LEVELS, MOST_CHOSEN, Choice, automatic_bodies, fewer_modes, usual_steps, with_choice
+from engine.choice import (
+    FINER,
+    LEVELS,
+    MOST_CHOSEN,
+    Asked,
+    Choice,
+    automatic_bodies,
+    fewer_modes,
+    usual_steps,
+    with_choice,
+)
 from engine.fidelity import LEAST_MARGIN, LEAST_STEPS, alias_steps, limit_steps, round_up
 from engine.ladder import errors_along, full_fidelity
 from engine.lanes import LaneValues
@@ -22,7 +32,6 @@ from engine.moving_load import Load, noticed
 from engine.omitted import MODES_LOOKED_AT, Omitted, longest_step, missed_by
 from engine.resonance import spring_steps
 from engine.route import Route, routes
-from engine.timeline import Window
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
@@ -34,6 +43,7 @@ MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 LEAST_PART = 0.1  # of the tolerance that steps may take where nothing holds it
 UNHELD = 1e15  # price of an error, beyond that of any march
 UNKNOWN_PRICE = 1e300  # of the carriages' own model where nothing can be told, beyond any error's
+KINKED = 0.3  # of the tolerance that extremes may miss between stations where an influence line has a kink
 MOST_FINER = 12.0  # times the steps where nothing is known, for the sake of the tolerance
 CHOSEN = (Fidelity.STATIC, Fidelity.FORCE, Fidelity.MASS)  # besides the carriages' own model
 
@@ -51,8 +61,7 @@ class Options:
     """Everything that may be chosen for a scene."""
 
     scene: SceneModel
-    least: Fidelity
-    window: Window
+    asked: Asked
     _models: dict[int, SceneModel] = field(default_factory=dict)
 
     @cached_property
@@ -77,7 +86,7 @@ class Options:
         full = full_fidelity(self.scene)
         if self.scene.study.solver.fidelity != "auto":
             return (self.scene.fidelity,)
-        simpler = [model for model in CHOSEN if self.least <= model < full]
+        simpler = [model for model in CHOSEN if self.asked.least <= model < full]
         if not self.scene.study.solver.static_correction:  # statics know the kept modes alone
             simpler = [model for model in simpler if model is not Fidelity.STATIC]
         if any(carriage.rides is not None for carriage in self.scene.carriages):
@@ -87,7 +96,7 @@ class Options:
     @cached_property
     def along(self) -> tuple[Route, ...] | None:
         """The routes of all loads over the whole bodies."""
-        return routes(self.whole, MODES_LOOKED_AT, self.window)
+        return routes(self.whole, MODES_LOOKED_AT, self.asked.window)
 
     def choose(self, values: LaneValues) -> Choice:
         """The choice for some variants."""
@@ -113,17 +122,19 @@ class Options:
             return _Option(choice, np.where(error <= MOST_SIMPLER * tolerance, 0.0, np.inf))
         kept, ours = level or MODES_LOOKED_AT, error * float(len(self.models) > 1)
         left, (sizes, slips) = told.modes(kept), told.ringing(kept)
+        sizes = self.asked.reported * sizes
         allowed = tolerance - ours - (left if level else 0.0)
         step = longest_step(sizes, slips, np.maximum(allowed, LEAST_PART * tolerance), time / LEAST_STEPS)
         most = np.minimum(MOST_FINER * np.maximum(usual_steps(values) * self._periods(time), LEAST_STEPS), MOST_CHOSEN)
         wanted, rules = np.minimum(self._unit(time) / step, most), self._rules(model, level, values)
+        wanted = np.maximum(wanted, told.kinks / (KINKED * tolerance) if self.asked.window == "last-cycle" else none)
         steps = round_up(np.maximum(wanted, rules)).astype(np.float64)
         missed = missed_by(sizes, slips, self._unit(time) / steps)
         fewer = told.modes(fewer_modes(kept)) if level else none
         decay = np.divide(left, fewer, out=np.ones_like(left), where=fewer > left)
         ruled = (rules > wanted).astype(float)
         choice = Choice(none + model, none + level, steps, error, left, missed, decay, ruled, told.felt(tolerance))
-        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (wanted < most)
+        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (self._unit(time) / step < most)
         price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
         last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
         return _Option(choice, np.where(np.isnan(price), last, price))
@@ -186,6 +197,11 @@ class Told:
     def modes(self, level: int) -> Array:
         """(V,) error of keeping so many modes of every body."""
         return np.asarray(np.sum([load.modes(level) for load in self.loads], axis=0))
+
+    @property
+    def kinks(self) -> float:
+        """Part of an extreme, times the number of steps, by which stations may miss the kink of an influence line."""
+        return max(load.load.route.steepest for load in self.loads)
 
     def felt(self, tolerance: Array) -> Array:
         """(V,) number of the lowest modes beyond which all ringing together is less than `UNFELT` of the tolerance."""

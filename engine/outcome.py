@@ -12,7 +12,7 @@ from engine.bucket import Bucket
 from engine.contacts import contact_forces
 from engine.cycles import counts_sampled, reduced
 from engine.envelopes import MOST_KEPT, envelope_names
-from engine.estimates import Estimator, Observed, pair_errors
+from engine.estimates import Estimator, Observed, extremes_of, pair_errors
 from engine.improving import improvements
 from engine.kernels.layout import (
     BELOW_AT,
@@ -78,7 +78,7 @@ def _computed(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[],
     status, diverged_step = _status(tables.model, marched)
     scale = _scale(tables, values, flat)
     missed = None if gap is None else pair_errors(tables, values, gap, scale)
-    observed = Observed(tables, counts, marched.history, own)
+    observed = Observed(tables, counts, marched.history, extremes_of(tables, marched), own)
     errors = Estimator(plan, bucket, variants, scale, halted).errors(observed, missed)
     status = np.maximum(status, errors.status(plan.study, values, bucket.chosen))
     flat |= {f"error_{part}": column for part, column in errors._asdict().items()} | {"error_estimate": errors.total}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
 from engine.checking import can_be_halved
-from engine.choice import Choice, automatic_bodies, with_choice
+from engine.choice import Asked, Choice, automatic_bodies, with_choice
 from engine.choosing import choose
 from engine.envelopes import check_places, places_read
 from engine.fidelity import (
@@ -63,6 +63,7 @@ MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richard
 MOST_MEMORY = 16 * 2**30
 STATIC_STEPS = 800  # stations of statics over one passage or cycle
 FULL_MODES = 20  # of the full model that costs are compared with
+REPORTED = 0.5  # of what histories are off by that extremes and the like are expected to be
 STATIONS = 256  # of a whole run, about, at which histories are compared
 SHOWN = 64  # variants whose histories are kept by default
 
@@ -191,25 +192,17 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     check_moves(study)
     cases = expand(study)
     check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction), reduction)
-    asked = _Asked("whole" if reduction is None else "last-cycle", check_steps, _least(study, reduction))
+    window: Window = "whole" if reduction is None else "last-cycle"
+    asked = Asked(_least(study, reduction), window, 1.0 if reads_accelerations(study) else REPORTED)
     buckets = tuple(
         bucket
         for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64))
-        for bucket in _buckets(scene, cases, variants, asked)
+        for bucket in _buckets(scene, cases, variants, asked, check_steps)
     )
     check_places(study, (bucket.scene for bucket in buckets))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
     check_memory(study, plan.size, plan.disk_bytes, reduction)
     return plan
-
-
-class _Asked(NamedTuple):
-    """What a plan is asked besides its study: what is recorded, which fixed steps are refused, and the lowest model
-    that tells what the study reports."""
-
-    window: Window
-    check_steps: CheckSteps
-    least: Fidelity
 
 
 def _least(study: Study, reduction: Reduction | None) -> Fidelity:
@@ -305,16 +298,18 @@ def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
     yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)
 
 
-def _buckets(scene: SceneModel, cases: Cases, variants: Counts, asked: _Asked) -> Iterator[Bucket]:
+def _buckets(
+    scene: SceneModel, cases: Cases, variants: Counts, asked: Asked, check_steps: CheckSteps
+) -> Iterator[Bucket]:
     """Variants of one scene by their model, modes and step counts."""
     columns = cases.columns_of(variants)
-    told = choose(scene, LaneValues(scene.study, columns, variants.size), asked.least, asked.window)
+    told = choose(scene, LaneValues(scene.study, columns, variants.size), asked)
     full_cost = _full_cost(scene, LaneValues(scene.study, columns, variants.size))
     chosen = automatic_bodies(scene)
     for own in _split(np.arange(variants.size), (told.fidelity * (MAX_MODES + 1) + told.modes).astype(np.int64)):
         model = with_choice(scene, Fidelity(int(told.fidelity[own[0]])), int(told.modes[own[0]]))
         values = LaneValues(model.study, cases.columns_of(variants[own]), own.size)
-        steps, reasons = _chosen_steps(model, values, told.of(own), asked.check_steps)
+        steps, reasons = _chosen_steps(model, values, told.of(own), check_steps)
         pace = values.time_scale(scene.carriages[0].name)  # of like pace they rise and fall together: fewer extremes
         fixed = fixed_steps(model.study, values)
         halved = can_be_halved(model, values, steps) if fixed else np.ones(own.size, dtype=np.bool_)

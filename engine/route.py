@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from engine.bodies.modal import ModalBody
 from engine.excitation import Excitation, excitation
 from engine.model import BodyPart, SceneModel
-from engine.readings import DERIVATIVE, Sensor, SprungSensor
+from engine.readings import DERIVATIVE, OF_SECTIONS, Sensor, SprungSensor
 from engine.signals import build_signals
 from engine.ties import CarriageTie, Grip
 from engine.timeline import Window
@@ -104,6 +104,20 @@ class Route:
                 passing = self._influence(sensor, _still(np.array([sensor.at])))
                 found[number] = max(found[number], float(passing[0]))
         return np.asarray(found)
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest part of a kinked influence line's largest value that half a unit of tau changes it by."""
+        here = [n for n, sensor in enumerate(self.sensors) if sensor.under is None and sensor.quantity in OF_SECTIONS]
+        still = _still(self.grid)
+        found = [0.0]
+        for number in here:
+            line = self._influence(self.sensors[number], still)
+            slope = float(np.abs(np.gradient(line, self.grid)).max())
+            found.append(
+                0.5 * slope * self.model.riders[self.rider].motion.max_speed / max(self.largest[number], 1e-300)
+            )
+        return max(found)
 
     @cached_property
     def usual(self) -> Array:

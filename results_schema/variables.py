@@ -230,25 +230,25 @@ declare(
     Variable(
         "error_estimate",
         long_name="estimated relative error",
-        meaning="sum of the parts from steps, modes and model, each the largest over the sensors over time, divided by "
-        "the largest static value of that sensor (velocity and acceleration: by their own largest value); NaN where a "
-        "part is not known",
+        meaning="sum of the parts from steps, modes and model, each the largest over the sensors of what the study "
+        "reports of them, divided by the largest static value of that sensor (velocity and acceleration: by their own "
+        "largest value); NaN where a part is not known",
         required=False,
         nan_allowed=True,
     ),
     Variable(
         "error_steps",
         long_name="part of the estimated relative error that comes from the time step",
-        meaning="from the largest difference to a march with half or twice the steps, over time and of what the study "
-        "makes of it",
+        meaning="from the difference to a march with half or twice the steps: of extremes and what the kind of study "
+        "makes of histories, no less than 0.3 of the largest difference over time (trajectory: all of it)",
         required=False,
         nan_allowed=True,
     ),
     Variable(
         "error_modes",
         long_name="part of the estimated relative error that comes from the number of modes",
-        meaning="from the largest difference between marches with all and with half the modes, over time and of what "
-        "the study makes of it; 0 for statics, which know all modes",
+        meaning="likewise, from the difference between marches with all and with half the modes; 0 for statics, which "
+        "know all modes",
         required=False,
         nan_allowed=True,
     ),

@@ -18,6 +18,7 @@ PROMINENCE = 0.02  # of the cycle's range: smaller bumps are no peaks
 FLAT = 1e-8  # of its largest value, below which a range is rounding
 PEAKS = 8
 HARMONICS = 16
+TORN = 3.0  # times the largest step beside it: a larger one where a cycle closes is a gap
 _EVEN_SPACING = 1e-9
 
 
@@ -158,7 +159,14 @@ def prominent(cycle: Array) -> Mask:
         top, top_at = np.where(higher, value, top), np.where(higher, at, top_at)
         bottom = np.where(fell, value, np.minimum(bottom, value))
         rising = (rising & ~fell) | rose
+    found[[0, -1]] &= ~_torn(lanes)
     return found.reshape(cycle.shape)
+
+
+def _torn(lanes: Array) -> Mask:
+    """(V,) whether cycles (H, V) do not close, as they have not settled: their ends are then no peaks."""
+    near = np.maximum(np.abs(lanes[1] - lanes[0]), np.abs(lanes[-1] - lanes[-2]))
+    return np.asarray(np.abs(lanes[0] - lanes[-1]) > TORN * near)
 
 
 def peaks(cycle: Array) -> Peaks:
