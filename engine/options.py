@@ -43,6 +43,7 @@ MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 LEAST_PART = 0.1  # of the tolerance that steps may take where nothing holds it
 UNHELD = 1e15  # price of an error, beyond that of any march
 UNKNOWN_PRICE = 1e300  # of the carriages' own model where nothing can be told, beyond any error's
+LEAST_OF_CYCLE = 400  # steps, of whose stations a study makes its results
 KINKED = 0.3  # of the tolerance that extremes may miss between stations where an influence line has a kink
 MOST_FINER = 12.0  # times the steps where nothing is known, for the sake of the tolerance
 CHOSEN = (Fidelity.STATIC, Fidelity.FORCE, Fidelity.MASS)  # besides the carriages' own model
@@ -158,7 +159,9 @@ class Options:
         if model is Fidelity.TIED:
             sprung = self._with(level)
             found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
-        return np.asarray(np.maximum((1.0 + CELL) * found, LEAST_STEPS))
+        return np.asarray(
+            np.maximum((1.0 + CELL) * found, LEAST_STEPS if self.asked.window == "whole" else LEAST_OF_CYCLE)
+        )
 
     def _with(self, level: int) -> SceneModel:
         """The carriages' own model with so many modes."""

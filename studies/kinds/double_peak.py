@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 MOST_SENSORS = 3
+KINKED = ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+KINKED_STATIONS = 3200  # of a cycle
 MOST_GROUPS = 4
 NEAR = 0.15  # how close a harmonic must be to be named as the cause
 SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
@@ -142,7 +144,9 @@ class DoublePeak:
         check_sensors(study)
 
     def reduction(self, study: Study) -> DoublePeakReduction:
-        return DoublePeakReduction()
+        """Moments and the like peak in a kink where the load passes, which few stations would miss."""
+        kinked = any(s.quantity in KINKED and s.at is not None for s in study.sensor.values())
+        return DoublePeakReduction(KINKED_STATIONS) if kinked else DoublePeakReduction()
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
