@@ -207,7 +207,7 @@ def _bucket(plan: Plan, group: _Group) -> Bucket:
     """A group as part of a plan: nothing was told of it, and it is compared with nothing."""
     model = build_model(in_full(group.scene, group.chosen), *group.scene.timing, plan.cases.paths)
     steps, none = _safe_steps(plan, model, group), np.zeros(group.variants.size)
-    tables = SceneTables(model, steps, plan.window, refinement=MORE_STEPS)
+    tables = SceneTables(model, steps, plan.window, refinement=MORE_STEPS, stops="kinks")
     told = Choice(*(none for _ in Choice._fields))
     return Bucket(tables, group.variants, "audit", told, none + steps * model.body_modes, compared="not")
 

@@ -85,8 +85,11 @@ def _with_other_modes(model: SceneModel) -> tuple[SceneModel | None, float]:
                 return more, OF_MORE
     least = {part.name: min(part.modal.omega.size, part.modal.rigid_modes + 1) for part in model.bodies}
     halved = {part.name: max(part.modal.omega.size // 2, least[part.name]) for part in model.bodies}
-    other = _with_modes(model, halved)
-    return (None, 0.0) if other.body_modes == model.body_modes else (other, 1.0)
+    with suppress(BadInput):  # modes that are to be left out may be beyond
+        other = _with_modes(model, halved)
+        if other.body_modes < model.body_modes:
+            return other, 1.0
+    return None, 0.0
 
 
 def _with_modes(model: SceneModel, counts: Mapping[str, int]) -> SceneModel:

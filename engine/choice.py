@@ -89,6 +89,6 @@ def usual_steps(values: LaneValues) -> Array:
 
 def _is_free(body: object) -> bool:
     """Whether a body's modes are ours to choose; those of a reduced or imported one are few already."""
-    if isinstance(body, Frame) and body.interface:
+    if isinstance(body, Frame) and (body.interface or body.leave_out):
         return False
     return isinstance(body, Beam | Frame) and body.modes == "auto" and not isinstance(body.damping_ratio, tuple)

@@ -24,7 +24,7 @@ def choose(scene: SceneModel, values: LaneValues, asked: Asked) -> Choice:
     """The choice for some variants of a scene."""
     cells, inverse = _lattice(values)
     options = Options(scene, asked)
-    with np.errstate(over="ignore"):  # infinitely slow variants
+    with np.errstate(over="ignore", invalid="ignore"):  # infinitely slow variants
         parts = [options.choose(part) for part in _pieces(cells)]
     return Choice(*(np.concatenate(column) for column in zip(*parts, strict=True))).of(inverse)
 

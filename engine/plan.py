@@ -316,7 +316,8 @@ def _buckets(
         for part in _split(np.arange(own.size), 2 * steps + halved):
             lanes = own[part[np.argsort(pace[part], kind="stable")]]
             stride = model.scheme.stride if fixed else max(2, model.scheme.stride)  # all segments can be halved
-            tables = SceneTables(model, int(steps[part[0]]), asked.window, refinement=stride)
+            stops: Literal["events", "kinks"] = "events" if fixed or model.scheme.stride > 1 else "kinks"
+            tables = SceneTables(model, int(steps[part[0]]), asked.window, refinement=stride, stops=stops)
             _check_readings(model, tables)
             even = all(segment.steps % 2 == 0 for segment in tables.timeline.segments)
             compared: Literal["half", "twice"] = "half" if halved[part[0]] and even else "twice"

@@ -59,7 +59,8 @@ class StaticUnit(NamedTuple):
 class SceneTables:
     """Timeline, signals and tables of a scene at ``steps`` per unit of scene time.
 
-    refinement: every step of a timeline with so many times fewer steps is cut into so many.
+    refinement: every step of a timeline with so many times fewer steps is cut into so many. stops: what falls on step
+    boundaries: events, and in whole runs where loads pass sensors whose influence lines have a kink there.
     """
 
     model: SceneModel
@@ -67,6 +68,7 @@ class SceneTables:
     window: Window
     readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
     refinement: int = 1
+    stops: Literal["events", "kinks"] = "events"
     _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
     _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -82,7 +84,7 @@ class SceneTables:
         if self.refinement > 1:
             free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
         steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
-        stops = self._kinks if self.window == "whole" else ()  # histories of cycles want equal steps
+        stops = self._kinks if self.stops == "kinks" and self.window == "whole" else ()  # cycles want equal steps
         return build_timeline(self.model.riders, steps, self.window, free, stops)
 
     @property
@@ -202,7 +204,8 @@ class SceneTables:
             for sensor in self.sensors
             if sensor.under is None
         ]
-        return np.unique(np.concatenate([counts, *passing]))
+        bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
+        return np.unique(np.concatenate([counts, bounds, *passing]))
 
     @cached_property
     def static_over_window(self) -> StaticUnit:

@@ -248,7 +248,7 @@ def test_the_steps_suggested_for_a_stiff_spring_are_accepted(scheme: str) -> Non
 
     def given(stiffness: float, steps: int) -> Study:
         car = oscillator(0.5, stiffness, cruise(0.0, 1.0, 0.3))
-        return study(beam(modes=1), car, solver={"scheme": scheme, "steps": steps})
+        return study(beam(modes=1), car, solver={"scheme": scheme, "steps": steps, "fidelity": "full"})
 
     for stiffness in np.linspace(1.9e6, 2.6e6, 8):
         with pytest.raises(BadInput, match="contact on its spring") as caught:

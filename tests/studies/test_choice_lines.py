@@ -47,7 +47,6 @@ def test_no_jumps_where_the_choice_changes(name: str) -> None:
         assert np.all(jump <= 2.0 * given.solver.tolerance)
 
 
-@pytest.mark.xfail(strict=True, reason="a peak near phase 0 of a cycle that has not settled depends on the stations")
 def test_peaks_where_the_cycle_is_closed() -> None:
     """Two numbers of steps tell the same peaks, within what both say of their errors."""
     pace = mass(0.3, swing(0.5, 0.4, 0.228777, 2))
