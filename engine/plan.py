@@ -312,7 +312,8 @@ def _buckets(
         steps, reasons = _chosen_steps(model, values, told.of(own), check_steps)
         pace = values.time_scale(scene.carriages[0].name)  # of like pace they rise and fall together: fewer extremes
         fixed = fixed_steps(model.study, values)
-        halved = can_be_halved(model, values, steps) if fixed else np.ones(own.size, dtype=np.bool_)
+        alone = fixed and model.scheme.stride == 1  # a Richardson pair tells its steps itself
+        halved = can_be_halved(model, values, steps) if alone else np.ones(own.size, dtype=np.bool_)
         for part in _split(np.arange(own.size), 2 * steps + halved):
             lanes = own[part[np.argsort(pace[part], kind="stable")]]
             stride = model.scheme.stride if fixed else max(2, model.scheme.stride)  # all segments can be halved
