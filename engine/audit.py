@@ -37,6 +37,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 MORE_MODES, MORE_STEPS = 2, 4
+_BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # of dimensions: axes beyond share the last
 LEAST_STEPS = 800  # of a variant that marched none
 MODES_OF_STATICS = 3  # whose double is marched for a variant that marched none: statics err by the slowest modes
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open
@@ -118,20 +119,33 @@ def sampled(plan: Plan) -> Sample:
 
 def spread_quasi_randomly(cases: Cases, count: int) -> Counts:
     """(n,) flat numbers of `count` variants or all, spread over the sweep's dimensions, and so are the first of them:
-    the additive recurrence of the generalised golden ratio, the root of x^(d+1) = x + 1 (Roberts 2018)."""
-    wanted, dimensions = min(count, cases.size), max(1, len(cases.shape))
-    ratio = 2.0
-    for _ in range(64):
-        ratio = (1.0 + ratio) ** (1.0 / (dimensions + 1))
-    steps = ratio ** -np.arange(1.0, dimensions + 1.0)
+    Halton's points, the longest dimension in base 2, the next ones in 3, 5 and so on."""
+    wanted, dimensions = min(count, cases.size), len(cases.shape)
+    order = np.argsort(np.argsort(-np.array(cases.shape, dtype=np.int64), kind="stable"))
+    base = np.array(_BASES)[np.minimum(order, len(_BASES) - 1)]
     found, draws = np.zeros(0, dtype=np.int64), 2 * wanted
     while found.size < wanted and draws <= 16 * cases.size:
-        points = np.mod(0.5 + np.arange(1.0, draws + 1.0)[:, None] * steps, 1.0)[:, : len(cases.shape)]
+        numbers = np.arange(1, draws + 1)
+        points = np.stack([_mirrored(numbers, int(b)) for b in base], axis=1) if dimensions else np.zeros((draws, 0))
         places = np.floor(points * cases.shape).astype(np.int64)
         drawn = np.ravel_multi_index(tuple(places.T), cases.shape) if cases.shape else np.zeros(1, dtype=np.int64)
         found, draws = drawn[np.sort(np.unique(drawn, return_index=True)[1])], 2 * draws
     left = np.setdiff1d(np.arange(cases.size), found) if found.size < wanted else found[:0]
     return np.concatenate([found, left])[:wanted]
+
+
+def _mirrored(numbers: Counts, base: int) -> NDArray[np.float64]:
+    """(n,) numbers with their digits mirrored at the point, from 0 to 1 (van der Corput 1935).
+
+    >>> _mirrored(np.array([1, 2, 3, 4]), 2)
+    array([0.5  , 0.25 , 0.75 , 0.125])
+    """
+    found, left, unit = np.zeros(numbers.size), numbers.copy(), 1.0
+    while left.any():
+        unit /= base
+        found += unit * (left % base)
+        left //= base
+    return found
 
 
 def audit_plan(plan: Plan, sample: Sample, used: Used) -> Plan | None:

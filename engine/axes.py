@@ -101,7 +101,8 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             current = study.value(path)
         except KeyError:
             current = study
-        if isinstance(current, bool) or not (current in (None, "auto") or isinstance(current, int | float)):
+        open_ = current in (None, "auto") and path != "solver.fidelity"  # which is a word whatever it says
+        if isinstance(current, bool) or not (open_ or isinstance(current, int | float)):
             remedy = nearest(path, list(study.numbers()))
             raise BadInput(
                 "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy

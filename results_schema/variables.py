@@ -263,8 +263,8 @@ declare(
         "relative_cost",
         long_name="cost over that of the full model",
         meaning="modes x steps of all marches of the variant, also those that it is compared with and first ones that "
-        "missed the tolerance, over those of the carriages' own model with 20 modes and the steps that all rules ask "
-        "for",
+        "missed the tolerance, over those of the carriages' own model with 20 modes (or what the study fixes) and the "
+        "steps that all rules ask for",
         required=False,
         nan_allowed=True,
     ),

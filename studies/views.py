@@ -183,7 +183,8 @@ def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None,
         mesh = axes.scatter(x[shown], y[shown], c=grid[shown], s=14.0, linewidths=0.0, **style)
     else:
         rasterized = grid.size > VECTOR_CELLS
-        mesh = axes.pcolormesh(x, y, grid.T, shading="nearest", rasterized=rasterized, edgecolors="face", **style)
+        edges = _edges(x), _edges(y)
+        mesh = axes.pcolormesh(*edges, grid.T, shading="flat", rasterized=rasterized, edgecolors="face", **style)
         mesh.set_linewidth(0.7)  # covers the seams that browsers show between cells
     for axis, way, ends in ((axes.xaxis, x, axes.set_xlim), (axes.yaxis, y, axes.set_ylim)):
         if np.nanmin(way) >= 0.0 > axis.get_view_interval()[0]:
@@ -191,6 +192,16 @@ def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None,
         if is_logarithmic(way):
             logarithmic(axis)
     return mesh
+
+
+def _edges(values: Array) -> Array:
+    """Edges of cells around ascending or descending values: half-way between, by ratio where the axis is drawn so."""
+    if values.size == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    spaced = np.log(values) if is_logarithmic(values) else values
+    middle = 0.5 * (spaced[1:] + spaced[:-1])
+    edges = np.concatenate([[1.5 * spaced[0] - 0.5 * spaced[1]], middle, [1.5 * spaced[-1] - 0.5 * spaced[-2]]])
+    return np.exp(edges) if is_logarithmic(values) else edges
 
 
 def depends_on(seen: View, values: Any, axis: Axis | None) -> bool:
