@@ -20,12 +20,12 @@ from engine.bodies.reduced import Reduced
 from engine.bodies.reduced_body import load_body
 from engine.bodies.rigid import Rigid
 from engine.bucket import PACE, Bucket
-from engine.choice import Choice, automatic_bodies
+from engine.choice import Choice, automatic_bodies, fixed_steps
 from engine.fidelity import MOST_STEPS, STEPS_PER_PERIOD, check_most_steps, safe_steps
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.model import SceneModel, build_model
-from engine.plan import Plan, fixed_steps, scenes
+from engine.plan import Plan, scenes
 from engine.resolution import steps_to_resolve
 from engine.resonance import spring_steps
 from engine.scene import Study

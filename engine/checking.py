@@ -49,12 +49,6 @@ class Checks(NamedTuple):
         parts = [part for part in (self.steps, self.modes) if part is not None]
         return sum(part.steps * part.model.body_modes for part in parts) / (own.steps * own.model.body_modes)
 
-    def forget(self) -> None:
-        """Drop the tables."""
-        for tables in (self.steps, self.modes):
-            if tables is not None:
-                tables.forget()
-
 
 def checks_of(tables: SceneTables, compared: Literal["half", "twice"]) -> Checks:
     """The comparisons of a march, with half its steps or with twice as many."""

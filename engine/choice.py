@@ -13,6 +13,7 @@ from engine.fidelity import STEPS_PER_PERIOD
 from engine.ladder import full_fidelity
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
+from engine.scene import Study
 from engine.timeline import Window
 from results_schema.status import Fidelity
 
@@ -80,6 +81,11 @@ def with_choice(scene: SceneModel, fidelity: Fidelity, modes: int) -> SceneModel
     if scene.study.solver.fidelity == "auto" and fidelity < full_fidelity(scene):
         changes["solver.fidelity"] = fidelity.name.lower()
     return simplified(scene, changes) if changes else scene
+
+
+def fixed_steps(study: Study, values: LaneValues) -> bool:
+    """Whether the study says how many steps."""
+    return study.solver.steps != "auto" or "solver.steps" in values.columns
 
 
 def usual_steps(values: LaneValues) -> Array:

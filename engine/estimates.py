@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from engine.bucket import Bucket
 from engine.checking import Checks
+from engine.choice import fixed_steps
 from engine.cycles import counts_sampled, reduced
 from engine.kernels.layout import LARGEST, SMALLEST
 from engine.lanes import LaneValues, padded
 from engine.march import Marched
-from engine.plan import Plan, fixed_steps, reads_accelerations
+from engine.plan import Plan, reads_accelerations
 from engine.reduction import Compared
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_chosen

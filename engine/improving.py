@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
-from engine.choice import FINER, LEVELS, MOST_CHOSEN, usual_steps
+from engine.choice import FINER, LEVELS, MOST_CHOSEN, fixed_steps, usual_steps
 from engine.fidelity import STEPS_PER_PERIOD, safe_steps
 from engine.lanes import LaneValues
 from engine.model import simplified
-from engine.plan import Plan, fixed_steps
+from engine.plan import Plan
 from results_schema.status import Status
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from engine.bouncing import bounce, springs
 from engine.moving_load import Load
-from engine.ringing import drift, lifted, rings, square_near_by
+from engine.ringing import drift, lifted, lowered, rings, square_near_by
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ MOST_AHEAD = 2.0  # times its inertia: what a load does whose way changes as fas
 def left_out(load: Load) -> dict[Fidelity, Array]:
     """(J, V) what every model leaves out of every sensor, in its unit; of mass alone only what springs add."""
     peaks, square = load.shaken.peaks[:, :, None], load.shaken.square
-    shift = _shift(square.mean(axis=0)[:, None], load.mass)
+    shift = lowered(square.mean(axis=0)[:, None], load.mass)
     near = np.divide(peaks[1], peaks[0], out=np.zeros_like(peaks[0]), where=peaks[0] > 0.0) / load.angle
     light, boost = (1.0 / (1.0 - np.minimum(n, STEEPEST) ** 2) for n in (near, near / (1.0 - shift)))
     forced = (2.0 * load.zeta * peaks[1] / load.angle + peaks[2] / load.angle**2) * boost
@@ -46,10 +46,10 @@ def left_out(load: Load) -> dict[Fidelity, Array]:
     other = ringing.mass * boost * (1.0 - shift) ** 2
     shared, sprung = load.through_mass(other, felt.mass), bounced + ahead * pressed
     if felt.soft.any():
-        sprung = sprung + load.at_places(either * drift(load, _shift(own, felt.beyond)))
+        sprung = sprung + load.at_places(either * drift(load, lowered(own, felt.beyond)))
         sprung = sprung + load.through_mass(other, felt.beyond)
     lag = load.at_places(forced * np.minimum(2.0 * shift * boost, 1.0))
-    drifted = load.at_places(either * drift(load, _shift(own, felt.mass)) + ringing.added)
+    drifted = load.at_places(either * drift(load, lowered(own, felt.mass)) + ringing.added)
     changed = load.at_places(ringing.mass * boost * lifted(load) + ringing.struck)
     told = {
         Fidelity.STATIC: load.at_places(ringing.whole * boost + forced) + shared + pressed + bounced + _unheld(load),
@@ -76,8 +76,3 @@ def _loose(load: Load) -> Array:
     """(J, V) the load's inertia on the rigid motion of a body that nothing holds."""
     mobility = load.route.body.shape(load.route.grid)[:, load.route.body.omega == 0.0] ** 2
     return np.asarray(load.scale * load.mass * float(mobility.sum(axis=1).max()))
-
-
-def _shift(square: Array, mass: Array) -> Array:
-    """(K, V) part by which a mass lowers the frequency of every mode whose phi^2 is this on average."""
-    return np.asarray(1.0 - 1.0 / np.sqrt(1.0 + mass * square))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from engine.bouncing import springs
 from engine.moving_load import Load
-from engine.ringing import rings
+from engine.ringing import lowered, rings
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Omitted:
     @cached_property
     def ringing(self) -> Array:
         """(K, V) ringing per unit of drive, with the load and after it."""
-        shift = 1.0 - 1.0 / np.sqrt(1.0 + self.load.mass * self.load.shaken.square.mean(axis=0)[:, None])
+        shift = lowered(self.load.shaken.square.mean(axis=0)[:, None], self.load.mass)
         return np.asarray(rings(self.load, shift).whole)
 
     @cached_property

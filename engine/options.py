@@ -21,6 +21,7 @@ from engine.choice import (
     Choice,
     automatic_bodies,
     fewer_modes,
+    fixed_steps,
     usual_steps,
     with_choice,
 )
@@ -121,7 +122,8 @@ class Options:
         if model is Fidelity.STATIC:
             choice = Choice(none + model, none, none, error, none, none, none, none, none)
             return _Option(choice, np.where(error <= MOST_SIMPLER * tolerance, 0.0, np.inf))
-        kept, ours = level or MODES_LOOKED_AT, error * float(len(self.models) > 1)
+        kept = level or MODES_LOOKED_AT
+        ours = error if self.scene.study.solver.fidelity == "auto" else none  # what the study fixes is its own affair
         left, (sizes, slips) = told.modes(kept), told.ringing(kept)
         sizes = self.asked.reported * sizes
         allowed = tolerance - ours - (left if level else 0.0)
@@ -129,13 +131,15 @@ class Options:
         most = np.minimum(MOST_FINER * np.maximum(usual_steps(values) * self._periods(time), LEAST_STEPS), MOST_CHOSEN)
         wanted, rules = np.minimum(self._unit(time) / step, most), self._rules(model, level, values)
         wanted = np.maximum(wanted, told.kinks / (KINKED * tolerance) if self.asked.window == "last-cycle" else none)
-        steps = round_up(np.maximum(wanted, rules)).astype(np.float64)
+        fixed = fixed_steps(self.scene.study, values)
+        steps = values.of("solver.steps") if fixed else round_up(np.maximum(wanted, rules)).astype(np.float64)
         missed = missed_by(sizes, slips, self._unit(time) / steps)
         fewer = told.modes(fewer_modes(kept)) if level else none
         decay = np.divide(left, fewer, out=np.ones_like(left), where=fewer > left)
         ruled = (rules > wanted).astype(float)
         choice = Choice(none + model, none + level, steps, error, left, missed, decay, ruled, told.felt(tolerance))
-        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (self._unit(time) / step < most)
+        enough = fixed | (self._unit(time) / step < most)
+        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & enough
         price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
         last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
         return _Option(choice, np.where(np.isnan(price), last, price))

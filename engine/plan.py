@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
 from engine.checking import can_be_halved
-from engine.choice import Asked, Choice, automatic_bodies, with_choice
+from engine.choice import Asked, Choice, automatic_bodies, fixed_steps, with_choice
 from engine.choosing import choose
 from engine.envelopes import check_places, places_read
 from engine.fidelity import (
@@ -27,7 +27,6 @@ from engine.fidelity import (
     check_most_steps,
     needed_steps,
     round_up,
-    safe_steps,
 )
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES, MARKS
@@ -150,7 +149,7 @@ class Plan:
     @property
     def memory_bytes(self) -> int:
         """Expected peak: results, a chunk per thread, and the program itself."""
-        return needed_memory(self.disk_bytes, self.reduction)
+        return needed_memory(self.disk_bytes)
 
     def lanes_per_chunk(self, bucket: Bucket) -> int:
         """Variants of one task, by time and memory."""
@@ -191,7 +190,7 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     """
     check_moves(study)
     cases = expand(study)
-    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction), reduction)
+    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction))
     window: Window = "whole" if reduction is None else "last-cycle"
     asked = Asked(_least(study, reduction), window, 1.0 if reads_accelerations(study) else REPORTED)
     buckets = tuple(
@@ -201,7 +200,7 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     )
     check_places(study, (bucket.scene for bucket in buckets))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
-    check_memory(study, plan.size, plan.disk_bytes, reduction)
+    check_memory(study, plan.size, plan.disk_bytes)
     return plan
 
 
@@ -226,15 +225,14 @@ def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
     return found
 
 
-def needed_memory(result_bytes: int, reduction: Reduction | None) -> int:
+def needed_memory(result_bytes: int) -> int:
     """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
-    history_bytes = 0 if reduction is None else 6 * MOST_HISTORY_BYTES
-    return 300 * 2**20 + 3 * result_bytes + history_bytes
+    return 300 * 2**20 + 3 * result_bytes + 6 * MOST_HISTORY_BYTES
 
 
-def check_memory(study: Study, size: int, result_bytes: int, reduction: Reduction | None) -> None:
+def check_memory(study: Study, size: int, result_bytes: int) -> None:
     """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
-    needed = needed_memory(result_bytes, reduction)
+    needed = needed_memory(result_bytes)
     if needed > MOST_MEMORY:
         raise BadInput(
             "the study does not fit into memory",
@@ -325,19 +323,9 @@ def _buckets(
             yield Bucket(tables, variants[lanes], reasons(part), told.of(lanes), full_cost[lanes], chosen, compared)
 
 
-def fixed_steps(study: Study, values: LaneValues) -> bool:
-    """Whether the study says how many steps."""
-    return study.solver.steps != "auto" or "solver.steps" in values.columns
-
-
-def steps_of(
-    scene: SceneModel, values: LaneValues, check_steps: CheckSteps, wanted: Array | None = None
-) -> tuple[Counts, Reasons]:
+def steps_of(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Reasons]:
     """Steps of every variant over a passage or cycle where the tolerance does not choose them, and what says why some
-    of them need so many: the study, or rules of thumb. Raises BadInput.
-
-    wanted: (V,) in place of the number per first period that is taken where nothing is known.
-    """
+    of them need so many: the study, or rules of thumb. Raises BadInput."""
     if scene.fidelity is Fidelity.STATIC:
         return np.full(values.size, STATIC_STEPS, dtype=np.int64), lambda part: "statics: nothing is marched"
     if fixed_steps(scene.study, values):
@@ -348,8 +336,6 @@ def steps_of(
         return steps, lambda part: "as the study says"
     distinct, inverse = np.unique(values.time_scale(scene.carriages[0].name), return_inverse=True)
     needs, own = needed_steps(scene, distinct).per_rule, spring_steps(scene, values)
-    if wanted is not None:
-        needs, own = safe_steps(scene, distinct), own | {"as wanted": wanted}
     if scene.scheme.stride > 1:
         own |= {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)}
     found = Needs({name: needed[inverse] for name, needed in needs.items()} | own)

@@ -66,6 +66,11 @@ def _left(load: Load, first: _Rung) -> _Rung:
     return _Rung(*(part * size for size in first))
 
 
+def lowered(square: Array, mass: Array) -> Array:
+    """(K, V) part by which a mass lowers the frequency of every mode whose phi^2 is this on average."""
+    return np.asarray(1.0 - 1.0 / np.sqrt(1.0 + mass * square))
+
+
 def drift(load: Load, shift: Array) -> Array:
     """Largest e^(-zeta x) 2 sin(shift x/2) to the end: how far two ringings drift apart whose frequencies differ by
     a part of themselves."""

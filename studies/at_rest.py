@@ -72,7 +72,7 @@ def pieces_of(kind: AtRest, study: Study, asked: Asked) -> list[Piece]:
         check_held(model)
         unreduced_model(study.without_sweep())  # refuses bodies that have none
     count = places.all.size
-    check_memory(study, cases.size, 8 * cases.size * _numbers(study, asked, count), None)
+    check_memory(study, cases.size, 8 * cases.size * _numbers(study, asked, count))
     seconds = SHAPES_SECONDS + count * STATION_SECONDS
     found = [Piece("shapes", "shapes of all bodies in the base scene", partial(_shapes, kind, study, places), seconds)]
     step = max(1, AT_ONCE // count)

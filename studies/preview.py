@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
 CHOSEN = "The choice per variant; cost is modes x steps, checks included, over the full model's"
-SIMPLER = "What simpler models would leave out of displacement, over the largest static one"
+SIMPLER = "What simpler models would leave out of the worst sensor, over its largest static value"
 
 
 class Table(NamedTuple):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engine.ladder import Rung, ladder
 from engine.lanes import LaneValues
 from engine.model import SceneModel
-from engine.plan import Plan
+from engine.plan import Plan, scenes
 from results_schema.status import Fidelity, label
 from studies.words import number
 
@@ -42,14 +42,11 @@ def simpler_models(plan: Plan) -> list[tuple[str, ...]]:
 
 
 def _looked_at(plan: Plan) -> Iterator[tuple[SceneModel, LaneValues]]:
-    """Some scenes, and some variants of each."""
-    scenes: dict[int, tuple[SceneModel, list[NDArray[np.int64]]]] = {}
-    for bucket in plan.buckets:
-        scenes.setdefault(id(bucket.scene), (bucket.scene, []))[1].append(bucket.variants)
-    chosen = [list(scenes.values())[place] for place in _spread(len(scenes), MOST_SCENES)]
-    for scene, parts in chosen:
-        variants = np.concatenate(parts)
-        variants = variants[_spread(variants.size, MOST_VARIANTS // len(chosen))]
+    """Some scenes as the study has them, before anything is chosen, and some variants of each."""
+    found = list(scenes(plan.study, plan.cases, np.arange(plan.size, dtype=np.int64)))
+    chosen = [found[place] for place in _spread(len(found), MOST_SCENES)]
+    for scene, own in chosen:
+        variants = own[_spread(own.size, MOST_VARIANTS // len(chosen))]
         yield scene, LaneValues(scene.study, plan.cases.columns_of(variants), variants.size)
 
 

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from engine.bodies.beam_modes import MOST_MODES, BeamProperties, Spring, uniform_beam
+from engine.bodies.beam_statics import Restraint
 from engine.bodies.modal import Array, ModalBody
+from engine.bodies.unit_modes import _decomposed, unit_modes
 from results_schema.errors import BadInput
 from tests.bodies.waves import Support, WaveBeam, hermite_model
 from tests.reference.closed_forms import CLAMPED, FREE, PINNED, characteristic_values
@@ -261,3 +263,14 @@ def test_a_bad_number_of_modes_is_refused(modes: int) -> None:
 def test_places_off_the_beam_and_unknown_derivatives_are_refused(s: float, derivative: int) -> None:
     with pytest.raises(BadInput):
         on_ends("pinned", "pinned", 2).shape([s], derivative)
+
+
+def test_few_modes_are_the_lowest_of_many() -> None:
+    """The same frequencies and shapes, third derivatives included, as from a decomposition of their own."""
+    restraints = (Restraint(0.1, 0, 0.01), Restraint(0.9, 0, 0.02))
+    few, own = unit_modes(restraints, 5), _decomposed(restraints, 5)
+    np.testing.assert_allclose(few.omega, own.omega, rtol=1e-12)
+    x = np.linspace(0.0, 1.0, 41)
+    for derivative in range(4):
+        size = np.abs(own.rows(x, derivative)).max(axis=0)
+        np.testing.assert_allclose(few.rows(x, derivative) / size, own.rows(x, derivative) / size, atol=1e-9)

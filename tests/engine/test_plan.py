@@ -18,7 +18,6 @@ from engine.plan import Plan, make_plan
 from engine.plan import steps_of as steps_by_rules
 from engine.scene import Study
 from results_schema.errors import BadInput
-from results_schema.status import Status
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study
 
 OMEGA_1 = math.pi**2
@@ -104,13 +103,17 @@ def test_auto_steps_stay_inside_the_stability_limit(scheme: str, limit: float) -
         SPEEDS,
         mass(0.1, cruise(0.0, 1.0, 1.0, after=1.0)),
         beam(modes=modes),
-        solver={"scheme": scheme},
+        solver={
+            "scheme": scheme,
+            "tolerance": 0.1,
+            "fidelity": "full",
+        },  # what undamped modes leave is not the question
     )
     plan = make_plan(given)
     highest = (modes * math.pi) ** 2
     assert np.all(highest / (np.array(SPEEDS) * steps_of(plan)) <= limit / 1.05 * (1 + 1e-12))
     ds = run(given)
-    assert set(ds.status.values.tolist()) <= {Status.OK, Status.SEPARATED, Status.TOLERANCE_MISSED}
+    assert set(ds.status.values.tolist()) <= {0, 1}
     assert np.isfinite(ds.midspan_max.values).all()
 
 

@@ -167,3 +167,13 @@ def test_a_lane_has_the_same_bits_in_any_company(stations: int) -> None:
         for expected, found in zip((*whole, *legs), (*alone, *own), strict=True):
             assert np.array_equal(expected[..., lanes], found, equal_nan=True)
     assert not math.isnan(float(legs.lag[0, 0]))
+
+
+def test_ends_of_a_cycle_that_does_not_close_are_no_peaks() -> None:
+    phase = np.arange(400) / 400
+    settled = np.sin(4.0 * np.pi * phase)
+    growing = settled + 0.8 * phase  # ends far above where it began, on its way up
+    assert indices.peaks(settled[:, None]).number.tolist() == [2.0]
+    found = indices.peaks(growing[:, None])
+    assert found.number.tolist() == [2.0]
+    assert np.all(np.nan_to_num(found.phase[:, 0], nan=0.2) < 0.9)
