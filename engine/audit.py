@@ -20,7 +20,7 @@ from engine.bodies.reduced import Reduced
 from engine.bodies.reduced_body import load_body
 from engine.bodies.rigid import Rigid
 from engine.bucket import PACE, Bucket
-from engine.choice import Choice, automatic_bodies, fixed_steps
+from engine.choice import Choice, automatic_bodies, fixed_steps, scheme_used, with_choice
 from engine.fidelity import MOST_STEPS, STEPS_PER_PERIOD, check_most_steps, safe_steps
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
@@ -31,7 +31,7 @@ from engine.resonance import spring_steps
 from engine.scene import Study
 from engine.sweep import Cases
 from engine.tables import KEPT_BYTES, SceneTables
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -52,11 +52,12 @@ TABLE_BYTES = 128  # of a mode at a station of tables, at most
 
 
 class Used(NamedTuple):
-    """What variants (V,) are marched with: modes of all bodies together, and steps over one passage or cycle; 0 where
-    nothing is marched."""
+    """What variants (V,) are marched with: modes of all bodies together, steps over one passage or cycle, and the
+    scheme (number of `SchemeUsed`); 0 where nothing is marched."""
 
     modes: Counts
     steps: Counts
+    scheme: Counts
 
 
 class Sample(NamedTuple):
@@ -99,6 +100,7 @@ def expected(plan: Plan) -> Used:
     found = Used(*(np.zeros(plan.size, dtype=np.int64) for _ in Used._fields))
     for bucket in plan.buckets:
         found.modes[bucket.variants] = bucket.scene.body_modes
+        found.scheme[bucket.variants] = scheme_used(bucket.scene.study)
         found.steps[bucket.variants] = 0 if bucket.scene.fidelity is Fidelity.STATIC else bucket.steps
     return found
 
@@ -180,8 +182,8 @@ def _affordable(plan: Plan, sample: Sample, used: Used) -> list[_Group]:
 
 
 def _groups(plan: Plan, variants: Counts, used: Used) -> Iterator[_Group]:
-    """Variants that share a scene and about as many steps."""
-    for scene, own in scenes(plan.study, plan.cases, np.sort(variants)) if variants.size else ():
+    """Variants that share a scene, a scheme and about as many steps."""
+    for scene, own in _scenes(plan, np.sort(variants), used.scheme) if variants.size else ():
         wanted = _wanted_steps(plan, scene, own, used.steps[own])
         order = np.argsort(-wanted, kind="stable")
         first = 0
@@ -191,6 +193,13 @@ def _groups(plan: Plan, variants: Counts, used: Used) -> Iterator[_Group]:
                 part = own[order[first:last]]
                 yield _Group(scene, _modes(scene, part, used), int(np.ceil(wanted[order[first]])), part)
                 first = last
+
+
+def _scenes(plan: Plan, variants: Counts, scheme: Counts) -> Iterator[tuple[SceneModel, Counts]]:
+    """Variants that share a scene and a scheme."""
+    for scene, own in scenes(plan.study, plan.cases, variants):
+        for number in np.unique(scheme[own]):
+            yield with_choice(scene, scene.fidelity, 0, SchemeUsed(number)), own[scheme[own] == number]
 
 
 def _wanted_steps(plan: Plan, scene: SceneModel, variants: Counts, used: Counts) -> Array:

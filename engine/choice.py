@@ -15,7 +15,7 @@ from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
 from engine.scene import Study
 from engine.timeline import Window
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed, label
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -37,8 +37,8 @@ class Asked(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What V variants get: a model (number of `Fidelity`), modes of every body whose modes are "auto", steps for the
-    tolerance; and the errors that these leave, NaN where nobody can tell.
+    """What V variants get: a model (number of `Fidelity`), modes of every body whose modes are "auto", a scheme (number
+    of `SchemeUsed`), steps for the tolerance; and the errors that these leave, NaN where nobody can tell.
 
     decay: the error of all these modes over that of as many as `checking` compares them with. ruled: 1 where the steps
     are more than the tolerance asks for, by the rules that no march may break. felt: modes that ring noticeably.
@@ -46,6 +46,7 @@ class Choice(NamedTuple):
 
     fidelity: Array
     modes: Array
+    scheme: Array
     steps: Array
     error_fidelity: Array
     error_modes: Array
@@ -75,17 +76,24 @@ def automatic_bodies(scene: SceneModel) -> tuple[str, ...]:
     )
 
 
-def with_choice(scene: SceneModel, fidelity: Fidelity, modes: int) -> SceneModel:
-    """A scene with a chosen model and number of modes; the same scene where nothing is chosen."""
+def with_choice(scene: SceneModel, fidelity: Fidelity, modes: int, scheme: SchemeUsed) -> SceneModel:
+    """A scene with a chosen model, number of modes and scheme; the same scene where nothing is chosen."""
     changes: dict[str, object] = {f"body.{name}.modes": modes for name in automatic_bodies(scene)} if modes else {}
     if scene.study.solver.fidelity == "auto" and fidelity < full_fidelity(scene):
         changes["solver.fidelity"] = fidelity.name.lower()
+    if scheme is not scheme_used(scene.study):
+        changes["solver.scheme"] = label(scheme)
     return simplified(scene, changes) if changes else scene
 
 
 def fixed_steps(study: Study, values: LaneValues) -> bool:
     """Whether the study says how many steps."""
     return study.solver.steps != "auto" or "solver.steps" in values.columns
+
+
+def scheme_used(study: Study) -> SchemeUsed:
+    """The scheme of a study as archives number it."""
+    return SchemeUsed[study.solver.integration.name.upper().replace("-", "_")]
 
 
 def usual_steps(values: LaneValues) -> Array:

@@ -30,18 +30,22 @@ def reduced(
     """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
     if plan.reduction is None:
         return {}
-    unit = tables.static_at(counts)
     loads = weights(tables.model, values)
-    static = unit.gravity[:, :, None] * values.of("gravity")
-    for r in range(loads.shape[0]):
-        static = static + unit.force[:, :, r, None] * loads[r]
-    first, last = tables.timeline.window
+
+    def static() -> Array:
+        unit = tables.static_at(counts)
+        found = unit.gravity[:, :, None] * values.of("gravity")
+        for r in range(loads.shape[0]):
+            found = found + unit.force[:, :, r, None] * loads[r]
+        return found
+
+    tau = tables.timeline.moments(counts)[1]
     cycle = Cycle(
-        phase=(counts - first) / (last - first),
+        phase=(tau - tau[0]) / (tau[-1] - tau[0]),
         position=tables.timeline.positions(0, counts.astype(np.float64)),
         history=history,
-        static=static,
-        static_slope=tables.static_slope_at(counts)[:, :, None] * loads[0],
         motion=tables.model.carriages[0].rider.motion,
+        find_static=static,
+        find_slope=lambda: tables.static_slope_at(counts)[:, :, None] * loads[0],
     )
     return dict(plan.reduction(cycle))

@@ -113,6 +113,18 @@ def round_up(steps: Array) -> Counts:
     return np.rint(LEAST_STEPS * tread * np.ceil(scaled / tread - 1e-9)).astype(np.int64)
 
 
+def stair(most: float) -> Array:
+    """All step counts of the stair up to the first that is no less than ``most``.
+
+    >>> stair(1000.0)
+    array([ 200.,  400.,  600.,  800., 1200.])
+    """
+    found = [LEAST_STEPS]
+    while found[-1] < most:
+        found.append(int(round_up(np.array([found[-1] + 1.0]))[0]))
+    return np.array(found, dtype=np.float64)
+
+
 def least_steps(model: SceneModel, time_scale: Array) -> Array:
     """(V,) the fewest steps that neither the alias rule nor the scheme's stability limit refuses."""
     inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit

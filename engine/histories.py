@@ -35,15 +35,19 @@ def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "no
 
 
 def counts_reduced(timeline: Timeline, stations: int) -> Counts:
-    """Equidistant stations of the last cycle (the last one left out), at least ``stations`` where there are so many.
+    """Equidistant stations of the last cycle from its beginning to its end, at least ``stations`` besides the last
+    where there are so many.
 
-    Every 2^j-th step, so that out and back meet at equal places.
+    Every 2^j-th step, so that out and back meet at equal places; times an odd number where that leaves too many.
     """
     first, last = timeline.window
     steps, stride = last - first, 1
     while steps % (4 * stride) == 0 and steps // (2 * stride) >= stations:
         stride *= 2
-    return np.arange(first, last, stride)
+    if steps // stride >= 2 * stations:
+        odd = np.arange(1, steps // (stride * stations) + 1, 2)
+        stride *= int(odd[steps % (stride * odd) == 0].max())
+    return np.arange(first, last + 1, stride)
 
 
 def rows_sampled(segment: Segment, counts: Counts) -> Counts:

@@ -101,5 +101,8 @@ class Motion(Spec):
         tau outside the segment is evaluated at the nearer end.
         """
         times = np.clip(np.asarray(tau, dtype=np.float64), segment_start, segment_end)
-        right, left = self.path(times, "right"), self.path(times, "left")
-        return Path(*(np.where(times == segment_end, a, b) for a, b in zip(left, right, strict=True)))
+        found, last = self.path(times, "right"), times == segment_end
+        if last.any():
+            for part, at_end in zip(found, self.path(times[last], "left"), strict=True):
+                part[last] = at_end
+        return found

@@ -6,20 +6,24 @@ sensor's reading r_k of that mode, and the static correction that stands for all
 - Modes beyond the kept ones leave out their ringing, and what follows the drive: sum of r_k (A_k + forced_k).
 - Under a mass m they also leave out that it rides on a softer body than the kept modes tell, by the residual
   flexibility c(s): its weight presses with m c''(t) less, and ringing drifts by the phase m omega_1^2 c/2 per radian.
-- Average acceleration turns mode k too slowly, by omega_k^3 h^2/12 per second while its damping remembers, and an
-  extreme between two stations is missed by (omega_k h)^2/8 of the ringing (mechanics section 6). What follows the
-  drive is in error by (omega_k h)^2/6.
+- The scheme turns mode k too slowly or too fast, by omega_k times its period error per second while damping remembers
+  (average acceleration: (omega_k h)^2/12, Fox-Goodwin: (omega_k h)^4/480; mechanics section 6), and an extreme between
+  two stations is missed by (omega_k h)^2/8 of the ringing. What follows the drive is in error by twice the period
+  error, but under a moving mass m by no less than (omega_k h)^2/12 m phi^2/(1 + m phi^2): velocities are of second
+  order in every scheme.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.bouncing import springs
+from engine.kernels.schemes import Scheme
 from engine.moving_load import Load
 from engine.ringing import lowered, rings
 
@@ -29,7 +33,20 @@ MODES_LOOKED_AT = 30
 COUPLED = 0.5  # of the largest inertia of a load on what omitted modes leave soft: it acts for a short time only
 SOFTENED = 0.7  # times the phase by which ringing drifts on a body that is softer than its kept modes tell
 TURNED = 2.0  # times its size: the most that ringing with a wrong phase can miss
-ROUNDS = 6  # of Newton's method for the step
+
+
+class Spoiled(NamedTuple):
+    """What a step may spoil: parts of static values (R, V), and by which part of itself each is off: per square of the
+    step, 1/s^2, and per fourth power, 1/s^4."""
+
+    sizes: Array
+    square: Array
+    fourth: Array
+
+    def missed(self, step: Array) -> Array:
+        """(V,) what a step (V,) in s misses of all of them."""
+        off = (self.square + self.fourth * step**2) * step**2
+        return np.asarray(np.sum(self.sizes * off / (1.0 + off / TURNED), axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,37 +110,24 @@ class Omitted:
         rings = self._read * self.ringing
         return np.asarray(np.cumsum(rings[::-1], axis=0)[::-1])
 
-    def stepped(self, kept: int) -> tuple[Array, Array]:
-        """What the step may spoil, as parts of static values (R, V), and by which part per square of the step, 1/s^2:
-        the ringing of the kept modes, and what follows the drive."""
+    def stepped(self, kept: int, scheme: Scheme) -> Spoiled:
+        """What the step of a scheme may spoil: the ringing of the kept modes, and what follows the drive."""
         here, omega = self.load.modes < kept, self.load.route.omega
-        slips = omega**3 * self._remembered * self.load.time / 12.0 + omega**2 / 8.0
-        follows = np.broadcast_to(omega**2 / 6.0, slips.shape)
-        sizes = np.concatenate([(self._read * part)[here] for part in (self.ringing, self._moving)])
-        return sizes, np.concatenate([slips[here], follows[here]])
+        square, fourth = scheme.period_error
+        turned = omega * self._remembered * self.load.time
+        coupled = omega**2 / 12.0 * self._carried
+        parts = (
+            (self.ringing, turned * omega**2 * square + omega**2 / 8.0, turned * omega**4 * fourth),
+            (self._moving, np.maximum(2.0 * square * omega**2, coupled), 2.0 * fourth * omega**4 + 0.0 * turned),
+        )
+        columns = ((self._read * size, by_square, by_fourth) for size, by_square, by_fourth in parts)
+        return Spoiled(*(np.concatenate([part[here] for part in column]) for column in zip(*columns, strict=True)))
+
+    @cached_property
+    def _carried(self) -> Array:
+        """(K, V) part of a mode's inertia that is the load's, at most."""
+        borne = self.load.shaken.square.max(axis=0)[:, None] * self.load.mass
+        return np.asarray(borne / (1.0 + borne))
 
     def _relative(self, absolute: Array) -> Array:
         return np.divide(absolute, self.scale, out=np.zeros_like(absolute), where=self.scale > 0.0)
-
-
-def longest_step(sizes: Array, slips: Array, allowed: Array, most: Array) -> Array:
-    """(V,) s, at most ``most``: the step at which ringing misses what is ``allowed`` (V,).
-
-    sizes (K, V): of the modes' ringing, in error by ``slips`` (K, V) times the square of the step, at most `TURNED`.
-    The sum is concave in the square of the step, so that Newton's method stays below the root from its first value on.
-    """
-    slope = np.sum(sizes * slips, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        square = np.minimum(np.where(slope > 0.0, allowed / slope, np.inf), most**2)
-        for _ in range(ROUNDS):
-            half = 1.0 + slips * square / TURNED
-            missed = np.sum(sizes * slips * square / half, axis=0)
-            rate = np.sum(sizes * slips / half**2, axis=0)
-            square = np.minimum(np.where(rate > 0.0, square + (allowed - missed) / rate, square), most**2)
-    return np.sqrt(square)
-
-
-def missed_by(sizes: Array, slips: Array, step: Array) -> Array:
-    """(V,) what a step (V,) in s misses of ringing."""
-    grown = slips * step**2
-    return np.asarray(np.sum(sizes * grown / (1.0 + grown / TURNED), axis=0))

@@ -1,4 +1,4 @@
-"""Every combination of model, modes and steps that a scene may get, with its price, and the cheapest that holds.
+"""Every combination of model, modes, scheme and steps that a scene may get, its price, and the cheapest that holds.
 
 All three errors are estimates (`ladder`, `omitted`); of all combinations whose sum is within the tolerance the one with
 the fewest modes x steps is taken, so that a tighter tolerance never gets a cheaper one.
@@ -14,26 +14,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.choice import (
+    FEW,
     FINER,
     LEVELS,
+    MORE,
     MOST_CHOSEN,
     Asked,
     Choice,
     automatic_bodies,
     fewer_modes,
     fixed_steps,
+    scheme_used,
     usual_steps,
     with_choice,
 )
-from engine.fidelity import LEAST_MARGIN, LEAST_STEPS, alias_steps, limit_steps, round_up
+from engine.fidelity import LEAST_MARGIN, LEAST_STEPS, alias_steps, limit_steps, round_up, stair
+from engine.kernels.schemes import Scheme
 from engine.ladder import errors_along, full_fidelity
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
 from engine.moving_load import Load, noticed
-from engine.omitted import MODES_LOOKED_AT, Omitted, longest_step, missed_by
+from engine.omitted import MODES_LOOKED_AT, Omitted, Spoiled
 from engine.resonance import spring_steps
 from engine.route import Route, routes
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed
 
 Array = NDArray[np.float64]
 
@@ -41,18 +45,28 @@ CELL = 0.05  # width of the lattice's cells on which variants are looked at, as 
 UNKNOWN = 12  # modes where nothing is known of their error
 UNFELT = 0.05  # of the tolerance: ringing that need not be resolved
 MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
-LEAST_PART = 0.1  # of the tolerance that steps may take where nothing holds it
+LEAST_PART = 0.1  # of the tolerance, or of all other errors where these are larger, that steps may take
 UNHELD = 1e15  # price of an error, beyond that of any march
 UNKNOWN_PRICE = 1e300  # of the carriages' own model where nothing can be told, beyond any error's
 LEAST_OF_CYCLE = 400  # steps, of whose stations a study makes its results
 KINKED = 0.3  # of the tolerance that extremes may miss between stations where an influence line has a kink
 MOST_FINER = 12.0  # times the steps where nothing is known, for the sake of the tolerance
 CHOSEN = (Fidelity.STATIC, Fidelity.FORCE, Fidelity.MASS)  # besides the carriages' own model
+SCHEMES = (SchemeUsed.AVERAGE_ACCELERATION, SchemeUsed.FOX_GOODWIN)  # with any step; and the truest in phase
+STAIR = stair(MOST_CHOSEN)
+
+
+class _Kind(NamedTuple):
+    """A model, a number of modes of every body whose modes are chosen (0 where none is), and a scheme."""
+
+    model: Fidelity
+    level: int
+    scheme: SchemeUsed
 
 
 class _Option(NamedTuple):
-    """One combination of model, modes and steps for V variants, and its price in modes x steps; more than any other's
-    where it does not hold the tolerance, by its error."""
+    """One combination of model, modes, scheme and steps for V variants, and its price in modes x steps; more than any
+    other's where it does not hold the tolerance, by its error."""
 
     choice: Choice
     price: Array
@@ -64,7 +78,7 @@ class Options:
 
     scene: SceneModel
     asked: Asked
-    _models: dict[int, SceneModel] = field(default_factory=dict)
+    _models: dict[tuple[int, SchemeUsed], SceneModel] = field(default_factory=dict)
 
     @cached_property
     def whole(self) -> SceneModel:
@@ -95,6 +109,13 @@ class Options:
             simpler = [model for model in simpler if model is Fidelity.STATIC]
         return (*simpler, full)
 
+    def schemes(self, values: LaneValues) -> tuple[SchemeUsed, ...]:
+        """Schemes to choose from. Free vibration with springs wants one that is stable with any step."""
+        free = self._vibrates_freely and bool(self.scene.springs)
+        if self.scene.study.solver.scheme != "auto" or fixed_steps(self.scene.study, values) or free:
+            return (scheme_used(self.scene.study),)
+        return SCHEMES
+
     @cached_property
     def along(self) -> tuple[Route, ...] | None:
         """The routes of all loads over the whole bodies."""
@@ -105,84 +126,109 @@ class Options:
         if self.along is None:
             return self._unknown(values)
         errors, told = errors_along(self.whole, self.along, values), Told.of(self.along, values)
+        schemes = self.schemes(values)
         options = [
-            self._option(model, errors.get(model, np.zeros(values.size)), level, told, values)
+            self._option(_Kind(model, level, scheme), errors.get(model, np.zeros(values.size)), told, values)
             for model in self.models
             for level in (self.levels if model is not Fidelity.STATIC else self.levels[:1])
+            for scheme in (schemes if model is not Fidelity.STATIC else schemes[:1])
         ]
         price = np.stack([option.price for option in options])
         cheapest = np.argmin(price, axis=0)
         columns = (np.stack(column) for column in zip(*(option.choice for option in options), strict=True))
         return Choice(*(np.take_along_axis(column, cheapest[None], axis=0)[0] for column in columns))
 
-    def _option(self, model: Fidelity, error: Array, level: int, told: Told, values: LaneValues) -> _Option:
+    def _option(self, kind: _Kind, error: Array, told: Told, values: LaneValues) -> _Option:
         """One combination for some variants."""
+        model, level, scheme = kind
         tolerance, time = values.of("solver.tolerance"), values.time_scale(self.scene.carriages[0].name)
         none = np.zeros(values.size)
         if model is Fidelity.STATIC:
-            choice = Choice(none + model, none, none, error, none, none, none, none, none)
+            choice = Choice(none + model, none, none + scheme, none, error, none, none, none, none, none)
             return _Option(choice, np.where(error <= MOST_SIMPLER * tolerance, 0.0, np.inf))
         kept = level or MODES_LOOKED_AT
         ours = error if self.scene.study.solver.fidelity == "auto" else none  # what the study fixes is its own affair
-        left, (sizes, slips) = told.modes(kept), told.ringing(kept)
-        sizes = self.asked.reported * sizes
-        allowed = tolerance - ours - (left if level else 0.0)
-        step = longest_step(sizes, slips, np.maximum(allowed, LEAST_PART * tolerance), time / LEAST_STEPS)
+        left, spoiled = told.modes(kept), told.ringing(kept, self._by(scheme).scheme)
+        spoiled = spoiled._replace(sizes=self.asked.reported * spoiled.sizes)
+        others = ours + (left if level else 0.0)
+        allowed = tolerance - others
+        least = LEAST_PART * np.maximum(tolerance, others)
+        enough = _fewest(spoiled, np.maximum(allowed, least), self._unit(time))
         most = np.minimum(MOST_FINER * np.maximum(usual_steps(values) * self._periods(time), LEAST_STEPS), MOST_CHOSEN)
-        wanted, rules = np.minimum(self._unit(time) / step, most), self._rules(model, level, values)
+        wanted, rules = np.minimum(enough, most), self._rules(kind, values)
         wanted = np.maximum(wanted, told.kinks / (KINKED * tolerance) if self.asked.window == "last-cycle" else none)
         fixed = fixed_steps(self.scene.study, values)
         steps = values.of("solver.steps") if fixed else round_up(np.maximum(wanted, rules)).astype(np.float64)
-        missed = missed_by(sizes, slips, self._unit(time) / steps)
+        missed = spoiled.missed(self._unit(time) / steps)
         fewer = told.modes(fewer_modes(kept)) if level else none
         decay = np.divide(left, fewer, out=np.ones_like(left), where=fewer > left)
         ruled = (rules > wanted).astype(float)
-        choice = Choice(none + model, none + level, steps, error, left, missed, decay, ruled, told.felt(tolerance))
-        enough = fixed | (self._unit(time) / step < most)
-        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & enough
+        errors = (error, left, missed, decay, ruled, told.felt(tolerance))
+        choice = Choice(none + model, none + level, none + scheme, steps, *errors)
+        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (fixed | (enough < most))
         price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
         last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
         return _Option(choice, np.where(np.isnan(price), last, price))
 
     def _unit(self, time: Array) -> Array:
         """(V,) s over which steps count; free vibration has as many per first period."""
-        free = any(getattr(rider.motion, "after", 0.0) > 0.0 for rider in self.scene.riders)
-        return np.maximum(time, 2.0 * np.pi / self.scene.first_omega) if free else time
+        return np.maximum(time, 2.0 * np.pi / self.scene.first_omega) if self._vibrates_freely else time
+
+    @property
+    def _vibrates_freely(self) -> bool:
+        return any(getattr(rider.motion, "after", 0.0) > 0.0 for rider in self.scene.riders)
 
     def _periods(self, time: Array) -> Array:
         """(V,) first periods over which steps count."""
         return np.asarray(self._unit(time) * self.scene.first_omega / (2.0 * np.pi))
 
-    def _rules(self, model: Fidelity, level: int, values: LaneValues) -> Array:
+    def _rules(self, kind: _Kind, values: LaneValues) -> Array:
         """(V,) steps that the rules ask for which no march may break, for any variant of a cell."""
-        time, scene = values.time_scale(self.scene.carriages[0].name), self.whole
-        kept = [part.modal.omega[: level or None] for part in scene.bodies]
-        found = FINER * limit_steps(scene, max(float(omega[-1]) for omega in kept), time)
+        model, level, scheme = kind
+        time, scene = values.time_scale(self.scene.carriages[0].name), self._by(scheme)
+        found = FINER * limit_steps(scene, self._highest(level), self._unit(time))
         if model > Fidelity.FORCE:
             found = np.maximum(found, FINER * LEAST_MARGIN * alias_steps(scene, time, level or None))
         if model is Fidelity.TIED:
-            sprung = self._with(level)
+            limited = np.isfinite(scene.scheme.stability_limit)  # with all modes that it is compared with
+            sprung = self._with(_compared(level) if limited else level, scheme)
             found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
         return np.asarray(
             np.maximum((1.0 + CELL) * found, LEAST_STEPS if self.asked.window == "whole" else LEAST_OF_CYCLE)
         )
 
-    def _with(self, level: int) -> SceneModel:
-        """The carriages' own model with so many modes."""
-        if level not in self._models:
-            self._models[level] = with_choice(self.scene, full_fidelity(self.scene), level)
-        return self._models[level]
+    def _highest(self, level: int) -> float:
+        """rad/s: of so many modes, and of those that few of them are compared with."""
+        ours = automatic_bodies(self.scene)
+        kept = (
+            part.modal.omega[: (_compared(level) or None) if part.name in ours else None] for part in self.whole.bodies
+        )
+        return max(float(omega[-1]) for omega in kept)
+
+    def _by(self, scheme: SchemeUsed) -> SceneModel:
+        """The scene with as many modes as are looked at, marched by a scheme."""
+        if (0, scheme) not in self._models:
+            self._models[0, scheme] = with_choice(self.whole, full_fidelity(self.scene), 0, scheme)
+        return self._models[0, scheme]
+
+    def _with(self, level: int, scheme: SchemeUsed) -> SceneModel:
+        """The carriages' own model with so many modes, marched by a scheme."""
+        if (level, scheme) not in self._models:
+            self._models[level, scheme] = with_choice(self.scene, full_fidelity(self.scene), level, scheme)
+        return self._models[level, scheme]
 
     def _unknown(self, values: LaneValues) -> Choice:
         """Where nothing is known: the full model, and steps by the tolerance alone."""
         periods = self._periods(values.time_scale(self.scene.carriages[0].name))
         nothing, none = np.full(values.size, np.nan), np.zeros(values.size)
         level = UNKNOWN if automatic_bodies(self.scene) else 0
-        wanted, rules = usual_steps(values) * periods, self._rules(self.models[-1], level, values)
+        kind = _Kind(self.models[-1], level, scheme_used(self.scene.study))
+        wanted, rules = usual_steps(values) * periods, self._rules(kind, values)
         steps = round_up(np.maximum(np.minimum(wanted, MOST_CHOSEN), rules)).astype(np.float64)
         ruled = (rules > wanted).astype(float)
         felt = none + np.inf
-        return Choice(none + self.models[-1], none + level, steps, none, nothing, nothing, none + 1.0, ruled, felt)
+        model, modes, scheme = (none + number for number in kind)
+        return Choice(model, modes, scheme, steps, none, nothing, nothing, none + 1.0, ruled, felt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +264,23 @@ class Told:
         ]
         return np.asarray(np.max(found, axis=0), dtype=np.float64)
 
-    def ringing(self, level: int) -> tuple[Array, Array]:
-        """What the step may spoil (R, V), and by which part per square of it, with so many modes of every body."""
-        parts = [load.stepped(level) for load in self.loads]
-        sizes, slips = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return sizes, slips
+    def ringing(self, level: int, scheme: Scheme) -> Spoiled:
+        """What the step of a scheme may spoil, with so many modes of every body."""
+        parts = [load.stepped(level, scheme) for load in self.loads]
+        return Spoiled(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+def _compared(level: int) -> int:
+    """The most modes that so many are marched with, in comparisons too."""
+    return level + MORE if 0 < level < FEW else level
+
+
+def _fewest(spoiled: Spoiled, allowed: Array, unit: Array) -> Array:
+    """(V,) the fewest steps of the stair over ``unit`` (V,) s that miss no more than is ``allowed`` (V,); infinite
+    where not even its last are enough."""
+    low, high = np.zeros(unit.size, dtype=np.int64), np.full(unit.size, STAIR.size)
+    while np.any(low < high):
+        middle = np.minimum((low + high) // 2, STAIR.size - 1)
+        enough = spoiled.missed(unit / STAIR[middle]) <= allowed
+        low, high = np.where(enough | (low == high), low, middle + 1), np.where(enough, middle, high)
+    return np.asarray(np.append(STAIR, np.inf)[high])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bucket import Bucket
+from engine.choice import scheme_used
 from engine.contacts import contact_forces
 from engine.cycles import counts_sampled, reduced
 from engine.envelopes import MOST_KEPT, envelope_names
@@ -91,6 +92,7 @@ def _computed(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[],
         "status": status.astype(np.int8),
         "diverged_step": diverged_step,
         "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
+        "scheme_used": np.full(size, int(scheme_used(tables.model.study)), dtype=np.int8),
         "modes_used": np.full(size, tables.model.body_modes, dtype=np.int32),
         "steps_used": np.full(size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
     }

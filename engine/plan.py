@@ -40,7 +40,7 @@ from engine.sweep import Cases, expand
 from engine.tables import KEPT_BYTES, SceneTables
 from engine.timeline import Window, coarsened
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed
 from results_schema.variables import declarations
 
 Array = NDArray[np.float64]
@@ -304,8 +304,10 @@ def _buckets(
     told = choose(scene, LaneValues(scene.study, columns, variants.size), asked)
     full_cost = _full_cost(scene, LaneValues(scene.study, columns, variants.size))
     chosen = automatic_bodies(scene)
-    for own in _split(np.arange(variants.size), (told.fidelity * (MAX_MODES + 1) + told.modes).astype(np.int64)):
-        model = with_choice(scene, Fidelity(int(told.fidelity[own[0]])), int(told.modes[own[0]]))
+    kinds = (told.fidelity * (MAX_MODES + 1) + told.modes) * len(SchemeUsed) + told.scheme
+    for own in _split(np.arange(variants.size), kinds.astype(np.int64)):
+        fidelity, modes, scheme = (int(column[own[0]]) for column in (told.fidelity, told.modes, told.scheme))
+        model = with_choice(scene, Fidelity(fidelity), modes, SchemeUsed(scheme))
         values = LaneValues(model.study, cases.columns_of(variants[own]), own.size)
         steps, reasons = _chosen_steps(model, values, told.of(own), check_steps)
         pace = values.time_scale(scene.carriages[0].name)  # of like pace they rise and fall together: fewer extremes

@@ -110,6 +110,15 @@ class Sensor:
             return np.zeros((1, model.omega.size))
         return _spread(model, model.bodies[self.body], self._rows(model, along))
 
+    def shown(self, model: SceneModel, places: Array) -> Array:
+        """(P,) the most that one of its body's modes would show, to some scale, if it read at other fixed places (m)."""
+        sections = self._sections(model)
+        if sections is not None:
+            rows = sections.rows(self.quantity, places)
+        else:
+            rows = self._modal(model).shape(places, DERIVATIVE.get(self.quantity, 0))
+        return np.asarray(np.abs(rows).max(axis=1))
+
     def rides(self, model: SceneModel) -> int | None:
         """The rider that it moves with."""
         return self.under

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,17 +22,28 @@ Array = NDArray[np.float64]
 class Cycle:
     """Histories of one chunk over the last cycle of a periodic motion, or over the whole run.
 
-    phase (H,): 0 <= phase < 1, equidistant where the step count allows;  position (H,): of the first carriage, m;
-    history (H, J, V): sensors in the study's order, SI, V variants;  static (H, J, V): static response of the same
-    model at the same positions;  static_slope (H, J, V): its derivative by the first carriage's position.
+    phase (H,): from 0 to 1, both with their own values, equidistant where the step count allows;  position (H,): of the
+    first carriage, m;
+    history (H, J, V): sensors in the study's order, SI, V variants.  find_static, find_slope: of what costs as much as
+    a march where there are many stations, so that only those who want it pay for it.
     """
 
     phase: Array
     position: Array
     history: Array
-    static: Array
-    static_slope: Array
     motion: Motion
+    find_static: Callable[[], Array]
+    find_slope: Callable[[], Array]
+
+    @cached_property
+    def static(self) -> Array:
+        """(H, J, V) static response of the same model at the same positions."""
+        return self.find_static()
+
+    @cached_property
+    def static_slope(self) -> Array:
+        """(H, J, V) its derivative by the first carriage's position."""
+        return self.find_slope()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +72,7 @@ class Reduction(Protocol):
 
     @property
     def stations(self) -> int:
-        """Stations per cycle that are wanted at least, where there are so many steps."""
+        """Stations per cycle that are wanted at least, besides the last, where there are so many steps."""
 
     @property
     def least_fidelity(self) -> Fidelity:

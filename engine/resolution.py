@@ -1,12 +1,14 @@
 """When a Richardson pair may be believed: every kept mode must be resolved.
 
-Average acceleration turns a mode by 2 atan(omega h/2) a step, so it falls behind by omega^3 h^2 t/12 in a time t
-(mechanics section 6); t is the run's length, or what the mode remembers, 1/(zeta omega), where that is shorter. A mode
-whose phase error is d has the error |1 - exp(i d)| in its amplitude; the pair sees a third of the difference of d and
-4 d, which is (1 + 2 cos d)/3 of it: half of it at d = 1.3.
+A scheme whose period error is e(omega h) turns a mode too slowly or too fast by omega t e in a time t, average
+acceleration by omega^3 h^2 t/12 (mechanics section 6); t is the run's length, or what the mode remembers, 1/(zeta
+omega), where that is shorter. A mode whose phase error is d has the error |1 - exp(i d)| in its amplitude; the pair
+sees a third of the difference of d and 4 d, which is (1 + 2 cos d)/3 of it: half of it at d = 1.3.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +33,13 @@ def phase_errors(tables: SceneTables, values: LaneValues, felt: Array | None = N
     moving = [segment for segment in timeline.segments if not segment.free]
     widths = np.array([segment.end - segment.start for segment in moving])
     steps = np.array([segment.step for segment in moving])
-    longest, gathered = steps.max() * scale, np.sum(widths * steps**2) * scale**3
+    longest, gathered = steps.max() * scale, [np.sum(widths * steps**power) * scale ** (power + 1) for power in (2, 4)]
     free = sum(segment.steps for segment in timeline.segments if segment.free)
     if free:
         rest = _free_seconds(tables.model)
-        longest, gathered = np.maximum(longest, rest / free), gathered + rest * (rest / free) ** 2
-    return _worst(tables.model, values, gathered, longest**2, felt)
+        longest = np.maximum(longest, rest / free)
+        gathered = [part + rest * (rest / free) ** power for power, part in zip((2, 4), gathered, strict=True)]
+    return _worst(tables.model, values, gathered, longest, felt)
 
 
 def steps_to_resolve(model: SceneModel, values: LaneValues) -> Array:
@@ -44,20 +47,31 @@ def steps_to_resolve(model: SceneModel, values: LaneValues) -> Array:
     scale = values.time_scale(model.carriages[0].name)
     unit = scale if _free_seconds(model) == 0.0 else np.maximum(scale, 2.0 * np.pi / model.first_omega)
     duration = scale * max(rider.end for rider in model.riders) + _free_seconds(model)
-    return np.sqrt(_worst(model, values, duration * unit**2, unit**2) / RESOLVED)
+    return np.sqrt(_worst(model, values, [duration * unit**2, np.zeros_like(unit)], unit) / RESOLVED)
 
 
-def _worst(model: SceneModel, values: LaneValues, gathered: Array, square: Array, felt: Array | None = None) -> Array:
-    """(V,) largest omega^3/12 times what has gathered, in s^3: over the run, or h^2 times what the mode remembers."""
+def _worst(
+    model: SceneModel, values: LaneValues, gathered: Sequence[Array], step: Array, felt: Array | None = None
+) -> Array:
+    """(V,) largest phase error: of steps whose squares and fourth powers have gathered over the run, s^3 and s^5, or of
+    the longest ``step``, s, in the time that a mode remembers."""
     worst = np.zeros(values.size)
     for part in model.bodies:
         rates = values.damping_rates(part.name, part.modal.omega)
         memory = np.divide(2.0, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
-        behind = part.modal.omega[:, None] ** 3 / 12.0 * np.minimum(gathered, memory * square)
+        omega, remembered = part.modal.omega[:, None], [memory * step**2, memory * step**4]
+        behind = np.minimum(_behind(model, omega, gathered), _behind(model, omega, remembered))
         if felt is not None:
             behind = np.where(np.arange(part.modal.omega.size)[:, None] < felt, behind, 0.0)
         worst = np.maximum(worst, behind.max(axis=0))
-    return np.maximum(worst, bounce_omega(model, values) ** 3 / 12.0 * gathered)
+    return np.maximum(worst, _behind(model, bounce_omega(model, values), gathered))
+
+
+def _behind(model: SceneModel, omega: Array, gathered: Sequence[Array]) -> Array:
+    """Phase error of frequencies, rad/s, from squares and fourth powers of steps times how long they are taken, which
+    may be for ever."""
+    parts = zip(model.scheme.period_error, (3, 5), gathered, strict=True)
+    return np.asarray(sum(part * omega**power * time for part, power, time in parts if part > 0.0))
 
 
 def _free_seconds(model: SceneModel) -> float:

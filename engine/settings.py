@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
 
 from engine.document import shortened
-from engine.kernels.schemes import SCHEMES, Scheme
+from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme
 from engine.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
 from engine.units import Dimensionless, fault
 
@@ -23,21 +23,22 @@ FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "ful
 SPRUNG = ("auto", "static", "full")  # those that know the springs of carriages
 MAX_STEPS = 100_000_000
 
-SchemeName = Annotated[str, AfterValidator(one_of(*SCHEMES))]
+SchemeName = Annotated[str, AfterValidator(one_of("auto", *SCHEMES))]
 Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES))]
 
 
 class Solver(Spec):
     """How to march.
 
-    beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step). alpha: of "hht-alpha",
-    rho_inf: of "generalized-alpha".
+    scheme: "auto" chooses between average acceleration and Fox-Goodwin with the steps, and is the former where the
+    study says how many. beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step).
+    alpha: of "hht-alpha", rho_inf: of "generalized-alpha".
     steps: over one whole passage or one whole cycle. tolerance: wanted where something is "auto".
     audit: number of variants that are run again with all terms, more modes and more steps; "auto" is 1 % of
     them, 16 to 256, or fewer where that would take long.
     """
 
-    scheme: SchemeName = "average-acceleration"
+    scheme: SchemeName = "auto"
     beta: Dimensionless | None = Field(default=None, ge=0, le=1)
     gamma: Dimensionless | None = Field(default=None, ge=0.5, le=1.5)
     alpha: Dimensionless | None = Field(default=None, ge=-1 / 3, le=0)
@@ -50,8 +51,9 @@ class Solver(Spec):
 
     @property
     def integration(self) -> Scheme:
-        """The scheme with its parameters."""
-        return SCHEMES[self.scheme]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, {})})
+        """The scheme with its parameters; the usual one where it is left open."""
+        name = USUAL_SCHEME if self.scheme == "auto" else self.scheme
+        return SCHEMES[name]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, {})})
 
     @model_validator(mode="after")
     def _fitting_keys(self) -> Solver:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,8 +100,5 @@ def silent(model: SceneModel, sensors: Iterable[Sensor]) -> NDArray[np.bool_]:
 
 def _says_nothing(model: SceneModel, sensor: Sensor) -> bool:
     places = np.linspace(0.0, model.bodies[sensor.body].modal.length, PLACES)
-    here, *elsewhere = (
-        max(float(np.abs(channel.rows).max()) for channel in replace(sensor, at=at).channels(model, ()))
-        for at in (sensor.at, *map(float, places))
-    )
-    return here <= SILENT * max(elsewhere)
+    here, *elsewhere = sensor.shown(model, np.array([sensor.at, *places]))
+    return bool(here <= SILENT * max(elsewhere))

@@ -26,7 +26,7 @@ _BOUNDS: tuple[tuple[type, str, str], ...] = ((Gt, "gt", ">"), (Ge, "ge", ">="),
 class Spec(BaseModel):
     """Base of every table of a study file: strict types, no unknown keys, finite numbers, frozen."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
     derived: ClassVar[tuple[str, ...]] = ()  # numbers that follow from others and can be asked for by their key
     entry_class: ClassVar[Any] = None  # class of the tables under names of the user's choice, if there are such
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -107,7 +107,7 @@ def _shares(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -
         )
     soft = (shapes * modal.modal_flexibility) @ shapes.T
     if study.solver.static_correction:
-        soft = np.array([[modal.flexibility_between(one, other)[0] for other in places] for one in places])
+        soft = _flexibility(modal, places)
     own = [0.0 if c.stiffness == "rigid" else 1.0 / float(c.stiffness) for c in carriage.contacts.values()]
     soft = soft + np.diag(own)
     unit = max(float(np.trace(soft)), 1e-30)
@@ -118,6 +118,16 @@ def _shares(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -
     found = np.linalg.lstsq(matrix, wanted, rcond=1e-12)[0]
     _check_stands(study, name, (free, wanted[count:]), found[:count])
     return tuple(float(share) for share in found[:count])
+
+
+def _flexibility(modal: ModalBody, places: Sequence[Array | str]) -> Array:
+    """(C, C) deflection at every contact per unit force at every other one, m/N; places (1,) or names of points."""
+    count = len(places)
+    along = [place for place in places if not isinstance(place, str)]
+    if len(along) == count:  # all at once
+        at = np.concatenate(along)
+        return modal.flexibility_between(np.repeat(at, count), np.tile(at, count)).reshape(count, count)
+    return np.array([[modal.flexibility_between(one, other)[0] for other in places] for one in places])
 
 
 def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares: Array) -> None:

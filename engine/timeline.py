@@ -239,30 +239,14 @@ def build_timeline(
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
     [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
     """
-    leading = riders[0]
     end = max(rider.end for rider in riders)
-    hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
-    recorded = (0.0, end)
-    seams = list(stops)
-    if leading.motion.period is not None:
-        seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
-        if window == "last-cycle":
-            recorded = (leading.end - leading.motion.period / leading.pace, leading.end)
     segments: list[Segment] = []
-    before = tuple(False for _ in riders)
-    for start, stop in pairwise(_merged([*hard, *seams, *recorded], end)):
-        count = segments[-1].first + segments[-1].steps if segments else 0
-        part = _between(riders, (start, stop), steps, count)
-        fresh = _near(hard, start, end)
-        seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
-        strikes = tuple(_strikes(riders, part[0].active, before, (start, stop))) if fresh else ()
-        head = part[0]._replace(fresh=fresh, strikes=strikes)
-        segments += [segment._replace(recorded=seen) for segment in (head, *part[1:])]
-        before = head.active
+    for part in _parts(riders, window, tuple(stops)):
+        segments += part.stepped(steps, segments[-1].first + segments[-1].steps if segments else 0)
     free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
     if free > 0.0:
         parked = tuple(rider.stays and rider.touches(end, end) for rider in riders)
-        last = segments[-1]._replace(active=parked, recorded=recorded[1] == end)
+        last = segments[-1]._replace(active=parked, recorded=_recorded(riders, window)[1] == end)
         segments += _free_vibration(last, math.ceil(free * free_steps))
     kept = [segment for segment in segments if segment.recorded]
     span = (kept[0].first, kept[-1].first + kept[-1].steps)
@@ -291,16 +275,54 @@ def coarsened(timeline: Timeline, by: int) -> Timeline:
     return replace(timeline, segments=segments, window=(first // by, last // by))
 
 
-def _between(riders: tuple[Rider, ...], ends: tuple[float, float], steps: int, count: int) -> list[Segment]:
-    """The slices between two neighbouring events; neither fresh nor recorded yet."""
-    start, stop = ends
-    total = max(1, math.ceil(steps * (stop - start) - 1e-9 * steps))
-    active = tuple(rider.touches(start, stop) for rider in riders)
-    at = [start + (stop - start) * n / total for n in _slices(total)[:-1]] + [stop]
-    return [
-        Segment(at[i], at[i + 1], last - first, count + first, active, False, (), False, False)
-        for i, (first, last) in enumerate(pairwise(_slices(total)))
-    ]
+class _Part(NamedTuple):
+    """What lies between two neighbouring boundaries, however many steps it gets; otherwise as `Segment`."""
+
+    start: float
+    end: float
+    active: tuple[bool, ...]
+    fresh: bool
+    strikes: tuple[Strike, ...]
+    recorded: bool
+
+    def stepped(self, steps: int, count: int) -> Iterator[Segment]:
+        """Its slices at so many steps per unit of scene time, counted from ``count``; an event precedes the first."""
+        total = max(1, math.ceil(steps * (self.end - self.start) - 1e-9 * steps))
+        bounds = _slices(total)
+        at = [self.start + (self.end - self.start) * n / total for n in bounds[:-1]] + [self.end]
+        for i, (first, last) in enumerate(pairwise(bounds)):
+            fresh, strikes = (self.fresh, self.strikes) if i == 0 else (False, ())
+            yield Segment(
+                at[i], at[i + 1], last - first, count + first, self.active, fresh, strikes, self.recorded, False
+            )
+
+
+@lru_cache(maxsize=64)
+def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) -> tuple[_Part, ...]:
+    """The scene cut at its events, its cycles and ``stops``; a study asks for the same with many numbers of steps."""
+    leading, end, recorded = riders[0], max(rider.end for rider in riders), _recorded(riders, window)
+    hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
+    seams = list(stops)
+    if leading.motion.period is not None:
+        seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
+    found: list[_Part] = []
+    before = tuple(False for _ in riders)
+    for start, stop in pairwise(_merged([*hard, *seams, *recorded], end)):
+        active = tuple(rider.touches(start, stop) for rider in riders)
+        fresh = _near(hard, start, end)
+        seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
+        strikes = tuple(_strikes(riders, active, before, (start, stop))) if fresh else ()
+        found.append(_Part(start, stop, active, fresh, strikes, seen))
+        before = active
+    return tuple(found)
+
+
+def _recorded(riders: tuple[Rider, ...], window: Window) -> tuple[float, float]:
+    """Scene times between which something is recorded."""
+    leading = riders[0]
+    if window == "last-cycle" and leading.motion.period is not None:
+        return leading.end - leading.motion.period / leading.pace, leading.end
+    return 0.0, max(rider.end for rider in riders)
 
 
 def _free_vibration(last: Segment, total: int) -> list[Segment]:

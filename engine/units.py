@@ -23,6 +23,20 @@ _FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|
 _OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
 _SUPERSCRIPTS = {"²": 2, "³": 3, "⁴": 4}
 _BASE = ("meter", "kilogram", "second")
+_COMMON = {
+    name: (Fraction(factor), base)
+    for base, names in (
+        ({}, {"%": "0.01"}),
+        ({"meter": 1}, {"m": "1", "mm": "1e-3", "cm": "1e-2", "km": "1e3"}),
+        ({"kilogram": 1}, {"kg": "1", "g": "1e-3", "t": "1e3"}),
+        ({"second": 1}, {"s": "1", "ms": "1e-3", "min": "60", "h": "3600"}),
+        ({"second": -1}, {"Hz": "1", "kHz": "1e3"}),
+        ({"kilogram": 1, "meter": 1, "second": -2}, {"N": "1", "kN": "1e3", "MN": "1e6"}),
+        ({"kilogram": 1, "meter": -1, "second": -2}, {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"}),
+        ({"radian": 1}, {"rad": "1"}),
+    )
+    for name, factor in names.items()
+}  # what pint says of them, which takes half a second to import
 
 
 @dataclass(frozen=True)
@@ -113,9 +127,14 @@ def _unit_factor(unit: str) -> tuple[Fraction, tuple[int, int, int], int]:
     return total, (exponents[0], exponents[1], exponents[2]), angle
 
 
-@lru_cache(maxsize=256)
 def _named_unit(name: str) -> tuple[Fraction, Mapping[str, int]]:
-    """Exact SI factor and exponents of base units of one name such as "kN"; pint is imported here."""
+    """Exact SI factor and exponents of base units of one name such as "kN"."""
+    return _COMMON[name] if name in _COMMON else _named_by_pint(name)
+
+
+@lru_cache(maxsize=256)
+def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
+    """The same of any unit; pint is imported here."""
     from pint import PintError
 
     try:

@@ -19,7 +19,6 @@ from engine.kernels.layout import LANES
 from engine.lanes import LaneValues, weights
 from engine.model import SceneModel, build_model
 from engine.plan import Plan
-from engine.richardson import march_chosen
 from engine.scene import Study
 from engine.tables import SceneTables
 from engine.timeline import refined
@@ -58,6 +57,8 @@ class Compared:
 def compare_variant(plan: Plan, variant: int, check: Callable[[], None] = lambda: None) -> Compared:
     """Both models of one variant over the recorded part. Raises BadInput as `unreduced_model`, and what `check`
     raises, which is called now and then."""
+    from engine.richardson import march_chosen  # here, as the check of a study marches nothing
+
     bucket = next(bucket for bucket in plan.buckets if variant in bucket.variants)
     study = reading_contacts(plan.cases.study_of(plan.study, variant))
     tables = _tables(plan, bucket, study)

@@ -1,4 +1,4 @@
-"""What became of a variant, and which model computed it."""
+"""What became of a variant, which model computed it, and by which scheme it was marched."""
 
 from __future__ import annotations
 
@@ -51,6 +51,23 @@ class Fidelity(IntEnum):
     MASS = 3
     TIED = 4
     FRAME = 5
+
+
+class SchemeUsed(IntEnum):
+    """The time integration scheme a variant was marched with; statics count as the first.
+
+    >>> label(SchemeUsed.FOX_GOODWIN)
+    'fox-goodwin'
+    """
+
+    AVERAGE_ACCELERATION = 0
+    FOX_GOODWIN = 1
+    LINEAR_ACCELERATION = 2
+    CENTRAL_DIFFERENCE = 3
+    NEWMARK = 4
+    HHT_ALPHA = 5
+    GENERALIZED_ALPHA = 6
+    RICHARDSON = 7
 
 
 def flag_values(flags: type[IntEnum]) -> list[int]:

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity, Status, flag_meanings, flag_values
+from results_schema.status import Fidelity, SchemeUsed, Status, flag_meanings, flag_values
 
 EVERY_KIND = "*"
 AXES = "axes"
@@ -38,7 +38,7 @@ _RESERVED_WORDS = """
     harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
-    tolerance_asked worst_result left_out relative_cost
+    tolerance_asked worst_result left_out relative_cost scheme_used
 """
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
@@ -219,6 +219,16 @@ declare(
     Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
     Variable("modes_used", (), "int32", long_name="number of modes used", meaning="number of modes marched"),
     Variable("steps_used", (), "int32", long_name="number of steps used", meaning="steps over one passage or cycle"),
+    Variable(
+        "scheme_used",
+        (),
+        "int8",
+        None,
+        "time integration scheme used",
+        "of average acceleration and Fox-Goodwin the cheaper one that holds the tolerance, where it is left open",
+        SchemeUsed,
+        required=False,
+    ),
     Variable(
         "diverged_step",
         (),

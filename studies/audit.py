@@ -97,7 +97,8 @@ def audit_group(plan: Plan, sample: Sample | None, dataset: xr.Dataset, work: Wo
         return {}
     from engine.audit import Used, audit_plan
 
-    used = Used(*(_flat(plan, dataset, name, np.arange(plan.size)) for name in ("modes_used", "steps_used")))
+    names = (f"{name}_used" for name in Used._fields)
+    used = Used(*(_flat(plan, dataset, name, np.arange(plan.size)) for name in names))
     kept = _flat(plan, dataset, "status", sample.variants) < int(Status.NOT_CONVERGED)
     finer = audit_plan(plan, sample._replace(variants=sample.variants[kept]), used)
     if finer is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -143,7 +144,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     if arguments is None:
         stopping.own_process()
+        _keep_linear_algebra_to_one_thread()
     code = trouble.exit_code_of(invoke)
     if arguments is None:
         stopping.end_undisturbed()
     return code
+
+
+def _keep_linear_algebra_to_one_thread() -> None:
+    """Tell OpenBLAS so before numpy loads it. The threads are the march's own; those of OpenBLAS wait for each other
+    longer than a product of small matrices takes, and let its last bits depend on the number of cores."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

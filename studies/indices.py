@@ -1,7 +1,8 @@
 """Numbers that describe a cycle (mechanics.md, section 9), for many variants at once.
 
-Fields have the shape (H, ...): H stations of a cycle, then sensors and variants. Sums run station by station, so that
-a variant's bits do not depend on which others are computed with it.
+Fields have the shape (H + 1, ...): stations of a cycle from phase 0 to phase 1, both with their own value as a cycle
+need not close; then sensors and variants. Sums run station by station, so that a variant's bits do not depend on which
+others are computed with it. Peaks are in `studies.peaks`.
 """
 
 from __future__ import annotations
@@ -12,13 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
-PROMINENCE = 0.02  # of the cycle's range: smaller bumps are no peaks
 FLAT = 1e-8  # of its largest value, below which a range is rounding
-PEAKS = 8
 HARMONICS = 16
-TORN = 3.0  # times the largest step beside it: a larger one where a cycle closes is a gap
 _EVEN_SPACING = 1e-9
 
 
@@ -46,26 +43,14 @@ class Asymmetry(NamedTuple):
     even_excess: Array
 
 
-class Peaks(NamedTuple):
-    """number (...): prominent peaks in the cycle. value, phase (K, ...): of the K highest, by phase, then NaN."""
-
-    number: Array
-    value: Array
-    phase: Array
-
-
 def evenly(phase: Array, field: Array) -> Array:
-    """A periodic field (H, ...) at H equidistant phases from 0; linear in between where the phases are not so."""
-    count = len(phase)
-    even = np.arange(count) / count
+    """A field (H + 1, ...) at equidistant phases from 0 to 1; linear in between where its own are not so."""
+    even = np.linspace(0.0, 1.0, len(phase))
     if np.abs(phase - even).max() < _EVEN_SPACING:
         return field
-    right = np.searchsorted(phase, even, side="right")
-    left, right = right - 1, right % count
-    gap = np.mod(phase[right] - phase[left], 1.0)
-    part = np.mod(even - phase[left], 1.0) / np.where(gap > 0.0, gap, 1.0)
-    part = part.reshape(-1, *([1] * (field.ndim - 1)))
-    return np.asarray((1.0 - part) * field[left] + part * field[right])
+    left = np.clip(np.searchsorted(phase, even, side="right") - 1, 0, len(phase) - 2)
+    part = ((even - phase[left]) / (phase[left + 1] - phase[left])).reshape(-1, *([1] * (field.ndim - 1)))
+    return np.asarray((1.0 - part) * field[left] + part * field[left + 1])
 
 
 def interval_weights(nodes: Array, low: float, high: float) -> Array:
@@ -91,9 +76,9 @@ def folded(cruise: tuple[float, float], history: Array, static: Array, slope: Ar
     cruise: phases where the cruise part begins and ends on the way out. On the cruise the speed is constant, so that
     an integral over the position is one over the phase.
     """
-    count = len(history)
+    count = len(history) - 1
     out = np.arange(count // 2 + 1)
-    back = (count - out) % count
+    back = count - out
     weight = interval_weights(out / count, *cruise)
     size = _range_between(static, cruise[0] * count, cruise[1] * count)
     return Legs(weight, history[out], history[back], static[out], slope[out], size)
@@ -133,71 +118,25 @@ def asymmetry(legs: Legs, forward: float) -> Asymmetry:
     return Asymmetry(*(np.where(np.isfinite(value) & varies, value, np.nan) for value in found))
 
 
-def prominent(cycle: Array) -> Mask:
-    """Where a periodic cycle (H, ...) has a maximum with a prominence above 2 % of its range.
-
-    Going round once from the lowest station, a maximum counts as soon as the cycle has fallen below it by more than
-    the threshold, after a rise of more than the threshold: these are exactly the peaks of that prominence.
-    """
-    count = len(cycle)
-    lanes = cycle.reshape(count, -1)
-    first, lane = np.argmin(lanes, axis=0), np.arange(lanes.shape[1])
-    lowest = lanes[first, lane]
-    span = lanes.max(axis=0) - lowest
-    flat = span <= FLAT * np.abs(lanes).max(axis=0)  # rounding has no peaks
-    threshold = np.where(flat, np.inf, PROMINENCE * span)
-    found = np.zeros(lanes.shape, dtype=bool)
-    rising = np.zeros(len(lane), dtype=bool)
-    bottom, top, top_at = lowest.copy(), lowest.copy(), first.copy()
-    for step in range(1, count + 1):
-        at = (first + step) % count
-        value = lanes[at, lane]
-        fell = rising & (top - value > threshold)
-        found[top_at[fell], lane[fell]] = True
-        rose = ~rising & (value - bottom > threshold)
-        higher = rose | (rising & (value > top))
-        top, top_at = np.where(higher, value, top), np.where(higher, at, top_at)
-        bottom = np.where(fell, value, np.minimum(bottom, value))
-        rising = (rising & ~fell) | rose
-    found[[0, -1]] &= ~_torn(lanes)
-    return found.reshape(cycle.shape)
-
-
-def _torn(lanes: Array) -> Mask:
-    """(V,) whether cycles (H, V) do not close, as they have not settled: their ends are then no peaks."""
-    near = np.maximum(np.abs(lanes[1] - lanes[0]), np.abs(lanes[-1] - lanes[-2]))
-    return np.asarray(np.abs(lanes[0] - lanes[-1]) > TORN * near)
-
-
-def peaks(cycle: Array) -> Peaks:
-    """Peaks of a periodic cycle (H, ...) at equidistant phases, each refined by the parabola through three stations."""
-    count = len(cycle)
-    found = prominent(cycle)
-    ranked = np.where(found, -cycle, np.inf)
-    kept = min(PEAKS, count)
-    at = np.argpartition(ranked, kept - 1, axis=0)[:kept]
-    is_peak = np.take_along_axis(found, at, axis=0)
-    left, middle, right = (np.take_along_axis(cycle, (at + step) % count, axis=0) for step in (-1, 0, 1))
-    bend = left - 2.0 * middle + right
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = np.where(bend < 0.0, 0.5 * (left - right) / bend, 0.0)
-    value = np.where(is_peak, middle - 0.25 * (left - right) * shift, np.nan)
-    phase = np.where(is_peak, np.mod((at + shift) / count, 1.0), np.nan)
-    order = np.argsort(phase, axis=0)  # NaN comes last
-    ordered = (np.take_along_axis(field, order, axis=0) for field in (value, phase))
-    value, phase = (_padded(field, PEAKS) for field in ordered)
-    return Peaks(found.sum(axis=0).astype(np.float64), value, phase)
-
-
 def harmonics(cycle: Array) -> Array:
-    """2 |c_k| (17, ...) of a periodic cycle (H, ...) at equidistant phases, k = 0..16; NaN beyond half of H.
+    """2 |c_k| (17, ...) of a cycle (H + 1, ...) at equidistant phases from 0 to 1, k = 0..16; NaN beyond half of H.
 
-    c_k is the mean of w exp(-2 pi i k phase).
+    c_k is the mean of w exp(-2 pi i k phase). The mean over stations is exact of what repeats itself; of a cycle that
+    does not close, the ramp (w(1) - w(0)) phase is integrated in closed form, which leaves an error of second order.
     """
-    count = len(cycle)
-    amplitudes = 2.0 * np.abs(np.fft.rfft(cycle, axis=0)[: HARMONICS + 1]) / count
-    resolved = (count + 1) // 2
-    return _padded(amplitudes[:resolved], HARMONICS + 1)
+    count, gap = len(cycle) - 1, cycle[-1] - cycle[0]
+    found = np.fft.rfft(cycle[:-1], axis=0)[: HARMONICS + 1] / count
+    for k in range(len(found)):
+        found[k] += gap * _missed_of_ramp(k, count)
+    return _padded(2.0 * np.abs(found[: (count + 1) // 2]), HARMONICS + 1)
+
+
+def _missed_of_ramp(k: int, count: int) -> complex:
+    """Integral of x exp(-2 pi i k x) over [0, 1], less its mean over the stations n/count, n < count."""
+    if k == 0:
+        return 0.5 / count
+    angle = np.pi * k / count
+    return complex(0.5 / count, (1.0 - angle / np.tan(angle)) / (2.0 * np.pi * k))
 
 
 def odd_even_ratio(amplitudes: Array) -> Array:

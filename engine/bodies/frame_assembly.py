@@ -6,7 +6,9 @@ from a node to the end of a member's axis carries its rotations along: u_end = u
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 Counts = NDArray[np.int64]
 
 MASSES = {"consistent": consistent_mass, "lumped": lumped_mass}
+_ABOUT_MODES = frozenset({"modes", "leave_out", "rigid_body_modes", "interface", "fixed_interface_modes"})
 _RANK = 1e-9  # of the largest: below it nothing resists a motion
 
 
@@ -83,8 +86,29 @@ class Assembly:
         return found
 
 
+@dataclass(frozen=True)
+class Content:
+    """A frame by what its matrices and modes depend on, so that the variants of a sweep share them."""
+
+    text: str
+    frame: Frame = field(compare=False)
+
+    @classmethod
+    def of(cls, frame: Frame, without: Iterable[str] = ()) -> Content:
+        """All that matters to a frame without damping and own weight, besides the keys ``without``."""
+        dampers = {name: {"damping", "rotational_damping"} for name in frame.spring}
+        left_out = dict.fromkeys(("damping_ratio", "own_weight", *without), True)
+        return cls(frame.model_dump_json(exclude={**left_out, "spring": dampers}), frame)
+
+
 def assemble(frame: Frame) -> Assembly:
-    """Mesh, stiffness, mass, supports and the motions that nothing resists."""
+    """Mesh, stiffness, mass, supports and the motions that nothing resists; the last few are remembered."""
+    return _assemble(Content.of(frame, without=_ABOUT_MODES))
+
+
+@lru_cache(maxsize=8)
+def _assemble(content: Content) -> Assembly:
+    frame = content.frame
     mesh = mesh_of(frame)
     beams = mesh.beams
     nodes = {name: index for index, name in enumerate(frame.node)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 
@@ -12,7 +11,7 @@ from engine.bodies.body import AUTO_MODES, MAX_MODES
 from engine.bodies.craig_bampton import reduce_model
 from engine.bodies.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
 from engine.bodies.frame import Frame
-from engine.bodies.frame_assembly import MASSES, Assembly, Counts, assemble, rigid_motions
+from engine.bodies.frame_assembly import MASSES, Assembly, Content, Counts, assemble, rigid_motions
 from engine.bodies.frame_geometry import unit
 from engine.bodies.frame_points import frame_points, point_loads
 from engine.bodies.frame_sections import TrackSections
@@ -26,26 +25,16 @@ from results_schema.errors import BadInput
 _UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
 
 
-@dataclass(frozen=True)
-class _Content:
-    """A frame by what its modes depend on, so that the variants of a sweep share one reduction."""
-
-    text: str
-    frame: Frame = field(compare=False)
-
-
 def frame_body(frame: Frame) -> ModalBody:
     """The frame in modal coordinates with its exact statics; the last few are remembered.
 
     Raises BadInput, with the key within the body as its place, for a frame that cannot be reduced as it asks.
     """
-    dampers = {name: {"damping", "rotational_damping"} for name in frame.spring}
-    text = frame.model_dump_json(exclude={"damping_ratio": True, "own_weight": True, "spring": dampers})
-    return _frame_body(_Content(text, frame))
+    return _frame_body(Content.of(frame))
 
 
 @lru_cache(maxsize=8)
-def _frame_body(content: _Content) -> ModalBody:
+def _frame_body(content: Content) -> ModalBody:
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused below
             found = _reduced(content.frame)

@@ -84,10 +84,13 @@ def _series(local: Array, table: Array) -> Array:
 
 def _legendre(x: Array, terms: int) -> Array:
     """P_0 to P_(terms - 1) at x (S,), as (terms, S)."""
-    basis = np.ones((terms, len(x)))
-    basis[1] = x
-    for n in range(1, terms - 1):
-        basis[n + 1] = ((2 * n + 1) / (n + 1)) * x * basis[n] - (n / (n + 1)) * basis[n - 1]
+    basis, rest, n = np.empty((terms, len(x))), np.empty(len(x)), np.arange(1, terms - 1)
+    before, last = basis[:2] = np.ones(len(x)), x
+    np.multiply(((2 * n + 1) / (n + 1))[:, None], x, out=basis[2:])
+    for row, factor in zip(basis[2:], n / (n + 1), strict=True):  # P_(n+1) = (2n+1)/(n+1) x P_n - n/(n+1) P_(n-1)
+        row *= last
+        row -= np.multiply(factor, before, out=rest)
+        before, last = last, row
     return basis
 
 

@@ -26,8 +26,9 @@ class Scheme(Protocol):
     """What the program asks of a scheme.
 
     name: as in the study file. order: of its error on smooth, resolved scenes. coefficients: for the kernels.
-    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. stride: steps that its
-    coarsest march takes at once.
+    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. period_error: of such an
+    oscillator, by its leading part: per (omega h)^2, and per (omega h)^4. stride: steps that its coarsest march takes
+    at once.
     """
 
     @property
@@ -40,6 +41,8 @@ class Scheme(Protocol):
     def coefficients(self) -> Newmark | Alpha: ...
     @property
     def stability_limit(self) -> float: ...
+    @property
+    def period_error(self) -> tuple[float, float]: ...
     @property
     def is_damped(self) -> bool:
         """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
@@ -77,6 +80,12 @@ class NewmarkScheme:
         """(gamma/2 - beta)^-1/2, infinite from beta >= gamma/2 on."""
         slack = 0.5 * self.gamma - self.beta
         return math.inf if slack <= 0.0 else 1.0 / math.sqrt(slack)
+
+    @property
+    def period_error(self) -> tuple[float, float]:
+        """|beta/2 - 1/24|; 1/480 per fourth power where that is 0 (mechanics section 6)."""
+        square = abs(0.5 * self.beta - 1.0 / 24.0)
+        return (0.0, 1.0 / 480.0) if math.isclose(self.beta, 1.0 / 12.0) else (square, 0.0)
 
     @property
     def is_damped(self) -> bool:
@@ -153,6 +162,11 @@ class AlphaScheme:
         return math.inf
 
     @property
+    def period_error(self) -> tuple[float, float]:
+        """Of average acceleration, to which its phase is close where it damps little."""
+        return (1.0 / 12.0, 0.0)
+
+    @property
     def is_damped(self) -> bool:
         """See `Scheme`."""
         return _radius(self.amplification(_JUDGED_AT)) <= _DAMPED
@@ -190,6 +204,9 @@ def generalized_alpha(rho_inf: float) -> AlphaScheme:
 def _newmark(name: str, beta: float) -> Callable[[Mapping[str, float]], Scheme]:
     return lambda given: NewmarkScheme(name, beta, 0.5)
 
+
+#: The scheme where the study names none and nothing speaks for another.
+USUAL_SCHEME = "average-acceleration"
 
 #: Every scheme of the march by its name in the study file, made of the parameters that stand there.
 SCHEMES: Mapping[str, Callable[[Mapping[str, float]], Scheme]] = {

@@ -14,6 +14,7 @@ from results_schema.status import Fidelity
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies import indices, theory
 from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.peaks import PEAKS, peaks
 from studies.results import PACES, Axis, Index, Results, chosen, extreme
 from studies.telling import check_sensors, first_carriage, in_words, told_statuses
 from studies.words import MINUS, counted, listed, number, percent
@@ -29,8 +30,8 @@ Array = NDArray[np.float64]
 
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 MOST_SENSORS = 3
-KINKED = ("bending_moment", "shear_force", "axial_force", "stress", "strain")
-KINKED_STATIONS = 3200  # of a cycle
+STATIONS = 8192  # of a cycle: all steps of nearly every march, so that whatever rings in it is seen as it was marched
+SAME_PEAK = 0.05  # of a cycle: maxima further apart are two peaks
 MOST_GROUPS = 4
 NEAR = 0.15  # how close a harmonic must be to be named as the cause
 SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
@@ -49,7 +50,7 @@ RESULTS = (
         ("sensor", "peak"),
         units="{sensor}",
         long_name="value of the peak",
-        meaning="refined by a parabola; the 8 highest peaks in the order of their phase, NaN beyond their number; "
+        meaning="refined by a parabola, at a kink by lines; the 8 highest peaks in the order of their phase, NaN beyond their number; "
         "in the unit of the sensor",
         nan_allowed=True,
     ),
@@ -96,30 +97,30 @@ declare(
 class DoublePeakReduction:
     """Peaks and harmonics of every sensor from the last cycle."""
 
-    stations: int = 400
+    stations: int = STATIONS
     least_fidelity: Fidelity = Fidelity.STATIC
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {variable.name: variable.dims for variable in RESULTS}
 
     def sizes(self, study: Study) -> Mapping[str, int]:
-        return {"sensor": len(study.sensor), "peak": indices.PEAKS, "harmonic_number": indices.HARMONICS + 1}
+        return {"sensor": len(study.sensor), "peak": PEAKS, "harmonic_number": indices.HARMONICS + 1}
 
     def __call__(self, cycle: Cycle) -> dict[str, Array]:
         """The results, (V, J) and (V, J, K)."""
-        history = indices.evenly(cycle.phase, cycle.history)
-        peaks, amplitudes = indices.peaks(history), indices.harmonics(history)
+        found = peaks(cycle.phase, cycle.history)
+        amplitudes = indices.harmonics(indices.evenly(cycle.phase, cycle.history))
         return {
-            "peaks_per_cycle": peaks.number.T,
-            "peak_value": peaks.value.T,
-            "peak_phase": peaks.phase.T,
+            "peaks_per_cycle": found.number.T,
+            "peak_value": found.value.T,
+            "peak_phase": found.phase.T,
             "odd_even_ratio": indices.odd_even_ratio(amplitudes).T,
             "harmonic": amplitudes.T,
         }
 
     def differences(self, compared: Compared) -> dict[str, Array]:
-        """Harmonics, and the values of peaks where both have as many. A bump near the least prominence is a peak in one
-        and none in the other without being an error; the harmonics see what matters of it."""
+        """Harmonics, and the values of peaks that are the same in both. A bump near the least prominence is a peak in
+        one and none in the other without being an error; the harmonics see what matters of it."""
         harmonics = compared.gap("harmonic").max(axis=2)
         return {"peak_value": compared.relative(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
 
@@ -144,9 +145,7 @@ class DoublePeak:
         check_sensors(study)
 
     def reduction(self, study: Study) -> DoublePeakReduction:
-        """Moments and the like peak in a kink where the load passes, which few stations would miss."""
-        kinked = any(s.quantity in KINKED and s.at is not None for s in study.sensor.values())
-        return DoublePeakReduction(KINKED_STATIONS) if kinked else DoublePeakReduction()
+        return DoublePeakReduction()
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
@@ -154,7 +153,7 @@ class DoublePeak:
         ratio = theory.frequency_ratio(Results(dataset, study))
         dims = tuple(getattr(ratio, "dims", ()))
         found = {
-            "peak": ("peak", np.arange(1, indices.PEAKS + 1, dtype=np.int64), _axis("peak")),
+            "peak": ("peak", np.arange(1, PEAKS + 1, dtype=np.int64), _axis("peak")),
             "harmonic_number": (
                 "harmonic_number",
                 np.arange(indices.HARMONICS + 1, dtype=np.int64),
@@ -181,19 +180,34 @@ KIND = DoublePeak()
 
 
 def _peak_gap(compared: Compared) -> Array:
-    """(V, J) the largest difference of peaks in the order of their phases, begun where both fit best: a peak at the
-    beginning of the cycle may stand at its end in the other. Of more than are kept only the highest is compared."""
-    one, other = (np.asarray(part["peak_value"], dtype=np.float64) for part in (compared.one, compared.other))
-    number, again = (np.asarray(part["peaks_per_cycle"], dtype=np.float64) for part in (compared.one, compared.other))
-    found = np.zeros(number.shape)
-    for count in range(1, indices.PEAKS + 1):
-        here = (number == count) & (again == count)
-        values, others = one[here][:, :count], other[here][:, :count]
-        gaps = [np.abs(values - np.roll(others, k, axis=1)).max(axis=1) for k in range(count)]
-        found[here] = np.min(gaps, axis=0)
-    many = (number > indices.PEAKS) & (again > indices.PEAKS)
-    found[many] = np.abs(np.max(one[many], axis=1) - np.max(other[many], axis=1))
+    """(V, J) the largest difference of peaks that are the same in both: their phases, round the cycle, are closer than
+    `SAME_PEAK` and than half of what separates either from the next peak. Others are not compared: one is a bump near
+    the least prominence, or it has moved, and harmonics tell what matters of that."""
+    (value, phase), (values, phases) = (
+        (np.asarray(part["peak_value"], dtype=np.float64), np.asarray(part["peak_phase"], dtype=np.float64))
+        for part in (compared.one, compared.other)
+    )
+    near, others_near = (np.fmin(SAME_PEAK, 0.5 * _spacing(part)) for part in (phase, phases))
+    found = np.zeros(value.shape[:-1])
+    for k in range(value.shape[-1]):
+        other = np.roll(np.arange(value.shape[-1]), k)
+        same = _apart(phase, phases[..., other]) <= np.minimum(near, others_near[..., other])
+        gap = np.where(same, np.abs(value - values[..., other]), 0.0)
+        found = np.maximum(found, gap.max(axis=-1))
     return found
+
+
+def _spacing(phase: Array) -> Array:
+    """(..., K) how far the next peak is from each, round the cycle; NaN where there is no other."""
+    found = np.full(phase.shape, np.nan)
+    for k in range(1, phase.shape[-1]):
+        found = np.fmin(found, _apart(phase, np.roll(phase, k, axis=-1)))
+    return found
+
+
+def _apart(phase: Array, other: Array) -> Array:
+    """Distance of phases, round the cycle."""
+    return np.asarray(np.abs(np.mod(phase - other + 0.5, 1.0) - 0.5))
 
 
 def _axis(name: str) -> dict[str, object]:

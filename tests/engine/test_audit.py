@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from engine.audit import (
     Sample,
@@ -22,7 +23,7 @@ from engine.plan import Plan, make_plan
 from engine.scene import Study
 from engine.sweep import Cases
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shuttle, study
 from tests.engine.test_unreduced import frame
 
@@ -37,6 +38,11 @@ def cases(*shape: int) -> Cases:
 def grown(bed: dict[str, Any], **changes: Any) -> Study:
     """The study that audits a scene on some bed."""
     return in_full(make_plan(study(bed, mass(0.2, CROSSING), **changes)).base, 7)
+
+
+def by_average(modes: NDArray[np.int64], steps: NDArray[np.int64]) -> Used:
+    """What variants were marched with by average acceleration."""
+    return Used(modes, steps, np.full(modes.size, SchemeUsed.AVERAGE_ACCELERATION))
 
 
 def again(plan: Plan, variants: Any, used: Used | None = None) -> tuple[Bucket, ...]:
@@ -103,7 +109,7 @@ def test_a_frame_gives_what_it_has() -> None:
 def test_twice_the_modes_and_four_times_the_steps_that_were_used() -> None:
     """Of every variant, also where it was improved during the run."""
     plan = make_plan(study(beam(modes="auto"), mass(0.2, CROSSING), sweep=SPEEDS))
-    used = Used(np.full(40, 3), np.full(40, 500))
+    used = by_average(np.full(40, 3), np.full(40, 500))
     used.modes[7], used.steps[7] = 16, 3000
     found = again(plan, np.arange(0, 40, 7), used)
     assert sorted(np.concatenate([bucket.variants for bucket in found])) == [0, 7, 14, 21, 28, 35]
@@ -117,12 +123,12 @@ def test_twice_the_modes_and_four_times_the_steps_that_were_used() -> None:
 
 def test_tables_are_shared_by_steps_of_one_size() -> None:
     plan = make_plan(study(beam(modes="auto"), mass(0.2, CROSSING), sweep=SPEEDS))
-    used = Used(np.full(40, 3), np.where(np.arange(40) < 20, 10_000, 1000))
+    used = by_average(np.full(40, 3), np.where(np.arange(40) < 20, 10_000, 1000))
     assert [bucket.steps for bucket in again(plan, np.arange(40), used)] == [40_000, 4000]
-    used = Used(np.full(40, 3), np.linspace(8000, 2000, 40).astype(np.int64))
+    used = by_average(np.full(40, 3), np.linspace(8000, 2000, 40).astype(np.int64))
     assert [bucket.steps for bucket in again(plan, np.arange(40), used)] == [32_000]
     many = masses(600, CROSSING)
-    used = Used(np.full(600, 3), np.linspace(8000, 2000, 600).astype(np.int64))
+    used = by_average(np.full(600, 3), np.linspace(8000, 2000, 600).astype(np.int64))
     assert 1 < len(again(many, np.arange(600), used)) <= 3
 
 
@@ -136,7 +142,7 @@ def test_few_fixed_steps_do_not_let_the_audit_ring() -> None:
 def test_a_simpler_model_is_compared_with_steps_that_its_mass_needs() -> None:
     """Four times the steps of a force break the alias rule of twice the modes under the mass."""
     fast = study(beam(modes=32), mass(0.2, cruise(0.0, 1.0, 2.0)), solver={"fidelity": "force"})
-    (found,) = again(make_plan(fast), [0], Used(np.array([32]), np.array([20])))
+    (found,) = again(make_plan(fast), [0], by_average(np.array([32]), np.array([20])))
     wave, omega, step = 64 * np.pi * 2.0, (64 * np.pi) ** 2, 0.5 / found.steps
     assert found.scene.fidelity is Fidelity.MASS and found.scene.body_modes == 64
     assert wave * step < 2.0 * np.arctan(2.0 / (omega * step))
@@ -201,5 +207,5 @@ def test_half_as_many_until_that_takes_no_longer_than_it_may() -> None:
     assert whole[0] == 16
     sizes = [audit_seconds(plan, sample._replace(seconds=part * whole[1])) for part in (1.0, 0.9, 0.5, 1e-6)]
     assert sizes[0] == whole and all(size < 16 for size, _ in sizes[1:]) and sizes[-1] == (0, 0)
-    more = Used(np.full(40, 6), np.full(40, 10_000_000))
+    more = by_average(np.full(40, 6), np.full(40, 10_000_000))
     assert audit_plan(plan, sample, more) is None

@@ -17,7 +17,7 @@ from engine.plan import base_scene
 from engine.scene import Study
 from engine.ways import frozen
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
-from tests.engine.test_riding import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
+from tests.engine.riders import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import engine.omitted as omitted
 from engine.execution import run
 from engine.lanes import LaneValues
 from engine.moving_load import Load, noticed
-from engine.omitted import MODES_LOOKED_AT, Omitted, missed_by
+from engine.omitted import MODES_LOOKED_AT, Omitted
 from engine.plan import base_scene
 from engine.route import routes
 from engine.scene import Study
@@ -257,8 +257,10 @@ def told_of_modes(given: Study, modes: int) -> float:
 
 def told_of_steps(given: Study, modes: int, steps: int) -> float:
     """What so many steps over a passage or cycle miss."""
-    parts = parts_of(given)
-    return float(sum(missed_by(*part.stepped(modes), part.load.time / steps) for part in parts)[0])  # type: ignore[index]
+    scheme = given.solver.integration
+    return float(
+        sum(part.stepped(modes, scheme).missed(part.load.time / steps) for part in parts_of(given))[0]  # type: ignore[index]
+    )
 
 
 class Beforehand(NamedTuple):

@@ -15,7 +15,7 @@ from engine.plan import base_scene
 from engine.scene import Study
 from engine.ways import frozen
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
-from tests.engine.test_riding import FLEXIBLE, THREE, TWO, UNEVEN, riding
+from tests.engine.riders import FLEXIBLE, THREE, TWO, UNEVEN, riding
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from engine.plan import make_plan
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
-from tests.engine.test_riding import FLEXIBLE, FRAME, SHOES, THREE, riding
+from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, riding
 
 STATIC: Table = {"solver": {"fidelity": "static"}}
 

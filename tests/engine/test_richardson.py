@@ -294,7 +294,7 @@ class Kept:
         return {"cycle": ("station_of_cycle",)}
 
     def sizes(self, given: Study) -> Mapping[str, int]:
-        return {"station_of_cycle": 100}
+        return {"station_of_cycle": 101}
 
     def differences(self, compared: Compared) -> dict[str, Array]:
         return {}

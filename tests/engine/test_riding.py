@@ -1,9 +1,8 @@
-"""Bodies that ride on contacts: the engine against a dense twin, limits, statics, starts, and what is refused."""
+"""Bodies that ride on contacts: the engine against a dense twin, lanes, steps, histories and separation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,66 +10,16 @@ from numpy.typing import NDArray
 
 import engine
 import studies
-from engine.fidelity import allow_any_steps
-from engine.influence import static_values
 from engine.lanes import LaneValues, padded
 from engine.march import march
 from engine.plan import make_plan
 from engine.resonance import contact_omega, spring_steps
-from engine.richardson import march_chosen
 from engine.scene import Study
-from engine.ways import frozen
-from results_schema.errors import BadInput
-from results_schema.status import Fidelity
-from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
+from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
+from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.riding import Twin
 
 Array = NDArray[np.float64]
-
-RIGID: Table = {"kind": "rigid", "length": 0.4, "mass": 0.5, "inertia": 0.01}
-UNEVEN: Table = RIGID | {"centre": 0.13}
-FLEXIBLE = beam(supports="free-free", length=0.5, modes=5, youngs_modulus=3.0, damping_ratio=0.01)
-FRAME: Table = {
-    "kind": "frame",
-    "plane": "xz",
-    "modes": 6,
-    "damping_ratio": 0.01,
-    "node": {"rear": [0.0, 0.0], "nose": [0.4, 0.0], "foot": [0.0, -0.1], "toe": [0.4, -0.1]},
-    "section": {"all": {"area": 1.0, "second_moment": 1.0, "youngs_modulus": 50.0, "density": 1.0}},
-    "member": {
-        "top": {"nodes": ["rear", "nose"], "section": "all", "elements": 4},
-        "back": {"nodes": ["foot", "rear"], "section": "all", "elements": 2, "up": [1, 0, 0]},
-        "front": {"nodes": ["toe", "nose"], "section": "all", "elements": 2, "up": [1, 0, 0]},
-    },
-    "point": {"rear_shoe": {"node": "foot"}, "front_shoe": {"node": "toe"}},
-    "track": {"members": ["top"]},
-}
-TWO = {
-    "rear": {"at": 0.05, "stiffness": 400.0, "damping": 0.3},
-    "front": {"at": 0.35, "stiffness": 500.0, "damping": 0.2},
-}
-THREE = {"a": {"at": 0.05, "stiffness": 400.0, "damping": 0.3}, "b": {"at": 0.2, "stiffness": 300.0}, "c": TWO["front"]}
-SHOES = {
-    "rear": {"point": "rear_shoe", "offset": -0.2, "stiffness": 400.0, "damping": 0.3},
-    "front": {"point": "front_shoe", "offset": 0.2, "stiffness": 500.0},
-}
-
-
-def riding(motion: Table, contacts: Any = TWO, table: Table = RIGID, bed: Table | None = None, **changes: Any) -> Study:
-    """A study of one body that rides on the bed, read wherever it can be read."""
-    base = beam(damping_ratio=0.02, modes=5) if bed is None else bed
-    car = {"on": "bed", "kind": "body", "body": "table", "contacts": contacts, "motion": motion}
-    sensors = {name: {"carriage": "car", "contact": name, "quantity": "contact_force"} for name in contacts}
-    sensors |= {
-        "total": {"carriage": "car", "quantity": "contact_force"},
-        "tip": fixed(0.1, body="table"),
-        "tip_rate": fixed(0.1, "velocity", body="table"),
-        "tip_acceleration": fixed(0.1, "acceleration", body="table"),
-        "place": fixed(0.61),
-        "below": under("car"),
-    }
-    tables = {"body": {"bed": base, "table": table}, "sensor": sensors, "solver": {"steps": 200}}
-    return study(base, {"car": car}, **(tables | changes))
 
 
 def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, Array], NDArray[np.bool_]]:
@@ -141,118 +90,6 @@ def test_what_rides_obeys_newton(name: str) -> None:
     assert np.corrcoef(rate[3:-3], push[3:-3])[0, 1] > 0.99
 
 
-def quiet(**changes: Any) -> Study:
-    """A very slow shuttle, nearly static."""
-    return riding(shuttle(0.3, 0.7, 1e-4, 0.5, 1), **({"contacts": THREE, "table": FLEXIBLE} | changes))
-
-
-@pytest.mark.parametrize("name", ["flexible", "frame", "own weight"])
-def test_statics_are_what_a_slow_march_tends_to(name: str) -> None:
-    cases: dict[str, Table] = {
-        "flexible": {},
-        "frame": {"contacts": SHOES, "table": FRAME},
-        "own weight": {"bed": beam(own_weight=True, modes=4)},
-    }
-    case = quiet(**cases[name])
-    plan = make_plan(case, check_steps=allow_any_steps)
-    (bucket,) = plan.buckets
-    tables, values = bucket.tables, plan.values(bucket, padded(bucket.variants))
-    counts = np.arange(0, 201, 20)
-    found = march(tables, values, counts, 1).history[:, :, 0]
-    unit, twin = tables.static_at(counts), Twin(case)
-    static = unit.force[:, :, 0] * twin.weight + unit.gravity * case.gravity
-    for j, sensor in enumerate(tables.sensors):
-        if sensor.quantity not in ("velocity", "acceleration"):
-            assert np.abs(static[:, j] - found[:, j]).max() <= 2e-6 * np.abs(found[:, j]).max(), sensor.name
-    places = tables.timeline.positions(0, counts.astype(np.float64))
-    force = np.array([twin.static(float(s))[1] for s in places])
-    names = [sensor.name for sensor in tables.sensors]
-    for r, contact in enumerate(case.carriage["car"].contacts):  # type: ignore[attr-defined]
-        assert np.abs(static[:, names.index(contact)] - force[:, r]).max() <= 1e-8 * np.abs(force).max()
-
-
-def test_the_weight_is_carried_by_levers() -> None:
-    """At rest on two contacts: shares by the lever rule, whatever the springs."""
-    case = riding(shuttle(0.3, 0.7, 1e-2, 0.5, 1), table=UNEVEN, solver={"steps": 8000})
-    found = engine.run(case)
-    weight = 0.5 * 9.81
-    for name, share in (("rear", 0.22 / 0.3), ("front", 0.08 / 0.3), ("total", 1.0)):
-        assert float(found[f"{name}_max"]) == pytest.approx(weight * share, rel=1e-4)
-        assert float(found[f"{name}_min"]) == pytest.approx(weight * share, rel=1e-4)
-    assert int(found.fidelity_used) == Fidelity.TIED and int(found.status) == 0
-
-
-def test_on_one_rigid_contact_it_is_a_rigid_mass() -> None:
-    bed, way = beam(modes=6, own_weight=True), swing(0.4, 0.3, 0.9, 1)  # starts with a speed, on a slope
-    changes: Table = {"solver": {"steps": 900}, "sensor": {"place": fixed(0.61), "below": under("car")}}
-    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
-    joined = engine.run(riding(way, one, RIGID, bed, **changes))
-    single = engine.run(study(bed, mass(0.5, way), **changes))
-    for name in ("place_max", "place_min", "below_max", "car_contact_force_max", "car_contact_force_min"):
-        assert float(joined[name]) == pytest.approx(float(single[name]), rel=1e-9), name
-
-
-def test_on_one_spring_it_is_a_sprung_mass() -> None:
-    way, bed = cruise(0.0, 1.0, 0.8), beam(modes=6)
-    plain: Table = {"solver": {"steps": 900, "static_correction": False}, "sensor": {"place": fixed(0.61)}}
-    one = {"only": {"at": 0.2, "stiffness": 40.0, "damping": 1.5}}
-    joined = engine.run(riding(way, one, RIGID, bed, **plain))
-    single = engine.run(study(bed, oscillator(0.5, 40.0, way, damping=1.5), **plain))
-    for name in ("place_max", "place_min", "car_contact_force_max", "car_contact_force_min"):
-        assert float(joined[name]) == pytest.approx(float(single[name]), rel=1e-9), name
-
-
-def test_rigid_joints_are_the_limit_of_stiff_springs() -> None:
-    """Two joints hold heave and pitch; stiffer and stiffer springs tend to them, as 1/k."""
-    bed, way = beam(modes=3, damping_ratio=0.05), shuttle(0.3, 0.7, 0.8, 0.5, 1)
-    changes: Table = {"solver": {"steps": 20000, "static_correction": False}, "sensor": {"place": fixed(0.61)}}
-
-    def largest(stiffness: float | str) -> float:
-        contacts = {name: {"at": at, "stiffness": stiffness} for name, at in (("rear", 0.05), ("front", 0.35))}
-        return float(engine.run(riding(way, contacts, RIGID, bed, **changes)).place_max)
-
-    joint = largest("rigid")
-    gaps = [abs(largest(stiffness) - joint) / joint for stiffness in (2e3, 2e4, 2e5)]
-    assert gaps[1] < 0.15 * gaps[0] < 0.15 * 0.02 and gaps[2] < 0.15 * gaps[1]
-
-
-@pytest.mark.parametrize(
-    ("scheme", "order"),
-    [
-        ({}, 2.0),
-        ({"scheme": "hht-alpha", "alpha": -0.1}, 2.0),
-        ({"scheme": "generalized-alpha", "rho_inf": 0.8}, 2.0),
-        ({"scheme": "richardson"}, 4.0),
-    ],
-)
-def test_orders(scheme: Table, order: float) -> None:
-    def largest(steps: int, solver: Table) -> Array:
-        case = riding(shuttle(0.3, 0.7, 0.8, 0.3, 1), THREE, FLEXIBLE, solver={"steps": steps} | solver)
-        plan = make_plan(case)
-        (bucket,) = plan.buckets
-        counts = np.linspace(0, bucket.tables.timeline.steps, 41).astype(np.int64)
-        marched, _ = march_chosen(bucket.tables, plan.values(bucket, padded(bucket.variants)), counts, 1)
-        return marched.history[:, :, 0]
-
-    exact = largest(25600, {"scheme": "richardson"})
-    errors = [np.nanmax(np.abs(largest(steps, scheme) - exact), axis=0) for steps in (1600, 3200)]
-    fitted = np.log2(errors[0] / errors[1])[[0, 1, 2, 4, 7]]
-    assert np.all(np.abs(fitted - order) < 0.06 * order)
-
-
-def test_static_correction_is_felt_in_the_contacts() -> None:
-    """Two kept modes with what they miss carry three contacts nearly as twenty do; without it they do not."""
-
-    def middle(modes: int, correction: bool) -> float:
-        bed, solver = beam(modes=modes), {"steps": 400, "static_correction": correction}
-        (bucket,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).buckets
-        names = [sensor.name for sensor in bucket.tables.sensors]
-        return float(bucket.tables.static_at(np.array([0, 77])).force[1, names.index("b"), 0])
-
-    whole = middle(20, True)
-    assert abs(middle(2, True) / whole - 1.0) < 1e-9 < 1e-3 < abs(middle(2, False) / whole - 1.0)
-
-
 def test_lanes_agree_with_single_variants() -> None:
     """Speed, gravity and damping of a contact are lanes; stiffness makes scenes of their own."""
     swept = {
@@ -307,132 +144,3 @@ def test_separation_is_judged_at_every_contact() -> None:
     assert int(found.status) == 1
     assert float(found.car_contact_force_min) == pytest.approx(min(float(found.rear_min), float(found.front_min)))
     assert np.isfinite(float(found.car_separation_position))
-
-
-def change(case: Study, path: str, value: Any) -> Study:
-    return case.with_values({path: value})
-
-
-WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "words"),
-    [
-        ("carriage.car.body", "bed", r"carriage\.car\.body: a body cannot ride on itself"),
-        ("carriage.car.body", "tabel", r"carriage\.car\.body: no such body"),
-        ("carriage.car.contacts.front.at", 0.5, r"contacts\.front\.at: a place off the track of the body that rides"),
-        ("carriage.car.contacts.front.at", 0.1, r"carriage\.car\.contacts: this body would tip over"),
-        ("carriage.car.contacts", {}, r"carriage\.car\.contacts"),
-        ("carriage.car.contacts.rear", {"at": 0.35, "stiffness": 1.0}, r"this body would tip over"),
-        ("carriage.car.contacts.front.stiffness", 0.0, r"contacts\.front\.stiffness"),
-        ("carriage.car.contacts.front.stiffness", "stiff", r"contacts\.front\.stiffness"),
-        ("carriage.car.contacts.front.stiffness", "rigid", r"a rigid contact has no damper"),
-        ("carriage.car.contacts.front.point", "toe", r"exactly one place"),
-        ("carriage.car.contacts.front", {"point": "toe", "offset": 0.1, "stiffness": 1.0}, r"no such point"),
-        ("carriage.car.contacts.front", {"point": "toe", "stiffness": 1.0}, r"belong together"),
-        ("carriage.car.motion.end", 0.9, r"contacts\.front: this contact leaves the body"),
-        ("carriage.car.reference", 0.6, r"carriage\.car\.reference: a place off the track"),
-        ("solver.fidelity", "mass", r"solver\.fidelity: .*has no meaning"),
-        ("body.table.own_weight", True, r"nothing holds this body fully"),
-        ("body.table", beam(length=0.4, modes=4), r"something holds this body"),
-        ("body.table.centre", 0.41, r"body\.table\.centre"),
-        ("sensor.rear.contact", "raer", r"sensor\.rear\.contact: no such contact"),
-        ("sensor.rear.quantity", "displacement", r"sensor\.rear: only contact forces"),
-        ("sensor.total.quantity", "velocity", r"has no sprung mass"),
-    ],
-)
-def test_refused(path: str, value: Any, words: str) -> None:
-    with pytest.raises(BadInput, match=words):
-        make_plan(change(WHOLE, path, value))
-
-
-def test_rigid_contacts_meet_no_shocks() -> None:
-    rigid = {name: {"at": contact["at"], "stiffness": "rigid"} for name, contact in TWO.items()}
-    for motion in (cruise(-0.4, 1.4, 0.8), shuttle(0.3, 0.7, 0.8, 0.0, 1), cruise(0.3, 0.7, 0.8, after=1.0)):
-        with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
-            make_plan(riding(motion, rigid))
-    whole = swing(0.5, 0.2, 0.7, 2)  # sets off and stops at once, as a scene of its own begins and ends
-    make_plan(riding(whole, rigid))
-    car = {"on": "bed", "kind": "body", "body": "table", "contacts": rigid}
-    push = {"on": "bed", "kind": "force", "force": 1.0, "motion": cruise(0.0, 1.0, 0.1)}
-    late = {"motion": cruise(0.3, 0.7, 0.8), "delay": 0.1}  # it is not there before
-    for cars in ({"car": car | {"motion": whole}, "push": push}, {"car": car | late}):
-        with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
-            make_plan(study(beam(), cars, body={"bed": beam(), "table": RIGID}))
-
-
-@pytest.mark.parametrize(
-    ("bed", "places", "most"), [(5, np.linspace(0.05, 0.35, 8), 7), (5, [0.2, 0.2], 1), (1, [0.0, 0.1, 0.2, 0.4], 3)]
-)
-def test_rigid_contacts_that_the_modes_cannot_meet_are_refused(bed: int, places: Any, most: int) -> None:
-    """A rigid body moves in two ways, and the bed in as many as it has modes."""
-    rigid = {f"c{number}": {"at": float(at), "stiffness": "rigid"} for number, at in enumerate(places)}
-    with pytest.raises(BadInput, match=rf"carriage\.car\.contacts: .*at most {most} of them rigid"):
-        make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid, bed=beam(modes=bed)))
-
-
-def test_a_rigid_contact_stays_on_the_track() -> None:
-    """From the first instant on, with the speed that a slope gives it, on a bed that sags by itself too."""
-    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
-    sensors = {"below": under("car"), "own": fixed(0.2, body="table")}
-    changes: Table = {
-        "solver": {"steps": 4000, "static_correction": False},
-        "sensor": sensors,
-        "kind": "trajectory",
-        "output": {"histories": "all"},
-    }
-    for motion in (shuttle(0.3, 0.7, 0.8, 0.1, 1), swing(0.4, 0.3, 0.9, 1)):
-        found = studies.run(riding(motion, one, RIGID, beam(modes=4, own_weight=True, damping_ratio=0.02), **changes))
-        gap = np.abs(found.own.values - found.below.values)
-        assert gap.max() < 1e-4 * np.abs(found.below.values).max()
-
-
-@pytest.mark.parametrize("correction", [True, False])
-@pytest.mark.parametrize("heavy", [True, False])
-def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -> None:
-    """A table half on a bed whose end gives way: what is off it stands on level ground."""
-    springs = [{"at": 0.0, "stiffness": 40.0}, {"at": 1.0, "stiffness": 60.0}]
-    solver = {"steps": 200, "static_correction": correction}
-    case = riding(
-        cruise(-0.4, 1.4, 0.8), THREE, FLEXIBLE, beam(modes=3, supports=springs, own_weight=heavy), solver=solver
-    )
-    (bucket,) = make_plan(case).buckets
-    twin, model = Twin(case), bucket.scene
-    places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
-    found = static_values(model, LaneValues(case, {}, 1), frozen(model, places)).contacts[0]
-    right = np.array([twin.static(float(place))[1] for place in places])
-    assert np.abs(found - right).max() <= 1e-9 * np.abs(right).max()
-
-
-def test_its_weight_alone() -> None:
-    """fidelity = "force": the shares of level ground as moving forces."""
-    changes: Table = {"sensor": {"place": fixed(0.61)}, "solver": {"steps": 300, "fidelity": "force"}}
-    found = engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN, **changes))
-    forces = {
-        name: {"on": "bed", "kind": "force", "force": 0.5 * 9.81 * share, "motion": cruise(a, a + 0.4, 0.8)}
-        for name, share, a in (("rear", 0.22 / 0.3, 0.15), ("front", 0.08 / 0.3, 0.45))
-    }
-    base = beam(damping_ratio=0.02, modes=5)
-    single = engine.run(study(base, forces, **(changes | {"solver": {"steps": 300}})))
-    assert float(found.place_max) == pytest.approx(float(single.place_max), rel=1e-9)
-    assert float(found.car_contact_force_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3)
-    assert float(found.car_contact_force_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
-    sensors = {name: {"carriage": "car", "contact": name, "quantity": "contact_force"} for name in TWO}
-    read = engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN, **(changes | {"sensor": sensors})))
-    assert float(read.rear_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3) == float(read.rear_static)
-    assert float(read.front_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
-
-
-def test_static_slopes_move_all_contacts() -> None:
-    """By the reference's place, against static readings a little apart, whatever the fidelity."""
-    way = shuttle(0.3, 0.7, 0.8, 0.1, 1)
-    for fidelity in ("auto", "force"):
-        case = riding(way, table=UNEVEN, sensor={"place": fixed(0.61)}, solver={"steps": 200, "fidelity": fidelity})
-        (bucket,) = make_plan(case).buckets
-        tables, counts = bucket.tables, np.array([40])
-        (place,) = tables.timeline.positions(0, counts)
-        apart = frozen(bucket.scene, place + np.array([-1e-4, 1e-4]))
-        left, right = static_values(bucket.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
-        assert abs(right - left) > 1e-7
-        assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

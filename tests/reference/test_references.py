@@ -7,11 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tests.naive import indices, motions
 from tests.reference import closed_forms, passages, sliding, sprung, values
 from tests.reference.closed_forms import PinnedBeam
+
+Array = NDArray[np.float64]
 
 WEIGHT = values.WEIGHT
 
@@ -89,6 +92,13 @@ def test_largest_amplification_of_a_moving_force() -> None:
     assert -one.fun == pytest.approx(values.MOVING_FORCE_ONE_MODE_MAXIMUM, abs=5e-4)
 
 
+@cache
+def gauss() -> tuple[Array, Array]:
+    """Places on (-1, 1) and weights of a rule that is exact far beyond what is integrated here."""
+    t, weights = np.polynomial.legendre.leggauss(400)
+    return t, weights
+
+
 def free_amplitude(alpha: float, forces: int, spacing: float, zeta: float) -> float:
     """Mode-1 amplitude after the last exit of forces `spacing` apart, by quadrature of Duhamel's integral.
 
@@ -96,7 +106,7 @@ def free_amplitude(alpha: float, forces: int, spacing: float, zeta: float) -> fl
     """
     omega, speed = math.pi**2, math.pi * alpha
     rate = complex(-zeta, math.sqrt(1.0 - zeta**2)) * omega
-    t, weights = np.polynomial.legendre.leggauss(400)
+    t, weights = gauss()
     t, weights = 0.5 * (t + 1.0) / speed, 0.5 * weights / speed
     end = 1.0 / speed + (forces - 1) * spacing / speed
     total = sum(

@@ -9,6 +9,7 @@ import sys
 import pytest
 from pydantic import Field, ValidationError
 
+from engine import units
 from engine.spec import Spec
 from engine.units import (
     ACCELERATION,
@@ -120,11 +121,15 @@ def test_every_dimension_reads_its_own_symbol() -> None:
             assert unit.si(f"3 {unit.symbol.replace(' ', '*')}") == 3.0, unit
 
 
-def test_pint_is_imported_only_for_strings() -> None:
+def test_pint_says_the_same_of_common_units() -> None:
+    assert {name: units._named_by_pint(name) for name in units._COMMON} == units._COMMON
+
+
+def test_pint_is_imported_only_for_uncommon_units() -> None:
     code = (
         "import sys; from engine.scene import Study; "
-        "Study(kind='passage', gravity=9.81); assert 'pint' not in sys.modules; "
+        "Study(kind='passage', gravity='9.81 m/s^2'); assert 'pint' not in sys.modules; "
         "assert not {'scipy', 'xarray', 'dask', 'numba', 'matplotlib'} & set(sys.modules); "
-        "Study(kind='passage', gravity='9.81 m/s^2'); assert 'pint' in sys.modules"
+        "Study(kind='passage', gravity='32.17 ft/s^2'); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,92 @@
+"""What a study's reduction is given of a cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.execution import run
+from engine.histories import counts_reduced
+from engine.plan import make_plan
+from engine.reduction import Compared, Cycle
+from engine.scene import Study
+from engine.timeline import Rider, build_timeline
+from results_schema.status import Fidelity
+from tests.engine.build import beam, cruise, force, study, swing
+
+Array = NDArray[np.float64]
+
+
+class Kept:
+    """A reduction that keeps what it is given."""
+
+    stations = 1000
+    least_fidelity = Fidelity.STATIC
+
+    def __init__(self) -> None:
+        self.cycles: list[Cycle] = []
+
+    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
+        return {}
+
+    def sizes(self, study: Study) -> Mapping[str, int]:
+        return {}
+
+    def differences(self, compared: Compared) -> dict[str, Array]:
+        return {}
+
+    def __call__(self, cycle: Cycle) -> dict[str, Array]:
+        self.cycles.append(cycle)
+        return {}
+
+
+def test_phases_are_those_of_the_motion_where_steps_are_not_equal() -> None:
+    """Another load leaves the beam within the last cycle, where steps are cut: counts of steps tell no phase."""
+    kept, frequency = Kept(), 0.3
+    passing = force(1.0, cruise(0.0, 1.0, frequency / 1.37))
+    given = study(
+        beam(modes=3), {"car": force(1.0, swing(0.5, 0.4, frequency, 2)), "next": passing}, solver={"steps": 97}
+    )
+    run(given, reduction=kept)
+    cycle = kept.cycles[0]
+    assert cycle.phase[0] == 0.0 and cycle.phase[-1] == 1.0
+    assert np.ptp(np.diff(cycle.phase)) > 1e-3 / 97
+    away = 0.4 * np.cos(2.0 * np.pi * cycle.phase)
+    ways = [np.abs(cycle.position - (0.5 + sign * away)).max() for sign in (1.0, -1.0)]
+    assert min(ways) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("steps", "stations", "expected"),
+    [
+        (400, 8192, 400),
+        (6400, 8192, 6400),
+        (12800, 400, 400),
+        (102400, 8192, 12800),
+        (120354, 8192, 9258),
+        (97, 40, 97),
+    ],
+)
+def test_stations_of_a_cycle(steps: int, stations: int, expected: int) -> None:
+    """From the beginning of the last of three cycles to its end, as many as wanted and less than twice as many where
+    the number of steps has such a divisor."""
+    given = study(beam(modes=2), force(1.0, swing(0.5, 0.3, 0.3, 3)), kind="double-peak")
+    motion = make_plan(given, reduction=Kept()).base.riders[0].motion
+    timeline = build_timeline((Rider(motion, 1.0),), steps, "last-cycle")
+    counts = counts_reduced(timeline, stations)
+    assert (counts[0], counts[-1]) == (2 * steps, 3 * steps)
+    assert counts.size == expected + 1 and np.ptp(np.diff(counts)) == 0
+
+
+def test_statics_are_made_when_they_are_asked_for() -> None:
+    """They cost as much as a march where a cycle has many stations."""
+    kept = Kept()
+    run(study(beam(modes=3), force(2.0, swing(0.5, 0.4, 0.3, 1)), solver={"steps": 64}), reduction=kept)
+    cycle = kept.cycles[0]
+    assert not {"static", "static_slope"} & set(vars(cycle))
+    middle = int(np.argmin(np.abs(cycle.position - 0.5)))
+    assert cycle.static[middle, 0, 0] == pytest.approx(2.0 / 48.0, rel=1e-3)
+    assert cycle.static is cycle.static and cycle.static_slope.shape == cycle.history.shape

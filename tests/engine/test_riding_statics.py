@@ -1,0 +1,98 @@
+"""Bodies that ride on contacts, at rest: against a dense twin, levers and slow marches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import engine
+from engine.fidelity import allow_any_steps
+from engine.influence import static_values
+from engine.lanes import LaneValues, padded
+from engine.march import march
+from engine.plan import make_plan
+from engine.ways import frozen
+from results_schema.status import Fidelity
+from tests.engine.build import Table, beam, cruise, fixed, shuttle
+from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding
+from tests.engine.riding import Twin
+
+
+@pytest.mark.parametrize("name", ["flexible", "frame", "own weight"])
+def test_statics_are_what_a_slow_march_tends_to(name: str) -> None:
+    cases: dict[str, Table] = {
+        "flexible": {},
+        "frame": {"contacts": SHOES, "table": FRAME},
+        "own weight": {"bed": beam(own_weight=True, modes=4)},
+    }
+    case = quiet(**cases[name])
+    plan = make_plan(case, check_steps=allow_any_steps)
+    (bucket,) = plan.buckets
+    tables, values = bucket.tables, plan.values(bucket, padded(bucket.variants))
+    counts = np.arange(0, 201, 20)
+    found = march(tables, values, counts, 1).history[:, :, 0]
+    unit, twin = tables.static_at(counts), Twin(case)
+    static = unit.force[:, :, 0] * twin.weight + unit.gravity * case.gravity
+    for j, sensor in enumerate(tables.sensors):
+        if sensor.quantity not in ("velocity", "acceleration"):
+            assert np.abs(static[:, j] - found[:, j]).max() <= 2e-6 * np.abs(found[:, j]).max(), sensor.name
+    places = tables.timeline.positions(0, counts.astype(np.float64))
+    force = np.array([twin.static(float(s))[1] for s in places])
+    names = [sensor.name for sensor in tables.sensors]
+    for r, contact in enumerate(case.carriage["car"].contacts):  # type: ignore[attr-defined]
+        assert np.abs(static[:, names.index(contact)] - force[:, r]).max() <= 1e-8 * np.abs(force).max()
+
+
+def test_the_weight_is_carried_by_levers() -> None:
+    """At rest on two contacts: shares by the lever rule, whatever the springs."""
+    case = riding(shuttle(0.3, 0.7, 1e-2, 0.5, 1), table=UNEVEN, solver={"steps": 8000})
+    found = engine.run(case)
+    weight = 0.5 * 9.81
+    for name, share in (("rear", 0.22 / 0.3), ("front", 0.08 / 0.3), ("total", 1.0)):
+        assert float(found[f"{name}_max"]) == pytest.approx(weight * share, rel=1e-4)
+        assert float(found[f"{name}_min"]) == pytest.approx(weight * share, rel=1e-4)
+    assert int(found.fidelity_used) == Fidelity.TIED and int(found.status) == 0
+
+
+def test_static_correction_is_felt_in_the_contacts() -> None:
+    """Two kept modes with what they miss carry three contacts nearly as twenty do; without it they do not."""
+
+    def middle(modes: int, correction: bool) -> float:
+        bed, solver = beam(modes=modes), {"steps": 400, "static_correction": correction}
+        (bucket,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).buckets
+        names = [sensor.name for sensor in bucket.tables.sensors]
+        return float(bucket.tables.static_at(np.array([0, 77])).force[1, names.index("b"), 0])
+
+    whole = middle(20, True)
+    assert abs(middle(2, True) / whole - 1.0) < 1e-9 < 1e-3 < abs(middle(2, False) / whole - 1.0)
+
+
+@pytest.mark.parametrize("correction", [True, False])
+@pytest.mark.parametrize("heavy", [True, False])
+def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -> None:
+    """A table half on a bed whose end gives way: what is off it stands on level ground."""
+    springs = [{"at": 0.0, "stiffness": 40.0}, {"at": 1.0, "stiffness": 60.0}]
+    solver = {"steps": 200, "static_correction": correction}
+    case = riding(
+        cruise(-0.4, 1.4, 0.8), THREE, FLEXIBLE, beam(modes=3, supports=springs, own_weight=heavy), solver=solver
+    )
+    (bucket,) = make_plan(case).buckets
+    twin, model = Twin(case), bucket.scene
+    places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
+    found = static_values(model, LaneValues(case, {}, 1), frozen(model, places)).contacts[0]
+    right = np.array([twin.static(float(place))[1] for place in places])
+    assert np.abs(found - right).max() <= 1e-9 * np.abs(right).max()
+
+
+def test_static_slopes_move_all_contacts() -> None:
+    """By the reference's place, against static readings a little apart, whatever the fidelity."""
+    way = shuttle(0.3, 0.7, 0.8, 0.1, 1)
+    for fidelity in ("auto", "force"):
+        case = riding(way, table=UNEVEN, sensor={"place": fixed(0.61)}, solver={"steps": 200, "fidelity": fidelity})
+        (bucket,) = make_plan(case).buckets
+        tables, counts = bucket.tables, np.array([40])
+        (place,) = tables.timeline.positions(0, counts)
+        apart = frozen(bucket.scene, place + np.array([-1e-4, 1e-4]))
+        left, right = static_values(bucket.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
+        assert abs(right - left) > 1e-7
+        assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

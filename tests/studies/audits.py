@@ -1,0 +1,44 @@
+"""Studies that are audited, and what their audits found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+import studies
+from engine.scene import Study
+from studies.options import RunOptions
+from studies.runner import Outcome, run_to_archive
+from tests.engine.build import beam, cruise, mass, study
+
+SWEEP = {
+    "speed": {"of": "carriage.car.motion.speed", "values": [0.2, 0.5, 0.9]},
+    "mass": {"of": "carriage.car.mass", "values": [0.1, 0.3]},
+}
+POOR = beam(modes=1, damping_ratio=0.02)
+RICH = beam(modes=12, damping_ratio=0.02)
+FINE = {"audit": 3, "steps": 1600, "tolerance": 2e-3}
+
+
+def crossing(bed: dict[str, Any], solver: dict[str, Any], **changes: Any) -> Study:
+    """A mass over a beam at three speeds."""
+    return study(bed, mass(0.2, cruise(0.0, 1.0, 0.5)), **({"sweep": SWEEP, "solver": solver} | changes))
+
+
+def outcome(given: Study, folder: Path, threads: int = 1) -> Outcome:
+    return run_to_archive(given, folder / "found.nc", RunOptions(threads=threads))
+
+
+def group_of(found: Outcome) -> xr.Dataset:
+    assert found.audit is not None
+    return found.audit
+
+
+def again(given: Study, sample: xr.Dataset, modes: int) -> xr.Dataset:
+    """By hand: one variant with all terms, more modes and the audit's steps."""
+    values = {"carriage.car.motion.speed": float(sample["speed"]), "carriage.car.mass": float(sample["mass"])}
+    values |= {"body.bed.modes": modes, "solver.steps": int(sample["steps_used"]), "solver.audit": 0}
+    values |= {"solver.fidelity": "auto", "solver.static_correction": True}
+    return studies.run(given.without_sweep().with_values(values))

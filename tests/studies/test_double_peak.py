@@ -1,0 +1,129 @@
+"""What a double-peak study samples, and how two of its answers are compared."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.execution import run
+from engine.lanes import LaneValues
+from engine.plan import MOST_HISTORY_BYTES, make_plan
+from engine.reduction import Compared
+from studies.kinds.double_peak import KIND, SAME_PEAK, DoublePeakReduction
+from studies.peaks import PEAKS, peaks
+from tests.engine.build import beam, mass, study, swing
+
+Array = NDArray[np.float64]
+
+PHASE = np.linspace(0.0, 1.0, 801)
+
+
+def answers(*cycles: Array) -> dict[str, Array]:
+    """What the study reports of cycles (801,), each a variant with one sensor."""
+    found = peaks(PHASE, np.stack(cycles, axis=1)[:, None])
+    return {"peaks_per_cycle": found.number.T, "peak_value": found.value.T, "peak_phase": found.phase.T}
+
+
+def gaps(one: Array, other: Array) -> tuple[float, tuple[float, float]]:
+    """How far the peaks of two cycles are apart by what the study reports, and how many both have."""
+    here, there = (answers(cycle) | {"harmonic": np.zeros((1, 1, 1))} for cycle in (one, other))
+    values = LaneValues(study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak"), {}, 1)
+    compared = Compared(here, there, np.ones((1, 1)), values)
+    numbers = float(here["peaks_per_cycle"][0, 0]), float(there["peaks_per_cycle"][0, 0])
+    return float(DoublePeakReduction().differences(compared)["peak_value"][0, 0]), numbers
+
+
+def bump(at: float, height: float, width: float = 0.02) -> Array:
+    """A bell round the cycle."""
+    away = np.mod(PHASE - at + 0.5, 1.0) - 0.5
+    return height * np.exp(-((away / width) ** 2))
+
+
+TWO = bump(0.2, 1.0, 0.1) + bump(0.7, 0.8, 0.1)
+
+
+def test_a_peak_that_is_off_is_told() -> None:
+    off, numbers = gaps(TWO, TWO + bump(0.7, 0.008, 0.1))
+    assert numbers == (2.0, 2.0) and off == pytest.approx(0.008, rel=1e-3)
+
+
+def test_it_is_told_beside_a_bump_that_only_one_has() -> None:
+    off, numbers = gaps(TWO, TWO + bump(0.2, 0.01, 0.1) + bump(0.45, 0.1))
+    assert numbers == (2.0, 3.0) and off == pytest.approx(0.01, rel=1e-3)
+
+
+def test_bumps_that_are_not_the_same_are_no_error() -> None:
+    """As many peaks in both, but another small one: compared in their order, they would be off by a third."""
+    off, numbers = gaps(TWO + bump(0.45, 0.1), TWO + bump(0.95, 0.1))
+    assert numbers == (3.0, 3.0) and off < 1e-3
+
+
+def test_neighbours_on_a_slope_are_not_taken_for_each_other() -> None:
+    """Crests of ringing 0.04 of a cycle apart, each missing in the other: a value between them would be off by 0.1."""
+    slope = bump(0.5, 1.0, 0.2)
+    crests = [bump(0.22 + 0.04 * n, 0.2, 0.008) for n in range(4)]
+    off, numbers = gaps(slope + crests[0] + crests[1] + crests[3], slope + crests[0] + crests[2] + crests[3])
+    assert numbers[0] == numbers[1] and off < 2e-3
+
+
+def test_a_peak_that_begins_the_cycle_may_end_the_other() -> None:
+    off, numbers = gaps(bump(0.001, 1.0, 0.1), bump(0.999, 1.01, 0.1))
+    assert numbers == (1.0, 1.0) and off == pytest.approx(0.01, rel=1e-3)
+
+
+def test_a_flat_top_whose_maximum_wanders_is_no_error() -> None:
+    flat = np.tanh(20.0 * (PHASE - 0.2)) * np.tanh(20.0 * (0.8 - PHASE))
+    off, numbers = gaps(flat + 1e-5 * PHASE, flat - 1e-5 * PHASE)
+    assert numbers == (1.0, 1.0) and off < 2e-5
+
+
+def test_what_is_further_apart_than_a_peak_moves_is_another_one() -> None:
+    one = bump(0.5, 1.0, 0.05)
+    assert gaps(one, bump(0.5 + 0.9 * SAME_PEAK, 1.2, 0.05))[0] == pytest.approx(0.2, rel=1e-3)
+    assert gaps(one, bump(0.5 + 1.1 * SAME_PEAK, 1.2, 0.05))[0] == 0.0
+
+
+def test_a_peak_that_is_missing_is_told_by_harmonics() -> None:
+    """A bump of a tenth of the range, 0.05 of a cycle wide, is worth 0.1 x 0.05 x sqrt(pi) of twice the mean."""
+    scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
+    from studies.indices import harmonics
+
+    cycles = [TWO, TWO + bump(0.45, 0.1, 0.05)]
+    one, other = (answers(cycle) | {"harmonic": harmonics(cycle[:, None, None]).T} for cycle in cycles)
+    found = DoublePeakReduction().differences(Compared(one, other, np.ones((1, 1)), LaneValues(scene, {}, 1)))
+    assert found["harmonic"][0, 0] == pytest.approx(2.0 * 0.1 * 0.05 * np.sqrt(np.pi), rel=0.05)
+
+
+def test_more_peaks_than_are_kept_are_compared_too() -> None:
+    ringing = np.cos(2.0 * np.pi * 20.0 * PHASE) * (1.0 + 0.3 * np.cos(2.0 * np.pi * PHASE))
+    off, numbers = gaps(ringing, 1.01 * ringing)
+    assert min(numbers) > PEAKS and off == pytest.approx(0.013, rel=0.02)
+
+
+def test_every_step_of_a_cycle_that_rings_is_seen() -> None:
+    """A slow light mass on a beam that rings without damping: 200 periods in the cycle, of which 400 stations would
+    tell nothing. The highest peak is the largest value of all steps, the march's own."""
+    pace = mass(0.01, swing(0.5, 0.4, np.pi / 400.0, 1))
+    given = study(beam(modes=1, damping_ratio=0.0), pace, kind="double-peak", initial="rest", solver={"steps": 6400})
+    found = run(given, reduction=KIND.reduction(given))
+    static, highest = float(found.midspan_static), float(np.nanmax(found.peak_value.values))
+    assert highest >= float(found.midspan_max) - 1e-12 * static
+    assert highest == pytest.approx(
+        float(found.midspan_max), abs=6e-3 * static
+    )  # 32 stations per period: 1 - cos(pi/32)
+
+
+def test_histories_of_a_chunk_fit_their_memory_whatever_the_steps() -> None:
+    for steps in (400, 6400, 102400, 120354):
+        sweep = {"m": {"of": "carriage.car.mass", "from": 0.01, "to": 0.2, "count": 4096}}
+        given = study(
+            beam(modes=1), mass(0.1, swing(0.5, 0.4, 0.2, 1)), kind="double-peak", sweep=sweep, solver={"steps": steps}
+        )
+        plan = make_plan(given, reduction=KIND.reduction(given))
+        bucket = plan.buckets[0]
+        from engine.cycles import counts_sampled
+
+        stations = counts_sampled(plan, bucket.tables).size
+        assert stations == steps + 1 if steps <= 8192 else 8192 < stations <= 16384
+        assert 8 * stations * plan.lanes_per_chunk(bucket) <= 1.01 * MOST_HISTORY_BYTES
