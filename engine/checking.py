@@ -58,8 +58,15 @@ def checks_of(tables: SceneTables, compared: Literal["half", "twice"]) -> Checks
     grown = 2.0 ** min(tables.model.scheme.order, SURE_ORDER)
     doubt = ALPHA_DOUBT if isinstance(tables.scheme, Alpha) else 1.0
     ratio, part = (-2, doubt / (grown - 1.0)) if compared == "half" else (2, doubt * grown / (grown - 1.0))
-    modes = None if model is None else tables.with_steps(model, min(ratio, 1))
+    modes = None if model is None else tables.with_steps(model, _within_limit(tables.model, model) or min(ratio, 1))
     return Checks(tables.with_steps(tables.model, ratio), part, modes, missed)
+
+
+def _within_limit(own: SceneModel, other: SceneModel) -> int:
+    """Times the steps, a power of two, that keep higher modes as far inside the scheme's limit; 0 where there is no
+    limit or no higher mode."""
+    higher = float(other.omega.max() / own.omega.max())
+    return 2 ** int(np.ceil(np.log2(higher))) if higher > 1.0 and np.isfinite(own.scheme.stability_limit) else 0
 
 
 def can_be_halved(model: SceneModel, values: LaneValues, steps: Counts) -> NDArray[np.bool_]:

@@ -117,7 +117,7 @@ class Estimator:
             finer = max(checks.steps, own.tables, key=lambda tables: tables.steps)
             resolved = phase_errors(finer, self._values, told.felt) <= RESOLVED
             steps = self._apart(own, other) * np.where(resolved, checks.missed, max(1.0, checks.missed))
-            partner = other if other.tables.steps < own.tables.steps else own
+            partner = other if checks.modes is not None and checks.modes.steps == other.tables.steps else own
         assert steps is not None
         modes = np.full(self.variants.size, np.nan)
         if checks.modes is not None:

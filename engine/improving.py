@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,14 +44,16 @@ def improvements(
     steps = np.ones(wanting.size, dtype=np.int64)
     if not fixed_steps(plan.study, values):
         steps = _times(np.sqrt(flat["error_steps"][wanting] / allowed))
-    for more in (*np.unique(modes[modes > 0])[::-1], 0):
+    for more, fewer in pairwise([*(more for more in NEXT[::-1] if more > _now(bucket)), 0, 0]):
         lanes = np.flatnonzero(modes == more)
-        own, most = variants[wanting[lanes]], _most_times(bucket, int(more), plan, variants[wanting[lanes]])
-        by = np.maximum(np.minimum(steps[lanes], most), _safe(plan, bucket, int(more), own))
-        modes[lanes[by > most]] = 0  # what is not worth its cost may still take more steps
+        if not lanes.size:
+            continue
+        own, most = variants[wanting[lanes]], _most_times(bucket, more, plan, variants[wanting[lanes]])
+        by = np.maximum(np.minimum(steps[lanes], most), _safe(plan, bucket, more, own))
+        modes[lanes[by > most]] = fewer  # what is not worth its cost may still take some modes more, or steps alone
         for times in np.unique(by[by <= most]):
             if more or times > 1:
-                yield bucket.finer(int(more), int(times)), wanting[lanes[by == times]]
+                yield bucket.finer(more, int(times)), wanting[lanes[by == times]]
 
 
 def _most_times(bucket: Bucket, modes: int, plan: Plan, variants: Counts) -> Counts:
@@ -73,11 +76,17 @@ def _modes(bucket: Bucket, ratio: Array) -> Counts:
     """(V,) the next number of modes that such a ratio of error to what is allowed asks for; 0: as many as now."""
     if not bucket.chosen:
         return np.zeros(ratio.size, dtype=np.int64)
-    now = max(part.modal.omega.size for part in bucket.scene.bodies if part.name in bucket.chosen)
+    now = _now(bucket)
     wanted = now * np.clip(np.sqrt(np.where(np.isnan(ratio), 1.0, ratio)), 1.0, 4.0)
     place = np.minimum(np.searchsorted(NEXT, np.where(ratio > 1.0, np.maximum(wanted, now + 1), now)), len(NEXT) - 1)
     found = np.asarray(NEXT)[place]
     return np.asarray(np.where((ratio > 1.0) & (found > now), found, 0), dtype=np.int64)
+
+
+def _now(bucket: Bucket) -> int:
+    """Modes of the bodies whose modes are chosen; more than any where there are none."""
+    sizes = [part.modal.omega.size for part in bucket.scene.bodies if part.name in bucket.chosen]
+    return max(sizes, default=MAX_MODES)
 
 
 def _safe(plan: Plan, bucket: Bucket, modes: int, variants: Counts) -> Counts:

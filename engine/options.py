@@ -6,6 +6,7 @@ the fewest modes x steps is taken, so that a tighter tolerance never gets a chea
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -17,7 +18,6 @@ from engine.choice import (
     FEW,
     FINER,
     LEVELS,
-    MORE,
     MOST_CHOSEN,
     Asked,
     Choice,
@@ -116,6 +116,10 @@ class Options:
             return (scheme_used(self.scene.study),)
         return SCHEMES
 
+    def _has_many(self, level: int) -> bool:
+        """Whether so many modes are compared with half of them: with more of them, a limit asks for many more steps."""
+        return (level or max(part.modal.omega.size for part in self.scene.bodies)) >= FEW
+
     @cached_property
     def along(self) -> tuple[Route, ...] | None:
         """The routes of all loads over the whole bodies."""
@@ -126,17 +130,24 @@ class Options:
         if self.along is None:
             return self._unknown(values)
         errors, told = errors_along(self.whole, self.along, values), Told.of(self.along, values)
-        schemes = self.schemes(values)
         options = [
-            self._option(_Kind(model, level, scheme), errors.get(model, np.zeros(values.size)), told, values)
-            for model in self.models
-            for level in (self.levels if model is not Fidelity.STATIC else self.levels[:1])
-            for scheme in (schemes if model is not Fidelity.STATIC else schemes[:1])
+            self._option(kind, errors.get(kind.model, np.zeros(values.size)), told, values)
+            for kind in self._kinds(values)
         ]
         price = np.stack([option.price for option in options])
         cheapest = np.argmin(price, axis=0)
         columns = (np.stack(column) for column in zip(*(option.choice for option in options), strict=True))
         return Choice(*(np.take_along_axis(column, cheapest[None], axis=0)[0] for column in columns))
+
+    def _kinds(self, values: LaneValues) -> Iterator[_Kind]:
+        """All combinations but for the steps."""
+        schemes = self.schemes(values)
+        for model in self.models:
+            for level in self.levels if model is not Fidelity.STATIC else ():
+                for scheme in schemes if self._has_many(level) else schemes[:1]:
+                    yield _Kind(model, level, scheme)
+            if model is Fidelity.STATIC:
+                yield _Kind(model, 0, schemes[0])
 
     def _option(self, kind: _Kind, error: Array, told: Told, values: LaneValues) -> _Option:
         """One combination for some variants."""
@@ -190,20 +201,16 @@ class Options:
         if model > Fidelity.FORCE:
             found = np.maximum(found, FINER * LEAST_MARGIN * alias_steps(scene, time, level or None))
         if model is Fidelity.TIED:
-            limited = np.isfinite(scene.scheme.stability_limit)  # with all modes that it is compared with
-            sprung = self._with(_compared(level) if limited else level, scheme)
+            sprung = self._with(level, scheme)
             found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
         return np.asarray(
             np.maximum((1.0 + CELL) * found, LEAST_STEPS if self.asked.window == "whole" else LEAST_OF_CYCLE)
         )
 
     def _highest(self, level: int) -> float:
-        """rad/s: of so many modes, and of those that few of them are compared with."""
-        ours = automatic_bodies(self.scene)
-        kept = (
-            part.modal.omega[: (_compared(level) or None) if part.name in ours else None] for part in self.whole.bodies
-        )
-        return max(float(omega[-1]) for omega in kept)
+        """rad/s: of the scene with so many modes."""
+        chosen, kept = automatic_bodies(self.scene), level or None
+        return max(float(part.modal.omega[: kept if part.name in chosen else None][-1]) for part in self.whole.bodies)
 
     def _by(self, scheme: SchemeUsed) -> SceneModel:
         """The scene with as many modes as are looked at, marched by a scheme."""
@@ -268,11 +275,6 @@ class Told:
         """What the step of a scheme may spoil, with so many modes of every body."""
         parts = [load.stepped(level, scheme) for load in self.loads]
         return Spoiled(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-
-def _compared(level: int) -> int:
-    """The most modes that so many are marched with, in comparisons too."""
-    return level + MORE if 0 < level < FEW else level
 
 
 def _fewest(spoiled: Spoiled, allowed: Array, unit: Array) -> Array:

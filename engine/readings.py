@@ -111,7 +111,7 @@ class Sensor:
         return _spread(model, model.bodies[self.body], self._rows(model, along))
 
     def shown(self, model: SceneModel, places: Array) -> Array:
-        """(P,) the most that one of its body's modes would show, to some scale, if it read at other fixed places (m)."""
+        """(P,) the most that one of its body's modes would show, to some scale, if it read at other places (m)."""
         sections = self._sections(model)
         if sections is not None:
             rows = sections.rows(self.quantity, places)

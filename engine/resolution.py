@@ -59,8 +59,8 @@ def _worst(
     for part in model.bodies:
         rates = values.damping_rates(part.name, part.modal.omega)
         memory = np.divide(2.0, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
-        omega, remembered = part.modal.omega[:, None], [memory * step**2, memory * step**4]
-        behind = np.minimum(_behind(model, omega, gathered), _behind(model, omega, remembered))
+        lasting = [np.minimum(run, memory * step**power) for run, power in zip(gathered, (2, 4), strict=True)]
+        behind = _behind(model, part.modal.omega[:, None], lasting)
         if felt is not None:
             behind = np.where(np.arange(part.modal.omega.size)[:, None] < felt, behind, 0.0)
         worst = np.maximum(worst, behind.max(axis=0))
@@ -68,10 +68,9 @@ def _worst(
 
 
 def _behind(model: SceneModel, omega: Array, gathered: Sequence[Array]) -> Array:
-    """Phase error of frequencies, rad/s, from squares and fourth powers of steps times how long they are taken, which
-    may be for ever."""
-    parts = zip(model.scheme.period_error, (3, 5), gathered, strict=True)
-    return np.asarray(sum(part * omega**power * time for part, power, time in parts if part > 0.0))
+    """Phase error of frequencies, rad/s, from squares and fourth powers of steps times how long they are taken."""
+    square, fourth = model.scheme.period_error
+    return np.asarray(omega**3 * square * gathered[0] + omega**5 * fourth * gathered[1])
 
 
 def _free_seconds(model: SceneModel) -> float:

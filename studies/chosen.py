@@ -1,4 +1,5 @@
-"""What a plan chose for its variants, as rows for people: model, modes and steps, why, what they leave out and cost."""
+"""What a plan chose for its variants, as rows for people: model, modes, scheme and steps, why, what they leave out and
+cost."""
 
 from __future__ import annotations
 
@@ -9,23 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bucket import Bucket
+from engine.choice import scheme_used
 from engine.plan import Plan
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, SchemeUsed, label
 from studies.choices import NAMES
 from studies.words import percent, scientific
 
 Array = NDArray[np.float64]
 
-HEADINGS = ("variants", "share", "model", "modes", "steps", "expected error", "steps decided by", "cost")
+HEADINGS = ("variants", "share", "model", "modes", "scheme", "steps", "expected error", "steps decided by", "cost")
 
 
 def choices(plan: Plan) -> list[tuple[str, ...]]:
-    """One row per model and number of modes, cheapest first: variants and their share, steps over one passage or
+    """One row per model, number of modes and scheme, cheapest first: variants and their share, steps over one passage or
     cycle, the largest error that is expected, the rule that decides the steps of most of them, and modes x steps, with
     the marches they are compared with, over those of the full model."""
-    groups: dict[tuple[Fidelity, int], list[Bucket]] = {}
+    groups: dict[tuple[Fidelity, int, SchemeUsed], list[Bucket]] = {}
     for bucket in plan.buckets:
-        groups.setdefault((bucket.scene.fidelity, _modes(bucket)), []).append(bucket)
+        kind = bucket.scene.fidelity, _modes(bucket), scheme_used(bucket.scene.study)
+        groups.setdefault(kind, []).append(bucket)
     return [_row(plan, *group, groups[group]) for group in sorted(groups)]
 
 
@@ -34,7 +37,7 @@ def _modes(bucket: Bucket) -> int:
     return 0 if bucket.scene.fidelity is Fidelity.STATIC else bucket.scene.body_modes
 
 
-def _row(plan: Plan, model: Fidelity, modes: int, buckets: Sequence[Bucket]) -> tuple[str, ...]:
+def _row(plan: Plan, model: Fidelity, modes: int, scheme: SchemeUsed, buckets: Sequence[Bucket]) -> tuple[str, ...]:
     sizes = [bucket.variants.size for bucket in buckets]
     cost = sum(bucket.cost * size for bucket, size in zip(buckets, sizes, strict=True))
     full = sum(float(bucket.full_cost.sum()) for bucket in buckets)
@@ -44,6 +47,7 @@ def _row(plan: Plan, model: Fidelity, modes: int, buckets: Sequence[Bucket]) -> 
         percent(sum(sizes) / plan.size),
         NAMES[model],
         str(modes) if marched else "none",
+        label(scheme) if marched else "",
         _span([bucket.steps for bucket in buckets]) if marched else "none",
         _error(np.concatenate([_expected(bucket) for bucket in buckets])),
         _reason(buckets) if marched else "",

@@ -56,8 +56,8 @@ def _prominent(lanes: Array) -> tuple[Counts, Counts]:
     the threshold, after a rise of more than the threshold: these are exactly the peaks of that prominence. The walk
     goes from one turning point to the next, for what lies between decides nothing.
     """
-    first = np.argmin(lanes, axis=0)
-    lowest, highest = lanes[first, np.arange(first.size)], lanes.max(axis=0)
+    lowest, highest = lanes.min(axis=0), lanes.max(axis=0)
+    first = np.argmax(lanes == lowest, axis=0)  # quicker than argmin
     span = highest - lowest
     varies = np.isfinite(span) & (span > FLAT * np.maximum(np.abs(highest), np.abs(lowest)))  # rounding has no peaks
     turns = _turns(lanes, varies, first)
@@ -104,7 +104,7 @@ def _turns(lanes: Array, varies: Mask, first: Counts) -> _Turns:
         compare(lanes[0], lanes[-1], out=way[0])
         goes_on[:-1] |= way[:-1] & way[1:]
         goes_on[-1] |= way[-1] & way[0]
-    lane, station = np.nonzero(np.ascontiguousarray((~goes_on & varies).T))
+    lane, station = np.divmod(np.flatnonzero(np.ascontiguousarray((~goes_on & varies).T)), len(lanes))
     count = np.bincount(lane, minlength=varies.size)
     begin = np.cumsum(count) - count
     lowest = begin.copy()

@@ -50,8 +50,8 @@ RESULTS = (
         ("sensor", "peak"),
         units="{sensor}",
         long_name="value of the peak",
-        meaning="refined by a parabola, at a kink by lines; the 8 highest peaks in the order of their phase, NaN beyond their number; "
-        "in the unit of the sensor",
+        meaning="refined by a parabola, at a kink by lines; the 8 highest peaks in the order of their phase, NaN "
+        "beyond their number; in the unit of the sensor",
         nan_allowed=True,
     ),
     Variable(

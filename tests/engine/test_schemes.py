@@ -194,3 +194,14 @@ def test_a_scheme_says_which_parameter_it_needs(scheme: str, wanted: str) -> Non
     other = {"hht-alpha": {"rho_inf": 0.5}, "generalized-alpha": {"alpha": -0.1}}[scheme]
     with pytest.raises(BadInput, match="not for this scheme"):
         passing(400, scheme, **other)
+
+
+@pytest.mark.parametrize("name", ["average-acceleration", "linear-acceleration", "fox-goodwin", "central-difference"])
+def test_period_errors_are_those_of_the_phase(name: str) -> None:
+    """The angle of one step, from its amplification matrix, against omega h, over many small steps."""
+    scheme = SCHEMES[name]({})
+    square, fourth = scheme.period_error
+    for x in (0.05, 0.1, 0.2):
+        turned = np.abs(np.angle(np.linalg.eigvals(scheme.amplification(x)))).max()
+        expected = square * x**2 + fourth * x**4
+        assert abs(abs(turned / x - 1.0) - expected) < 0.1 * expected

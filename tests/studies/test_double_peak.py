@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from engine.cycles import counts_sampled
 from engine.execution import run
 from engine.lanes import LaneValues
 from engine.plan import MOST_HISTORY_BYTES, make_plan
 from engine.reduction import Compared
+from studies.indices import harmonics
 from studies.kinds.double_peak import KIND, SAME_PEAK, DoublePeakReduction
 from studies.peaks import PEAKS, peaks
 from tests.engine.build import beam, mass, study, swing
@@ -87,8 +89,6 @@ def test_what_is_further_apart_than_a_peak_moves_is_another_one() -> None:
 def test_a_peak_that_is_missing_is_told_by_harmonics() -> None:
     """A bump of a tenth of the range, 0.05 of a cycle wide, is worth 0.1 x 0.05 x sqrt(pi) of twice the mean."""
     scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
-    from studies.indices import harmonics
-
     cycles = [TWO, TWO + bump(0.45, 0.1, 0.05)]
     one, other = (answers(cycle) | {"harmonic": harmonics(cycle[:, None, None]).T} for cycle in cycles)
     found = DoublePeakReduction().differences(Compared(one, other, np.ones((1, 1)), LaneValues(scene, {}, 1)))
@@ -122,8 +122,6 @@ def test_histories_of_a_chunk_fit_their_memory_whatever_the_steps() -> None:
         )
         plan = make_plan(given, reduction=KIND.reduction(given))
         bucket = plan.buckets[0]
-        from engine.cycles import counts_sampled
-
         stations = counts_sampled(plan, bucket.tables).size
         assert stations == steps + 1 if steps <= 8192 else 8192 < stations <= 16384
         assert 8 * stations * plan.lanes_per_chunk(bucket) <= 1.01 * MOST_HISTORY_BYTES
