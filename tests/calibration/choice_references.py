@@ -35,7 +35,7 @@ Counts = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 SCHEME = "fox-goodwin"
-MODES, MOMENT_MODES = 40, 48
+MODES, MOMENT_MODES = 40, 64
 SLOW = 0.05  # alpha below which high modes hardly move, so that fewer tell as much; their steps would be many
 SLOW_MODES, SLOW_SPAN = (
     (12, 20),
