@@ -25,10 +25,11 @@ from engine.fidelity import MOST_STEPS, STEPS_PER_PERIOD, check_most_steps, safe
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.model import SceneModel, build_model
-from engine.plan import Plan, scenes
+from engine.plan import Plan
 from engine.resolution import steps_to_resolve
 from engine.resonance import spring_steps
 from engine.scene import Study
+from engine.scenes import scenes
 from engine.sweep import Cases
 from engine.tables import KEPT_BYTES, SceneTables
 from results_schema.status import Fidelity, SchemeUsed

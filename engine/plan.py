@@ -5,48 +5,37 @@ Scene, step count and bucket of a variant are functions of that variant alone, s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 from math import prod
-from typing import Any, Literal
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
-from engine.checking import can_be_halved
-from engine.choice import Asked, Choice, automatic_bodies, fixed_steps, with_choice
-from engine.choosing import choose
+from engine.bucketing import CheckSteps, buckets_of
+from engine.choice import Asked
 from engine.envelopes import check_places, places_read
-from engine.fidelity import (
-    Needs,
-    allow_any_steps,
-    check_even_steps,
-    check_most_steps,
-    needed_steps,
-    round_up,
-)
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES, MARKS
-from engine.lanes import LANE_KEYS, LaneValues
-from engine.model import SceneModel, build_model, check_moves, simplified
+from engine.lanes import LaneValues
+from engine.model import SceneModel, check_moves
 from engine.reduction import Reduction
-from engine.resolution import steps_to_resolve
-from engine.resonance import check_steps, spring_steps
+from engine.resonance import check_steps
 from engine.scene import Study
+from engine.scenes import base_scene, scenes
 from engine.sweep import Cases, expand
-from engine.tables import KEPT_BYTES, SceneTables
+from engine.tables import KEPT_BYTES
 from engine.timeline import Window, coarsened
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity, SchemeUsed
+from results_schema.status import Fidelity
 from results_schema.variables import declarations
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
-Reasons = Callable[[Counts], str]
 
 START_SECONDS, BUCKET_SECONDS = 2.5, 0.02  # besides marching, for expected times only
 STATION_SECONDS, STATION_MODE_SECONDS = 3e-6, 2e-7  # of a station's tables, and of each mode in them; likewise
@@ -60,8 +49,6 @@ READING_SECONDS = 6e-7  # of an envelope's place at a station, in tables
 MOST_MARK_BYTES = 32 * 2**20  # of one chunk's extremes along bodies
 MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
-STATIC_STEPS = 800  # stations of statics over one passage or cycle
-FULL_MODES = 20  # of the full model that costs are compared with
 REPORTED = 0.5  # of what histories are off by that extremes and the like are expected to be
 STATIONS = 256  # of a whole run, about, at which histories are compared
 SHOWN = 64  # variants whose histories are kept by default
@@ -90,11 +77,12 @@ class Plan:
 
     @cached_property
     def key(self) -> str:
-        """What finished parts belong to: the study's text, the files of its bodies, and the kernels."""
+        """What finished parts belong to: the study's text, the files of its bodies, the kernels, and all that chooses
+        what they are given."""
         from engine.kernels.jit import kernel_hash
 
         files = [body.content for body in self.study.body.values() if body.content]
-        return "-".join([self.study.source.sha256, *files, kernel_hash()])
+        return "-".join([self.study.source.sha256, *files, kernel_hash(), _sources_hash()])
 
     @cached_property
     def seconds(self) -> float:
@@ -177,6 +165,14 @@ class Plan:
         return LaneValues(bucket.scene.study, self.cases.columns_of(variants), variants.size)
 
 
+def _sources_hash() -> str:
+    """SHA-256 over the engine's own sources."""
+    digest = sha256()
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
 def _even(size: int, most: int) -> int:
     """The size of equal chunks of at most ``most``, in whole blocks."""
     parts = max(1, -(-size // most))
@@ -196,7 +192,7 @@ def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: 
     buckets = tuple(
         bucket
         for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64))
-        for bucket in _buckets(scene, cases, variants, asked, check_steps)
+        for bucket in buckets_of(scene, cases, variants, asked, check_steps)
     )
     check_places(study, (bucket.scene for bucket in buckets))
     plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
@@ -241,158 +237,6 @@ def check_memory(study: Study, size: int, result_bytes: int) -> None:
             received=f"{needed / 2**30:.1f} GiB for {size} variants",
             remedy="fewer variants or sensors, or fewer histories",
         )
-
-
-def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
-    """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
-    for variants in _split(chosen, structure(cases, chosen)):
-        own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
-        values = LaneValues(own, cases.columns_of(variants), variants.size)
-        timing = values.timing()
-        columns = np.stack([column for pair in timing.values() for column in pair])
-        codes = np.zeros(variants.size, dtype=np.int64)
-        if np.any(columns != columns[:, :1]):
-            codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
-        for part in _split(np.arange(variants.size), codes):
-            yield build_model(own, *_timing_of(values, int(part[0])), cases.paths), variants[part]
-
-
-def base_scene(study: Study) -> SceneModel:
-    """The scene of a study without its sweep."""
-    return build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
-
-
-def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Paces and delays of one lane, by carriage."""
-    timing = values.timing()
-    return (
-        {name: float(pace[lane]) for name, (pace, _) in timing.items()},
-        {name: float(delay[lane]) for name, (_, delay) in timing.items()},
-    )
-
-
-def _structural(cases: Cases) -> list[str]:
-    """Swept keys that change the scene itself."""
-    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
-
-
-def structure(cases: Cases, variants: Counts) -> Counts:
-    """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
-    positions = cases.positions(variants)
-    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(_structural(cases))}
-    code = np.zeros(variants.size, dtype=np.int64)
-    for dim, size in zip(cases.dims, cases.shape, strict=True):
-        if dim in dims:
-            code = code * size + positions[dim]
-    return code
-
-
-def _split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
-    """Items by equal codes, both in ascending order."""
-    if items.size and np.all(codes == codes[0]):
-        yield items
-        return
-    order = np.argsort(codes, kind="stable")
-    yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)
-
-
-def _buckets(
-    scene: SceneModel, cases: Cases, variants: Counts, asked: Asked, check_steps: CheckSteps
-) -> Iterator[Bucket]:
-    """Variants of one scene by their model, modes and step counts."""
-    columns = cases.columns_of(variants)
-    told = choose(scene, LaneValues(scene.study, columns, variants.size), asked)
-    full_cost = _full_cost(scene, LaneValues(scene.study, columns, variants.size))
-    chosen = automatic_bodies(scene)
-    kinds = (told.fidelity * (MAX_MODES + 1) + told.modes) * len(SchemeUsed) + told.scheme
-    for own in _split(np.arange(variants.size), kinds.astype(np.int64)):
-        fidelity, modes, scheme = (int(column[own[0]]) for column in (told.fidelity, told.modes, told.scheme))
-        model = with_choice(scene, Fidelity(fidelity), modes, SchemeUsed(scheme))
-        values = LaneValues(model.study, cases.columns_of(variants[own]), own.size)
-        steps, reasons = _chosen_steps(model, values, told.of(own), check_steps)
-        pace = values.time_scale(scene.carriages[0].name)  # of like pace they rise and fall together: fewer extremes
-        fixed = fixed_steps(model.study, values)
-        alone = fixed and model.scheme.stride == 1  # a Richardson pair tells its steps itself
-        halved = can_be_halved(model, values, steps) if alone else np.ones(own.size, dtype=np.bool_)
-        for part in _split(np.arange(own.size), 2 * steps + halved):
-            lanes = own[part[np.argsort(pace[part], kind="stable")]]
-            stride = model.scheme.stride if fixed else max(2, model.scheme.stride)  # all segments can be halved
-            stops: Literal["events", "kinks"] = "events" if fixed or model.scheme.stride > 1 else "kinks"
-            tables = SceneTables(model, int(steps[part[0]]), asked.window, refinement=stride, stops=stops)
-            _check_readings(model, tables)
-            even = all(segment.steps % 2 == 0 for segment in tables.timeline.segments)
-            compared: Literal["half", "twice"] = "half" if halved[part[0]] and even else "twice"
-            yield Bucket(tables, variants[lanes], reasons(part), told.of(lanes), full_cost[lanes], chosen, compared)
-
-
-def steps_of(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> tuple[Counts, Reasons]:
-    """Steps of every variant over a passage or cycle where the tolerance does not choose them, and what says why some
-    of them need so many: the study, or rules of thumb. Raises BadInput."""
-    if scene.fidelity is Fidelity.STATIC:
-        return np.full(values.size, STATIC_STEPS, dtype=np.int64), lambda part: "statics: nothing is marched"
-    if fixed_steps(scene.study, values):
-        steps = values.of("solver.steps").astype(np.int64)
-        check_even_steps(scene, steps)
-        check_most_steps(scene, steps)
-        check_steps(scene, values, steps)
-        return steps, lambda part: "as the study says"
-    distinct, inverse = np.unique(values.time_scale(scene.carriages[0].name), return_inverse=True)
-    needs, own = needed_steps(scene, distinct).per_rule, spring_steps(scene, values)
-    if scene.scheme.stride > 1:
-        own |= {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)}
-    found = Needs({name: needed[inverse] for name, needed in needs.items()} | own)
-    check_most_steps(scene, found.total)
-    return round_up(found.total), lambda part: _reason(found, part)
-
-
-def _chosen_steps(
-    scene: SceneModel, values: LaneValues, told: Choice, check_steps: CheckSteps
-) -> tuple[Counts, Reasons]:
-    """Steps of every variant, chosen by its tolerance where the study leaves them open."""
-    if scene.fidelity is Fidelity.STATIC or scene.scheme.stride > 1 or fixed_steps(scene.study, values):
-        return steps_of(scene, values, check_steps)
-    check_most_steps(scene, told.steps)
-    return told.steps.astype(np.int64), lambda part: "rules for any march" if told.ruled[part].any() else "tolerance"
-
-
-def _full_cost(scene: SceneModel, values: LaneValues) -> Array:
-    """(V,) modes x steps of the carriages' own model with many modes and the steps that all its rules ask for."""
-    changes: dict[str, Any] = {f"body.{name}.modes": FULL_MODES for name in automatic_bodies(scene)}
-    full = simplified(scene, changes | {"solver.fidelity": "full", "solver.steps": "auto"})
-    columns = {path: column for path, column in values.columns.items() if path != "solver.steps"}
-    steps, _ = steps_of(full, LaneValues(full.study, columns, values.size), allow_any_steps)
-    return np.asarray(full.body_modes * steps, dtype=np.float64)
-
-
-def _check_static(scene: SceneModel, tables: SceneTables) -> None:
-    for sensor in tables.sensors:
-        if sensor.offset_order:
-            raise BadInput(
-                f'fidelity = "static" has no {sensor.quantity}',
-                where=scene.study.source.where(f"sensor.{sensor.name}.quantity"),
-                expected="a quantity that statics tell, such as displacement",
-            )
-
-
-def _check_readings(scene: SceneModel, tables: SceneTables) -> None:
-    """Refuse a sensor under a carriage that is never on its body while anything is recorded, and rates of what is at
-    rest. Raises BadInput."""
-    if scene.fidelity is Fidelity.STATIC:
-        _check_static(scene, tables)
-    for sensor in tables.sensors:
-        seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
-        if not seen:
-            raise BadInput(
-                "the carriage is off its body for all of the recorded part, so the sensor reads nothing",
-                where=scene.study.source.where(f"sensor.{sensor.name}.under"),
-                expected="a carriage on its body",
-            )
-
-
-def _reason(needs: Needs, lanes: Counts) -> str:
-    """The rule that decides for the most demanding of some variants."""
-    worst = lanes[np.argmax(needs.total[lanes])]
-    return list(needs.per_rule)[int(needs.deciding[worst])]
 
 
 def _shown(study: Study, size: int) -> Counts:

@@ -61,7 +61,8 @@ class AtRest(Protocol):
 
 def pieces_of(kind: AtRest, study: Study, asked: Asked) -> list[Piece]:
     """The work of a study at rest: shapes of its base scene, all variants, and what is compared."""
-    from engine.plan import base_scene, check_memory
+    from engine.plan import check_memory
+    from engine.scenes import base_scene
     from engine.sweep import expand
     from engine.unreduced import unreduced_model
 
@@ -112,7 +113,7 @@ def _numbers(study: Study, asked: Asked, positions: int) -> int:
 
 def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Shapes along all bodies, of the scene without sweep."""
-    from engine.plan import base_scene
+    from engine.scenes import base_scene
     from engine.ways import frozen
 
     model = base_scene(study)
@@ -122,7 +123,7 @@ def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dat
 def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
     """Some variants, in the order of the scenes that they share."""
     from engine.lanes import LaneValues
-    from engine.plan import scenes, structure
+    from engine.scenes import scenes, structure
     from engine.sweep import expand
 
     cases = expand(study)
@@ -158,7 +159,7 @@ def _evaluated(kind: AtRest, model: SceneModel, values: LaneValues, places: Posi
 def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:
     """Results with another number of modes of every body, with and without static correction."""
     from engine.lanes import LaneValues
-    from engine.plan import base_scene
+    from engine.scenes import base_scene
     from engine.ways import frozen
 
     found = []
@@ -175,7 +176,7 @@ def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work:
 def _unreduced(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Results of the unreduced model, and those of the modes at the same positions."""
     from engine.lanes import LaneValues
-    from engine.plan import base_scene
+    from engine.scenes import base_scene
     from engine.ways import frozen
 
     model, positions = base_scene(study), places.all[places.unreduced]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from results_schema.errors import BadInput, Interrupted
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
+from studies.choices import is_marched
 from studies.measuring import Work, described
 from studies.results import Results
 from studies.words import counted, scientific
@@ -31,6 +32,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 GROUP = "/audit"
 EXTREMES = ("max", "min")
+NONE_AUDITED = "no variant was audited: it would have taken too long; audit = N asks for N variants all the same"
 AT_REST = 1e-9  # of what a sensor reads: statics of less are rounding
 
 
@@ -253,9 +255,10 @@ class Verdict:
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
-    """What the group says, in sentences; [] where there is none."""
+    """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
     if group is None:
-        return []
+        left_open = is_marched(results) and results.study.solver.audit == "auto"
+        return [NONE_AUDITED] if left_open and bool(results.kept.any()) else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, label
 from studies.results import VARIANT, Axis, Results
-from studies.summary import is_pieced
+from studies.study import is_measuring
 from studies.words import counted, percent, scientific
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ NAMES: Mapping[Fidelity, str] = {
 
 def is_marched(results: Results) -> bool:
     """Whether variants of a sweep were computed, each with a model, modes and steps of its own."""
-    return not is_pieced(results.dataset)
+    return not is_measuring(str(results.dataset.attrs["study_kind"]))
 
 
 def of_variants(results: Results, name: str) -> Array:
@@ -79,6 +79,26 @@ def told_choices(results: Results) -> list[str]:
         rest = "".join(f"; {count:,}: {words}" for count, words in others)
         said = f"{count:,} of {counted(total, 'variant')}{_with_values(results, total)}: {words}{rest}."
     return [said, *_told_cost(results)]
+
+
+def as_json(results: Results) -> list[dict[str, Any]]:
+    """What `run --json` says of it: one entry for every model that variants took, cheapest first."""
+    chosen = of_variants(results, MODEL)
+    return [_as_json(results, model, chosen == model) for model in (models(results) if is_marched(results) else ())]
+
+
+def _as_json(results: Results, model: Fidelity, which: NDArray[np.bool_]) -> dict[str, Any]:
+    """A model with the ranges of its modes and steps, its largest estimated error and what it took on average."""
+    modes, steps, errors, cost = (of_variants(results, name)[which] for name in (MODES, STEPS, ERROR, COST))
+    return {
+        "model": label(model),
+        "variants": int(which.sum()),
+        "modes": [int(modes.min()), int(modes.max())],
+        "steps": [int(steps.min()), int(steps.max())],
+        "largest_error_estimate": float(known(errors).max()) if known(errors).size else None,
+        "without_estimate": int(np.isnan(errors).sum()),
+        "mean_relative_cost": float(known(cost).mean()) if known(cost).size else None,
+    }
 
 
 def _with_values(results: Results, total: int) -> str:

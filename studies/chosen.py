@@ -22,9 +22,9 @@ HEADINGS = ("variants", "share", "model", "modes", "scheme", "steps", "expected 
 
 
 def choices(plan: Plan) -> list[tuple[str, ...]]:
-    """One row per model, number of modes and scheme, cheapest first: variants and their share, steps over one passage or
-    cycle, the largest error that is expected, the rule that decides the steps of most of them, and modes x steps, with
-    the marches they are compared with, over those of the full model."""
+    """One row per model, number of modes and scheme, cheapest first: variants and their share, steps over one passage
+    or cycle, the largest error that is expected, the rule that decides the steps of most of them, and modes x steps,
+    with the marches they are compared with, over those of the full model."""
     groups: dict[tuple[Fidelity, int, SchemeUsed], list[Bucket]] = {}
     for bucket in plan.buckets:
         kind = bucket.scene.fidelity, _modes(bucket), scheme_used(bucket.scene.study)

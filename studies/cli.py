@@ -68,13 +68,15 @@ def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
     With a progress bar, and a summary at the end. Started again after any interruption it goes on from what is
     finished.
     """
-    from studies import actions, console, summary
+    from studies import actions, choices, console, summary
     from studies.options import RunOptions
+    from studies.results import Results
 
     outcome = actions.run(study, archive, RunOptions(**how))
     code = actions.exit_code(outcome)
     if as_json:
-        console.say_json(summary.as_json(outcome, code))
+        chosen = choices.as_json(Results.of(outcome.results))
+        console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
     else:
         console.show_outcome(outcome)
     console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))

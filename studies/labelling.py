@@ -67,7 +67,7 @@ class _Gathering:
     """The pieces of one study with what their dimensions mean."""
 
     def __init__(self, kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked: Asked) -> None:
-        from engine.plan import base_scene
+        from engine.scenes import base_scene
         from engine.sweep import expand
 
         self.kind, self.pieces, self.asked = kind, pieces, asked

@@ -13,8 +13,9 @@ from engine.audit import audit_seconds, sampled
 from engine.bucket import Bucket
 from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
-from engine.plan import Plan, base_scene
+from engine.plan import Plan
 from engine.remarks import remarks
+from engine.scenes import base_scene
 from engine.sweep import Cases, expand
 from studies import chosen, simpler
 from studies.measuring import disk_bytes

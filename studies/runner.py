@@ -131,7 +131,7 @@ def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
 def _bodies(study: Study) -> Mapping[str, xr.Dataset]:
     """The bodies of the scene without its sweep, by group."""
     from engine.dataset import model_groups
-    from engine.plan import base_scene
+    from engine.scenes import base_scene
 
     return model_groups(base_scene(study))
 

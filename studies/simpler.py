@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from engine.ladder import Rung, ladder
 from engine.lanes import LaneValues
 from engine.model import SceneModel
-from engine.plan import Plan, scenes
+from engine.plan import Plan
+from engine.scenes import scenes
 from results_schema.status import Fidelity, label
 from studies.words import number
 

@@ -70,6 +70,11 @@ def kind_named(name: str, where: str = "kind") -> AnyKind:
     return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
 
 
+def is_measuring(name: str) -> bool:
+    """Whether the kind of that name is computed in pieces, and not by a march. Raises BadInput for an unknown one."""
+    return isinstance(kind_named(name), MeasuringKind)
+
+
 def kind_of(study: Study) -> AnyKind:
     """The kind of a study, after its check. Raises BadInput."""
     kind = kind_named(study.kind, study.source.where("kind"))

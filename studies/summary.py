@@ -58,9 +58,9 @@ def is_measured(results: xr.Dataset) -> bool:
 
 def is_pieced(results: xr.Dataset) -> bool:
     """Whether these were computed in pieces, and not by a march."""
-    from studies.measuring import MeasuringKind
+    from studies.study import is_measuring
 
-    return isinstance(_kind(results), MeasuringKind)
+    return is_measuring(str(results.attrs["study_kind"]))
 
 
 def _kind(results: xr.Dataset) -> AnyKind:

@@ -33,7 +33,7 @@ STAGES = {
     "scenes as arrays": "timeline ties standing model ways grips statics track readings contacts signals lanes "
     "influence coupled fidelity tables envelopes resonance resolution excitation route moving_load ringing bouncing "
     "neglect ladder omitted choice options choosing checking bucket",
-    "all work of a study": "reduction plan histories cycles remarks audit",
+    "all work of a study": "reduction scenes bucketing plan histories cycles remarks audit",
     "the run": "starting march quasistatic richardson ode transition comparison estimates improving outcome dataset "
     "execution unreduced_track unreduced_bodies unreduced unreduced_rows unreduced_statics unreduced_march "
     "unreduced_comparison",

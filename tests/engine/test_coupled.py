@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from engine.coupled import coupled_frequencies, coupled_modes
 from engine.lanes import LaneValues
-from engine.plan import base_scene
 from engine.scene import Study
+from engine.scenes import base_scene
 from engine.ways import frozen
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
 from tests.engine.riders import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding

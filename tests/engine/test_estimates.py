@@ -16,9 +16,9 @@ from engine.execution import run
 from engine.lanes import LaneValues
 from engine.moving_load import Load, noticed
 from engine.omitted import MODES_LOOKED_AT, Omitted
-from engine.plan import base_scene
 from engine.route import routes
 from engine.scene import Study
+from engine.scenes import base_scene
 from results_schema.status import Fidelity, Status
 from tests.engine.build import (
     Table,

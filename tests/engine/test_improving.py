@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import engine.bucketing as bucketing
 import engine.improving as improving
-import engine.plan as planning
 from engine.choice import Choice
 from engine.estimates import Errors
 from engine.execution import run
@@ -28,7 +28,7 @@ OPEN = beam(modes="auto", damping_ratio=0.02)
 
 def too_cheap(monkeypatch: pytest.MonkeyPatch, modes: int, steps: int) -> None:
     """The choice is always these modes, and as few steps as the rules allow."""
-    real = planning.choose
+    real = bucketing.choose
 
     def cheap(*args: Any) -> Choice:
         told = real(*args)
@@ -39,7 +39,7 @@ def too_cheap(monkeypatch: pytest.MonkeyPatch, modes: int, steps: int) -> None:
             error_fidelity=np.zeros_like(told.modes),
         )
 
-    monkeypatch.setattr(planning, "choose", cheap)
+    monkeypatch.setattr(bucketing, "choose", cheap)
 
 
 def improved(**changes: Any) -> Study:

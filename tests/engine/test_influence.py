@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 import engine
 from engine.influence import StaticReadings, contact_names, static_shapes, static_values
 from engine.lanes import LaneValues
-from engine.plan import base_scene
 from engine.scene import Study
+from engine.scenes import base_scene
 from engine.ways import frozen
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
 from tests.engine.riders import FLEXIBLE, THREE, TWO, UNEVEN, riding

@@ -11,11 +11,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from engine.bucketing import steps_of as steps_by_rules
 from engine.execution import run
 from engine.fidelity import MOST_STEPS, alias_steps, allow_any_steps, round_up
 from engine.lanes import LaneValues
 from engine.plan import Plan, make_plan
-from engine.plan import steps_of as steps_by_rules
 from engine.scene import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study

@@ -17,6 +17,7 @@ from results_schema.status import Status
 from studies.actions import exit_code
 from studies.audit import (
     GROUP,
+    NONE_AUDITED,
     Again,
     Verdict,
     as_json,
@@ -130,3 +131,28 @@ def test_a_check_does_not_refuse_what_only_an_audit_could_not_do() -> None:
     """Four times the steps of a very slow cruise would be too many; nobody has asked for them."""
     slow = study(beam(), mass(0.5, cruise(0.0, 1.0, 1e-5)), solver={"steps": 50_000_000})
     assert "No audit: it would take too long" in preview(make_plan(slow), 1).cost
+
+
+def test_it_is_said_that_no_audit_was_worth_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.audit.MOST_TIME", 0.0)
+    monkeypatch.setattr("engine.audit.FREE_SECONDS", 0.0)
+    found = outcome(crossing(RICH, {}), tmp_path)
+    assert found.audit is None and exit_code(found) == 0
+    assert told_audit(found.audit, Results.of(found.results)) == [NONE_AUDITED]
+    (tmp_path / "none").mkdir()
+    none = outcome(crossing(RICH, {"audit": 0}), tmp_path / "none")
+    assert told_audit(none.audit, Results.of(none.results)) == []
+
+
+def test_json_tells_the_choice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path, SMALL.replace("[solver]", "[solver]\naudit = 0"))
+    monkeypatch.chdir(tmp_path)
+    main(["run", "small.toml", "--json"])
+    told, root = json.loads(capsys.readouterr().out), open_archive("small.nc").root
+    used, errors = root["modes_used"].values, root["error_estimate"].values
+    assert sum(part["variants"] for part in told["choice"]) == told["variants"] == used.size
+    assert min(part["modes"][0] for part in told["choice"]) == used.min()
+    assert max(part["largest_error_estimate"] for part in told["choice"]) == errors.max()
+    assert all(part["mean_relative_cost"] >= 0.0 for part in told["choice"])
