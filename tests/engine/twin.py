@@ -268,6 +268,7 @@ def padded_by(phi: scenes.Shape, coordinates: int) -> scenes.Shape:
 
 
 BETA = {"average-acceleration": 1 / 4, "linear-acceleration": 1 / 6, "fox-goodwin": 1 / 12, "central-difference": 0.0}
+BETA["auto"] = BETA["average-acceleration"]  # with fixed steps
 
 
 def newmark_of(study: Study) -> naive.Newmark:

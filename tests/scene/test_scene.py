@@ -35,7 +35,7 @@ def test_values_and_defaults() -> None:
     assert study.solver.integration.coefficients == (0.25, 0.5)
     assert study.body_of("table_moment") == "bed"
     small = load(MINIMAL)
-    assert (small.gravity, small.start, small.solver.scheme) == (STANDARD_GRAVITY, "rest", "average-acceleration")
+    assert (small.gravity, small.start, small.solver.scheme) == (STANDARD_GRAVITY, "rest", "auto")
     assert small.body["bed"].ends == ("pinned", "pinned")
     assert study.start == "equilibrium"
     assert load(SAMPLE.replace('initial = "equilibrium"\n', "")).start == "equilibrium"
