@@ -1,4 +1,5 @@
-"""What a march is compared with to know its error: the same with other steps, and with other modes besides.
+"""What a march is compared with to know its error: the same with other steps, with other modes besides, and with the
+carriages' own model where a simpler one is marched.
 
 A march of second order misses a third of what separates it from one with half its steps, or four thirds of what
 separates it from one with twice as many; one of first order all of it, or twice. What half the modes miss is at least
@@ -24,6 +25,7 @@ from engine.resonance import contact_omega
 from engine.tables import SceneTables
 from results_schema.errors import BadInput
 
+Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 ALPHA_DOUBT = 1.5  # times that for alpha schemes, which leave their asymptotic range sooner than Newmark's
@@ -36,17 +38,19 @@ class Checks(NamedTuple):
 
     steps: with half or twice its steps; of their difference the march misses the part ``missed``. None where the march
     makes its own estimate. modes: with other modes and its own steps, or half of them where ``steps`` has so; of the
-    difference to the march with as many steps it misses the part ``modes_missed``. None where there are none.
+    difference to the march with as many steps it misses the part ``modes_missed``. None where there are none. model:
+    with the carriages' own model and as many steps as ``modes`` may have; None where it is marched itself.
     """
 
     steps: SceneTables | None
     missed: float
     modes: SceneTables | None
     modes_missed: float
+    model: SceneTables | None = None
 
     def cost(self, own: SceneTables) -> float:
         """Modes x steps of these marches over those of the march itself."""
-        parts = [part for part in (self.steps, self.modes) if part is not None]
+        parts = [part for part in (self.steps, self.modes, self.model) if part is not None]
         return sum(part.steps * part.model.body_modes for part in parts) / (own.steps * own.model.body_modes)
 
 
@@ -59,7 +63,9 @@ def checks_of(tables: SceneTables, compared: Literal["half", "twice"]) -> Checks
     doubt = ALPHA_DOUBT if isinstance(tables.scheme, Alpha) else 1.0
     ratio, part = (-2, doubt / (grown - 1.0)) if compared == "half" else (2, doubt * grown / (grown - 1.0))
     modes = None if model is None else tables.with_steps(model, _within_limit(tables.model, model) or min(ratio, 1))
-    return Checks(tables.with_steps(tables.model, ratio), part, modes, missed)
+    own = simplified(tables.model, {"solver.fidelity": "full"})
+    full = tables.with_steps(own, min(ratio, 1)) if own.fidelity > tables.model.fidelity else None
+    return Checks(tables.with_steps(tables.model, ratio), part, modes, missed, full)
 
 
 def _within_limit(own: SceneModel, other: SceneModel) -> int:
@@ -71,9 +77,14 @@ def _within_limit(own: SceneModel, other: SceneModel) -> int:
 
 def can_be_halved(model: SceneModel, values: LaneValues, steps: Counts) -> NDArray[np.bool_]:
     """(V,) whether half of these steps still keep the rules that no march may break."""
+    return can_be_marched(model, values, steps.astype(np.float64) / 2.0)
+
+
+def can_be_marched(model: SceneModel, values: LaneValues, steps: Array | float) -> NDArray[np.bool_]:
+    """(V,) whether so many steps keep the rules that no march may break."""
     distinct, inverse = np.unique(values.time_scale(model.carriages[0].name), return_inverse=True)
     contact = values.time_scale(model.carriages[0].name) * contact_omega(model, values) / (2.0 * np.pi)
-    return np.asarray(0.5 * steps >= np.maximum(least_steps(model, distinct)[inverse], contact))
+    return np.asarray(steps >= np.maximum(least_steps(model, distinct)[inverse], contact))
 
 
 def _with_other_modes(model: SceneModel) -> tuple[SceneModel | None, float]:

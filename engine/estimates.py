@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bucket import Bucket
-from engine.checking import Checks
+from engine.checking import Checks, can_be_marched
 from engine.choice import fixed_steps
 from engine.cycles import counts_sampled, reduced
 from engine.kernels.layout import LARGEST, SMALLEST
@@ -111,19 +111,32 @@ class Estimator:
         if checks is None:
             known = self.bucket.scene.study.solver.static_correction  # else statics know the kept modes alone
             return Errors(told.error_fidelity, none if known else none + np.nan, none)
-        partner, steps = own, missed
+        other, steps = own, missed
         if checks.steps is not None:
             other = self._march(checks.steps, own)
             finer = max(checks.steps, own.tables, key=lambda tables: tables.steps)
             resolved = phase_errors(finer, self._values, told.felt) <= RESOLVED
             steps = self._apart(own, other) * np.where(resolved, checks.missed, max(1.0, checks.missed))
-            partner = other if checks.modes is not None and checks.modes.steps == other.tables.steps else own
         assert steps is not None
         modes = np.full(self.variants.size, np.nan)
         if checks.modes is not None:
             part = _of_difference(told.decay, checks, own.tables.model.fidelity)
-            modes = self._apart(partner, self._march(checks.modes, own)) * part
-        return Errors(told.error_fidelity, modes, steps)
+            modes = self._off(checks.modes, own, other) * part
+        return Errors(self._fidelity(told.error_fidelity, own, other), modes, steps)
+
+    def _fidelity(self, told: Array, own: Observed, other: Observed) -> Array:
+        """(V,) what a simpler model leaves out of this march: its difference to the carriages' own model, or what is
+        told beforehand where that would want more steps."""
+        model = self.bucket.checks.model if self.bucket.checks is not None else None
+        if model is None:
+            return told
+        sound = can_be_marched(model.model, self._values, model.steps)
+        return np.where(sound, self._off(model, own, other), told) if sound.any() else told
+
+    def _off(self, tables: SceneTables, own: Observed, other: Observed) -> Array:
+        """(V,) difference of another march to that one of two which has as many steps."""
+        partner = other if other.tables.steps == tables.steps else own
+        return self._apart(partner, self._march(tables, own))
 
     @property
     def _values(self) -> LaneValues:
