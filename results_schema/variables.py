@@ -265,8 +265,8 @@ declare(
     Variable(
         "error_fidelity",
         long_name="part of the estimated relative error that comes from the choice of model",
-        meaning="what the model leaves out of the carriages' own: the difference to a march of that; told before it runs "
-        "for statics, and where springs or masses would want more steps; 0 for their own",
+        meaning="what the model leaves out of the carriages' own: the difference to a march of that; told before it "
+        "runs for statics, and where springs or masses would want more steps; 0 for their own",
         required=False,
         nan_allowed=True,
     ),
