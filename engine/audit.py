@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.beam import Beam
 from engine.bodies.body import AUTO_MODES, MAX_MODES, Body
 from engine.bodies.frame import MAX_FIXED_INTERFACE_MODES, Frame
 from engine.bodies.reduced import Reduced
@@ -47,8 +46,7 @@ SHARED = 8  # times the steps that a variant takes to share tables, which cost m
 FULL_SHARED = 2  # the same once `MOST` share them
 GROUP_SECONDS = 0.05  # besides tables and marching, for expected times only
 STATION_SECONDS = 3e-6  # of tables; likewise
-MODE_SECONDS = 2e-7  # of each mode of frames in tables; likewise
-SERIES_SECONDS = 3e-8  # of modes squared in tables, where beams have them as series; likewise
+MODE_SECONDS = 2e-7  # of each mode in tables; likewise
 TABLE_BYTES = 128  # of a mode at a station of tables, at most
 
 
@@ -83,8 +81,7 @@ class _Group(NamedTuple):
         modes = self.modes
         once = timeline.repeats and TABLE_BYTES * self.steps * modes * ties <= KEPT_BYTES
         stations = min(timeline.steps, self.steps) if once else timeline.steps
-        series = any(isinstance(body, Beam) for body in self.scene.study.body.values())
-        table = STATION_SECONDS + (SERIES_SECONDS * modes**2 if series else MODE_SECONDS * modes)
+        table = STATION_SECONDS + MODE_SECONDS * modes
         lanes = LANES * -(-self.variants.size // LANES)
         march = modes * (1.0 + 0.1 * len(plan.study.sensor)) * ties**1.2 * timeline.steps * lanes / PACE
         return float(GROUP_SECONDS + table * stations * ties + march)
