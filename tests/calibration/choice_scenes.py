@@ -90,7 +90,7 @@ def draw(seed: int, number: int) -> Scene:
         motion["after"] = 0.0  # conditionally stable schemes, such as the references', march no springs in it
     bed = beam(supports=supports, modes="auto")
     sensors = {"place": fixed(_between(random, 0.1, 0.9)), "below": under("car")}
-    if number // len(KINDS) % 3 == 0:
+    if reads_moment(number):
         sensors["moment"] = fixed(_on_the_way(random, motion), "bending_moment")
     first = float(base_scene(study(bed | {"modes": 4}, mass(1.0, motion))).first_omega)
     alpha, mu = _alphas(random), _log(random, 0.01, 1.0, LANES)
@@ -98,6 +98,11 @@ def draw(seed: int, number: int) -> Scene:
     carriage, columns = _carriage(random, kind, motion, mu, first)
     columns |= {_pace_key(motion): _pace(motion, alpha * first / np.pi), "body.bed.damping_ratio": zeta}
     return Scene(seed, number, name, kind, bed, carriage, sensors, columns, alpha, mu, zeta)
+
+
+def reads_moment(number: int) -> bool:
+    """Whether the scene of a number reads a bending moment too: every third of each kind."""
+    return number // len(KINDS) % 3 == 0
 
 
 def _alphas(random: Random) -> Array:
