@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.status import Fidelity, label
+from results_schema.status import Fidelity, SchemeUsed, label
 from studies.results import VARIANT, Axis, Results
 from studies.study import is_measuring
 from studies.words import counted, percent, scientific
@@ -16,6 +16,7 @@ from studies.words import counted, percent, scientific
 Array = NDArray[np.float64]
 
 MODEL, MODES, STEPS = "fidelity_used", "modes_used", "steps_used"
+SCHEME = "scheme_used"
 COST = "relative_cost"
 ERROR = "error_estimate"
 PARTS: Mapping[str, str] = {"error_steps": "steps", "error_modes": "modes", "error_fidelity": "model"}
@@ -78,7 +79,7 @@ def told_choices(results: Results) -> list[str]:
         (count, words), *others = parts
         rest = "".join(f"; {count:,}: {words}" for count, words in others)
         said = f"{count:,} of {counted(total, 'variant')}{_with_values(results, total)}: {words}{rest}."
-    return [said, *_told_cost(results)]
+    return [said, *_told_schemes(results), *_told_cost(results)]
 
 
 def as_json(results: Results) -> list[dict[str, Any]]:
@@ -126,6 +127,17 @@ def _span(values: Array, noun: str) -> str:
     """
     low, high = int(values.min()), int(values.max())
     return counted(low, noun) if low == high else f"{low:,} to {counted(high, noun)}"
+
+
+def _told_schemes(results: Results) -> list[str]:
+    """By which schemes variants were marched, where the choice took more than one."""
+    marched = of_variants(results, MODEL) > Fidelity.STATIC
+    number = of_variants(results, SCHEME)[marched]
+    used, counts = np.unique(number[np.isfinite(number)], return_counts=True)
+    if used.size < 2:
+        return []
+    parts = [f"{label(SchemeUsed(int(k)))} {n:,}" for k, n in zip(used, counts, strict=True)]
+    return [f"Variants by scheme: {', '.join(parts)}."]
 
 
 def _told_cost(results: Results) -> list[str]:

@@ -1,0 +1,28 @@
+"""Sentences on what variants were given."""
+
+from __future__ import annotations
+
+import studies
+from studies.choices import as_json, told_choices
+from studies.results import Results
+from tests.engine.build import beam, cruise, mass, study
+
+ZETA = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.1]}}
+
+
+def found(**solver: object) -> Results:
+    bed = beam(modes="auto", supports="clamped-free")
+    given = study(bed, mass(0.1, cruise(0.3, 1.0, 0.05)), sweep=ZETA, solver={"audit": 0} | solver)
+    return Results.of(studies.run(given))
+
+
+def test_schemes_are_told_where_there_are_several() -> None:
+    assert "Variants by scheme: average-acceleration 1, fox-goodwin 1." in told_choices(found())
+    assert not any("by scheme" in said for said in told_choices(found(scheme="average-acceleration")))
+
+
+def test_every_model_has_an_entry_of_its_own() -> None:
+    results = found()
+    (entry,) = as_json(results)
+    assert entry["model"] == "mass" and entry["variants"] == 2 and entry["without_estimate"] == 0
+    assert entry["modes"] == [4, 6] and entry["largest_error_estimate"] == results.dataset.error_estimate.values.max()
