@@ -44,7 +44,7 @@ class Bucket:
     compared: Literal["half", "twice", "not"] = "half"
     added: int = 1
     rounds: int = 0
-    _finer: dict[tuple[int, int], Bucket] = field(default_factory=dict)
+    _finer: dict[tuple[int, int, bool], Bucket] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
@@ -107,19 +107,29 @@ class Bucket:
     def finer(self, modes: int, by: int) -> Bucket:
         """The same variants with so many modes of the bodies whose modes are chosen (0: as many as now) and ``by``
         times the steps."""
-        with self._lock:
-            if (modes, by) not in self._finer:
-                self._finer[modes, by] = self._with_more(modes, by)
-            return self._finer[modes, by]
+        return self._kept(modes, by, self.told, {f"body.{name}.modes": modes for name in self.chosen if modes})
 
-    def _with_more(self, modes: int, by: int) -> Bucket:
-        model = simplified(self.scene, {f"body.{name}.modes": modes for name in self.chosen}) if modes else self.scene
+    def with_own_model(self, by: int) -> Bucket:
+        """The same variants with the carriages' own model in place of a simpler one, and ``by`` times the steps."""
+        told = self.told._replace(error_fidelity=np.zeros_like(self.told.error_fidelity))
+        return self._kept(0, by, told, {"solver.fidelity": "full"})
+
+    def _kept(self, modes: int, by: int, told: Choice, changes: dict[str, object]) -> Bucket:
+        key = modes, by, "solver.fidelity" in changes
+        with self._lock:
+            if key not in self._finer:
+                self._finer[key] = self._with_more(by, told, changes)
+            return self._finer[key]
+
+    def _with_more(self, by: int, told: Choice, changes: dict[str, object]) -> Bucket:
+        model = simplified(self.scene, changes) if changes else self.scene
         tables = self.tables.with_steps(model, by)
         reason = "more than expected was missed"
         return replace(
             self,
             tables=tables,
             reason=reason,
+            told=told,
             added=self.added * by,
             rounds=self.rounds + 1,
             _finer={},

@@ -13,12 +13,14 @@ from engine.bucket import Bucket
 from engine.checking import can_be_halved
 from engine.choice import Asked, Choice, automatic_bodies, fixed_steps, with_choice
 from engine.choosing import choose
-from engine.fidelity import Needs, allow_any_steps, check_even_steps, check_most_steps, needed_steps, round_up
+from engine.fidelity import Needs, check_even_steps, check_most_steps, needed_steps, round_up
+from engine.kernels.schemes import USUAL_SCHEME
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
 from engine.resolution import steps_to_resolve
 from engine.resonance import spring_steps
 from engine.scenes import split
+from engine.settings import PARAMETERS
 from engine.sweep import Cases
 from engine.tables import SceneTables
 from results_schema.errors import BadInput
@@ -73,13 +75,18 @@ def steps_of(scene: SceneModel, values: LaneValues, check_steps: CheckSteps) -> 
         check_most_steps(scene, steps)
         check_steps(scene, values, steps)
         return steps, lambda part: "as the study says"
+    found = _needs(scene, values)
+    check_most_steps(scene, found.total)
+    return round_up(found.total), lambda part: _reason(found, part)
+
+
+def _needs(scene: SceneModel, values: LaneValues) -> Needs:
+    """Steps that rules of thumb ask for."""
     distinct, inverse = np.unique(values.time_scale(scene.carriages[0].name), return_inverse=True)
     needs, own = needed_steps(scene, distinct).per_rule, spring_steps(scene, values)
     if scene.scheme.stride > 1:
         own |= {"every mode of a Richardson pair resolved": steps_to_resolve(scene, values)}
-    found = Needs({name: needed[inverse] for name, needed in needs.items()} | own)
-    check_most_steps(scene, found.total)
-    return round_up(found.total), lambda part: _reason(found, part)
+    return Needs({name: needed[inverse] for name, needed in needs.items()} | own)
 
 
 def _chosen_steps(
@@ -93,12 +100,17 @@ def _chosen_steps(
 
 
 def _full_cost(scene: SceneModel, values: LaneValues) -> Array:
-    """(V,) modes x steps of the carriages' own model with many modes and the steps that all its rules ask for."""
+    """(V,) modes x steps of the carriages' own model with many modes, by the usual scheme with the steps that all its
+    rules ask for."""
     changes: dict[str, Any] = {f"body.{name}.modes": FULL_MODES for name in automatic_bodies(scene)}
+    if scene.study.solver.scheme not in PARAMETERS:  # whose keys no other scheme has
+        changes["solver.scheme"] = USUAL_SCHEME
     full = simplified(scene, changes | {"solver.fidelity": "full", "solver.steps": "auto"})
     columns = {path: column for path, column in values.columns.items() if path != "solver.steps"}
-    steps, _ = steps_of(full, LaneValues(full.study, columns, values.size), allow_any_steps)
-    return np.asarray(full.body_modes * steps, dtype=np.float64)
+    needs = _needs(full, LaneValues(full.study, columns, values.size))
+    if scene.fidelity is not Fidelity.STATIC and not fixed_steps(scene.study, values):
+        check_most_steps(full, needs.total)
+    return np.asarray(full.body_modes * round_up(needs.total), dtype=np.float64)
 
 
 def _check_static(scene: SceneModel, tables: SceneTables) -> None:

@@ -21,7 +21,7 @@ from engine.fidelity import least_steps
 from engine.kernels.layout import Alpha
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
-from engine.resonance import contact_omega
+from engine.resonance import contact_omega, least_for_limit, vibrates_freely
 from engine.tables import SceneTables
 from results_schema.errors import BadInput
 
@@ -81,9 +81,13 @@ def can_be_halved(model: SceneModel, values: LaneValues, steps: Counts) -> NDArr
 
 
 def can_be_marched(model: SceneModel, values: LaneValues, steps: Array | float) -> NDArray[np.bool_]:
-    """(V,) whether so many steps keep the rules that no march may break."""
+    """(V,) whether so many steps keep the rules that no march may break; springs that vibrate freely keep none of a
+    conditionally stable scheme."""
     distinct, inverse = np.unique(values.time_scale(model.carriages[0].name), return_inverse=True)
     contact = values.time_scale(model.carriages[0].name) * contact_omega(model, values) / (2.0 * np.pi)
+    if model.springs and np.isfinite(model.scheme.stability_limit):
+        never = any(vibrates_freely(carriage) for carriage in model.carriages)
+        contact = np.maximum(contact, np.inf if never else least_for_limit(model, values))
     return np.asarray(steps >= np.maximum(least_steps(model, distinct)[inverse], contact))
 
 

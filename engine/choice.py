@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from engine.bodies.beam import Beam
 from engine.bodies.frame import Frame
 from engine.fidelity import STEPS_PER_PERIOD
+from engine.kernels.schemes import Scheme
 from engine.ladder import full_fidelity
 from engine.lanes import LaneValues
 from engine.model import SceneModel, simplified
@@ -23,6 +24,7 @@ Counts = NDArray[np.int64]
 LEVELS = (2, 3, 4, 6, 8, 12, 16, 24)  # numbers of modes that are chosen from
 FEW, MORE = 4, 3  # fewer modes than these are compared with so many more, others with half
 USUAL = 1e-3  # the tolerance at which `STEPS_PER_PERIOD` is right where nothing is known
+MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 FINER = 2.0  # times the steps that are safe: half of them must be so too
 MOST_CHOSEN = 1e6  # steps over a passage or cycle for the sake of the tolerance; what asks for more misses it
 
@@ -99,6 +101,13 @@ def scheme_used(study: Study) -> SchemeUsed:
 def usual_steps(values: LaneValues) -> Array:
     """(V,) steps per period where nothing but the tolerance is known."""
     return STEPS_PER_PERIOD * np.sqrt(USUAL / values.of("solver.tolerance"))
+
+
+def true_steps(values: LaneValues, scheme: Scheme) -> Array:
+    """(V,) steps per period with which a scheme has the period error of average acceleration with `usual_steps`."""
+    square, fourth = scheme.period_error
+    error = (2.0 * np.pi / usual_steps(values)) ** 2 / 12.0
+    return 2.0 * np.pi * (np.sqrt(square / error) if square > 0.0 else (fourth / error) ** 0.25)
 
 
 def _is_free(body: object) -> bool:

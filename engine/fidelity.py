@@ -199,5 +199,5 @@ def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
             where=model.study.source.where("solver.steps"),
             expected=f"at most {MOST_STEPS}",
             received=f"{float(np.max(steps)):.3g}",
-            remedy="a faster motion, fewer modes or larger steps",
+            remedy="a larger tolerance, a faster motion, fewer modes or larger steps",
         )

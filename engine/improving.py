@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
-from engine.choice import FINER, LEVELS, MOST_CHOSEN, fixed_steps, usual_steps
+from engine.choice import FINER, LEVELS, MOST_CHOSEN, MOST_SIMPLER, fixed_steps, true_steps, usual_steps
 from engine.fidelity import STEPS_PER_PERIOD, safe_steps
 from engine.lanes import LaneValues
 from engine.model import simplified
 from engine.plan import Plan
+from engine.resonance import spring_steps, vibrates_freely
 from results_schema.status import Status
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ LEAST_PART = 0.05  # of the tolerance itself, likewise
 MOST_COST = 10.0  # times the full model's at a tolerance of 1e-3 or more: what still misses it says so
 ROUNDS = 3  # of improving
 AT_ONCE = 8  # times the steps before the next look
+NOT_LEFT = -1  # to be improved by modes or steps
 NEXT = (*LEVELS, 32, 48, MAX_MODES)  # numbers of modes to go on with
 
 
@@ -35,12 +37,17 @@ def improvements(
     """Buckets with more modes or steps, and which of the variants (numbers below V) they are for."""
     status = flat["status"]
     wanting = np.flatnonzero((status == Status.TOLERANCE_MISSED) | (status == Status.UNRESOLVED))
-    if bucket.rounds >= ROUNDS or bucket.checks is None or not wanting.size or bucket.scene.scheme.stride > 1:
+    done = bucket.rounds >= ROUNDS or bucket.checks is None or bucket.scene.scheme.stride > 1
+    if done or not wanting.size or not plan.study.sensor:  # without any nothing can be known
         return
     values = plan.values(bucket, variants[wanting])
     tolerance = values.of("solver.tolerance")
     allowed = np.maximum(PART * (tolerance - flat["error_fidelity"][wanting]), LEAST_PART * tolerance)
     modes = _modes(bucket, flat["error_modes"][wanting] / allowed)
+    coarse = flat["error_fidelity"][wanting] > MOST_SIMPLER * tolerance
+    if plan.study.solver.fidelity == "auto" and coarse.any():
+        modes[coarse] = NOT_LEFT  # more of anything else is of no use
+        yield from _with_own_model(plan, bucket, variants, wanting[coarse])
     steps = np.ones(wanting.size, dtype=np.int64)
     if not fixed_steps(plan.study, values):
         steps = _times(np.sqrt(flat["error_steps"][wanting] / allowed))
@@ -56,6 +63,27 @@ def improvements(
                 yield bucket.finer(more, int(times)), wanting[lanes[by == times]]
 
 
+def _with_own_model(plan: Plan, bucket: Bucket, variants: Counts, lanes: Counts) -> Iterator[tuple[Bucket, Counts]]:
+    """Buckets with the carriages' own model for variants that a simpler one does not tell well enough, with the steps
+    that it needs whatever its accuracy; only those for which it is worth that."""
+    model = simplified(bucket.scene, {"solver.fidelity": "full"})
+    free = any(vibrates_freely(carriage) for carriage in model.carriages)
+    if model.fidelity == bucket.scene.fidelity or (free and np.isfinite(model.scheme.stability_limit)):
+        return
+    values = LaneValues(model.study, plan.cases.columns_of(variants[lanes]), lanes.size)
+    rules = safe_steps(model, values.time_scale(model.carriages[0].name), FINER)
+    rules |= spring_steps(model, values, true_steps(values, model.scheme), FINER)
+    by = _power_of_two(np.max([*rules.values()], axis=0) / bucket.steps)
+    worth = by <= (1 if fixed_steps(model.study, values) else _most_times(bucket, 0, plan, variants[lanes]))
+    for times in np.unique(by[worth]):
+        yield bucket.with_own_model(int(times)), lanes[worth & (by == times)]
+
+
+def _power_of_two(ratio: Array) -> Counts:
+    """(V,) the next powers of two, from 1 on."""
+    return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(ratio, 1.0)) - 1e-9)), dtype=np.int64)
+
+
 def _most_times(bucket: Bucket, modes: int, plan: Plan, variants: Counts) -> Counts:
     """(V,) powers of two by which the steps may grow, with so many modes, for what that is worth; 0 where not even as
     many as now are."""
@@ -69,7 +97,7 @@ def _most_times(bucket: Bucket, modes: int, plan: Plan, variants: Counts) -> Cou
 def _times(ratio: Array) -> Counts:
     """(V,) powers of two that are no less than these ratios, up to `AT_ONCE`; 2 where they are unknown."""
     known = np.clip(np.where(np.isnan(ratio), 2.0, ratio), 1.0, AT_ONCE)
-    return np.asarray(np.exp2(np.ceil(np.log2(known) - 1e-9)), dtype=np.int64)
+    return _power_of_two(known)
 
 
 def _modes(bucket: Bucket, ratio: Array) -> Counts:
@@ -98,4 +126,4 @@ def _safe(plan: Plan, bucket: Bucket, modes: int, variants: Counts) -> Counts:
     if fixed_steps(model.study, values):
         return np.ones(variants.size, dtype=np.int64)
     least = np.max([*safe_steps(model, values.time_scale(model.carriages[0].name), FINER).values()], axis=0)
-    return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(least / bucket.steps, 1.0)) - 1e-9)), dtype=np.int64)
+    return _power_of_two(least / bucket.steps)

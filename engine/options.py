@@ -19,12 +19,14 @@ from engine.choice import (
     FINER,
     LEVELS,
     MOST_CHOSEN,
+    MOST_SIMPLER,
     Asked,
     Choice,
     automatic_bodies,
     fewer_modes,
     fixed_steps,
     scheme_used,
+    true_steps,
     usual_steps,
     with_choice,
 )
@@ -44,9 +46,9 @@ Array = NDArray[np.float64]
 CELL = 0.05  # width of the lattice's cells on which variants are looked at, as a part of a number
 UNKNOWN = 12  # modes where nothing is known of their error
 UNFELT = 0.05  # of the tolerance: ringing that need not be resolved
-MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 LEAST_PART = 0.1  # of the tolerance, or of all other errors where these are larger, that steps may take
 UNHELD = 1e15  # price of an error, beyond that of any march
+ALIKE = 1.25  # times an error that is not held: as good as that
 UNKNOWN_PRICE = 1e300  # of the carriages' own model where nothing can be told, beyond any error's
 LEAST_OF_CYCLE = 400  # steps, of whose stations a study makes its results
 KINKED = 0.3  # of the tolerance that extremes may miss between stations where an influence line has a kink
@@ -176,8 +178,10 @@ class Options:
         ruled = (rules > wanted).astype(float)
         errors = (error, left, missed, decay, ruled, told.felt(tolerance))
         choice = Choice(none + model, none + level, none + scheme, steps, *errors)
-        holds = (allowed > 0.0) & (ours <= MOST_SIMPLER * tolerance) & (fixed | (enough < most))
-        price = np.where(holds, steps * (level or self.scene.body_modes), UNHELD * (ours + left + missed))
+        room = allowed >= (0.0 if fixed else LEAST_PART * tolerance)
+        holds = room & (ours <= MOST_SIMPLER * tolerance) & (fixed | (enough < most))
+        work = steps * (level or self.scene.body_modes)
+        price = np.where(holds, work, UNHELD * _alike(ours + left + missed) + work)
         last = UNKNOWN_PRICE if model is full_fidelity(self.scene) else np.inf
         return _Option(choice, np.where(np.isnan(price), last, price))
 
@@ -202,7 +206,8 @@ class Options:
             found = np.maximum(found, FINER * LEAST_MARGIN * alias_steps(scene, time, level or None))
         if model is Fidelity.TIED:
             sprung = self._with(level, scheme)
-            found = np.max([found, *spring_steps(sprung, values, usual_steps(values), FINER).values()], axis=0)
+            rules = spring_steps(sprung, values, true_steps(values, scene.scheme), FINER)
+            found = np.max([found, *rules.values()], axis=0)
         return np.asarray(
             np.maximum((1.0 + CELL) * found, LEAST_STEPS if self.asked.window == "whole" else LEAST_OF_CYCLE)
         )
@@ -275,6 +280,12 @@ class Told:
         """What the step of a scheme may spoil, with so many modes of every body."""
         parts = [load.stepped(level, scheme) for load in self.loads]
         return Spoiled(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+def _alike(error: Array) -> Array:
+    """(V,) errors that nothing holds, to the next power of `ALIKE`: of such alike the cheapest is good enough."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(ALIKE ** np.ceil(np.log(error) / np.log(ALIKE)))
 
 
 def _fewest(spoiled: Spoiled, allowed: Array, unit: Array) -> Array:

@@ -93,9 +93,14 @@ def _computed(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[],
         "diverged_step": diverged_step,
         "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
         "scheme_used": np.full(size, int(scheme_used(tables.model.study)), dtype=np.int8),
-        "modes_used": np.full(size, tables.model.body_modes, dtype=np.int32),
+        "modes_used": np.full(size, 0 if _knows_all(tables) else tables.model.body_modes, dtype=np.int32),
         "steps_used": np.full(size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
     }
+
+
+def _knows_all(tables: SceneTables) -> bool:
+    """Whether these are statics of the whole body, whatever modes it keeps."""
+    return _rests(tables) and tables.model.study.solver.static_correction
 
 
 def _rests(tables: SceneTables) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from engine.fidelity import LIMIT_MARGIN, STEPS_PER_PERIOD, check_fixed_steps
 from engine.lanes import LaneValues
 from engine.model import SceneModel
-from engine.ties import SpringTie
+from engine.ties import CarriageTie, SpringTie
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def spring_steps(
         * contact_omega(model, values),
     }
     if math.isfinite(model.scheme.stability_limit):
-        rules["the scheme's stability limit with springs"] = finer * LIMIT_MARGIN * _least_for_limit(model, values)
+        rules["the scheme's stability limit with springs"] = finer * LIMIT_MARGIN * least_for_limit(model, values)
     return {name: model.scheme.stride * steps for name, steps in rules.items()}
 
 
@@ -87,16 +87,21 @@ def check_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
         return
     check_free_vibration(model)
     if math.isfinite(model.scheme.stability_limit):
-        _refuse(model, _least_for_limit(model, values), steps, "the step is beyond the scheme's stability limit")
+        _refuse(model, least_for_limit(model, values), steps, "the step is beyond the scheme's stability limit")
     least = model.scheme.stride * time_scale * contact_omega(model, values) / (2.0 * math.pi)
     _refuse(model, least, steps, "a step is longer than a period of the contact on its spring: the march could grow")
+
+
+def vibrates_freely(carriage: CarriageTie) -> bool:
+    """Whether a carriage leaves free vibration behind."""
+    return bool(getattr(carriage.rider.motion, "after", 0.0) > 0.0)
 
 
 def check_free_vibration(model: SceneModel) -> None:
     """Refuse free vibration with springs by a conditionally stable scheme: its steps follow from the bodies' modes
     alone, whatever the springs of a variant. Raises BadInput."""
     for carriage in model.carriages:
-        if math.isfinite(model.scheme.stability_limit) and getattr(carriage.rider.motion, "after", 0.0) > 0.0:
+        if math.isfinite(model.scheme.stability_limit) and vibrates_freely(carriage):
             raise BadInput(
                 "free vibration with springs needs a scheme that is stable with any step",
                 where=model.study.source.where(f"carriage.{carriage.name}.motion.after"),
@@ -105,7 +110,7 @@ def check_free_vibration(model: SceneModel) -> None:
             )
 
 
-def _least_for_limit(model: SceneModel, values: LaneValues) -> Array:
+def least_for_limit(model: SceneModel, values: LaneValues) -> Array:
     """(V,) steps at which the coupled scene reaches the scheme's limit, at most."""
     highest = np.sqrt(float(model.omega.max()) ** 2 + contact_omega(model, values) ** 2)
     return np.asarray(highest * values.time_scale(model.carriages[0].name) / model.scheme.stability_limit)

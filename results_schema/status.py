@@ -54,7 +54,7 @@ class Fidelity(IntEnum):
 
 
 class SchemeUsed(IntEnum):
-    """The time integration scheme a variant was marched with; statics count as the first.
+    """The time integration scheme a variant was marched with, or would have been.
 
     >>> label(SchemeUsed.FOX_GOODWIN)
     'fox-goodwin'

@@ -217,7 +217,9 @@ declare(
     EVERY_KIND,
     Variable("status", (), "int8", None, "status of the variant", "the highest that applies", Status),
     Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
-    Variable("modes_used", (), "int32", long_name="number of modes used", meaning="number of modes marched"),
+    Variable(
+        "modes_used", (), "int32", long_name="number of modes used", meaning="0 for statics, which know all modes"
+    ),
     Variable("steps_used", (), "int32", long_name="number of steps used", meaning="steps over one passage or cycle"),
     Variable(
         "scheme_used",

@@ -96,6 +96,7 @@ def _as_json(results: Results, model: Fidelity, which: NDArray[np.bool_]) -> dic
         "variants": int(which.sum()),
         "modes": [int(modes.min()), int(modes.max())],
         "steps": [int(steps.min()), int(steps.max())],
+        "schemes": [label(SchemeUsed(int(number))) for number in np.unique(known(of_variants(results, SCHEME)[which]))],
         "largest_error_estimate": float(known(errors).max()) if known(errors).size else None,
         "without_estimate": int(np.isnan(errors).sum()),
         "mean_relative_cost": float(known(cost).mean()) if known(cost).size else None,

@@ -60,7 +60,17 @@ def preview(plan: Plan, threads: int) -> Preview:
         f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
         f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk.{_audit(plan)}"
     )
-    return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks(plan)))
+    return Preview(tuple(table for table in tables if table.rows), cost, (*_foreseen(plan), *remarks(plan)))
+
+
+def _foreseen(plan: Plan) -> Iterator[str]:
+    """How far the table of the choice can be believed."""
+    told = np.concatenate([bucket.told.error_modes + bucket.told.error_steps for bucket in plan.buckets])
+    if np.isnan(told).any():
+        yield (
+            "errors of rates, contact forces and whatever rides are not known before the march: it begins with the "
+            "carriages' own model, and what misses the tolerance is marched again, which may take many times as long"
+        )
 
 
 def _audit(plan: Plan) -> str:

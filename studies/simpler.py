@@ -12,7 +12,8 @@ from engine.lanes import LaneValues
 from engine.model import SceneModel
 from engine.plan import Plan
 from engine.scenes import scenes
-from results_schema.status import Fidelity, label
+from results_schema.status import Fidelity
+from studies.choices import NAMES
 from studies.words import number
 
 Array = NDArray[np.float64]
@@ -66,7 +67,7 @@ def _row(rungs: Sequence[Rung], tolerance: Array, full: Array) -> tuple[str, ...
     span = [_size(value) for value in (known.min(), known.max())] if known.size else ["none"]
     shown = span[0] if span[0] == span[-1] else " to ".join(span)
     share = number(100.0 * float(np.mean(error <= tolerance)))
-    return label(rungs[0].fidelity), shown, f"{share} %", number(float(cost.sum() / full.sum()), 2)
+    return NAMES[rungs[0].fidelity], shown, f"{share} %", number(float(cost.sum() / full.sum()), 2)
 
 
 def _size(error: float) -> str:

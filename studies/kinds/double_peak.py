@@ -121,7 +121,9 @@ class DoublePeakReduction:
     def differences(self, compared: Compared) -> dict[str, Array]:
         """Harmonics, and the values of peaks that are the same in both. A bump near the least prominence is a peak in
         one and none in the other without being an error; the harmonics see what matters of it."""
-        harmonics = compared.gap("harmonic").max(axis=2)
+        gaps = compared.gap("harmonic")
+        known = ~np.isnan(gaps).all(axis=2)  # few steps tell few harmonics
+        harmonics = np.where(known, np.max(np.where(np.isnan(gaps), -np.inf, gaps), axis=2), np.nan)
         return {"peak_value": compared.relative(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
 
 

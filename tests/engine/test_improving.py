@@ -17,7 +17,7 @@ from engine.lanes import LaneValues
 from engine.plan import make_plan
 from engine.scene import Study
 from results_schema.status import Fidelity, Status
-from tests.engine.build import beam, cruise, mass, study
+from tests.engine.build import beam, cruise, fixed, mass, oscillator, study
 
 Array = NDArray[np.float64]
 
@@ -163,3 +163,22 @@ def test_improved_variants_do_not_depend_on_chunks(chunk: int, monkeypatch: pyte
     whole, parts = run(given, threads=1), run(given, threads=2, chunk=chunk)
     for name in ("midspan_max", "midspan", "error_estimate", "relative_cost", "modes_used", "steps_used", "status"):
         np.testing.assert_array_equal(whole[name].values, parts[name].values)
+
+
+def test_a_model_that_turns_out_too_simple_gives_way_to_the_carriages_own() -> None:
+    moving = oscillator(0.486, 923.56, cruise(-0.2, 0.8, 0.134)) | {"damping": 2.12}
+    bed = beam(modes="auto", supports="clamped-free", damping_ratio=0.1)
+    given = study(bed, {"car": moving, "two": moving | {"headway": 0.2}}, sensor={"mid": fixed(0.45)})
+    (bucket,) = make_plan(given).buckets
+    assert bucket.scene.fidelity is Fidelity.MASS
+    found, truth = run(given), run(given.with_values({"solver.fidelity": "full", "body.bed.modes": 24}))
+    assert found.fidelity_used.item() == Fidelity.TIED and found.status.item() == Status.OK
+    assert found.error_fidelity.item() == 0.0
+    for end in ("mid_max", "mid_min"):
+        assert abs(found[end].item() - truth[end].item()) <= 1e-3 * truth.mid_static.item()
+
+
+def test_nothing_is_improved_without_a_sensor() -> None:
+    bare = run(study(OPEN, mass(0.3, CROSSING), sensor={}))
+    read = run(study(OPEN, mass(0.3, CROSSING)))
+    assert bare.status.item() == Status.UNRESOLVED and bare.relative_cost.item() < 2.0 * read.relative_cost.item()

@@ -314,3 +314,11 @@ def test_a_study_without_sensors_or_sweep() -> None:
 def test_nothing_moves() -> None:
     with pytest.raises(BadInput, match="nothing moves"):
         make_plan(study(beam(), {}))
+
+
+def test_the_full_model_may_want_more_steps_than_are_marched() -> None:
+    """What costs are compared with refuses nothing where no step is open."""
+    slow = study(beam(modes="auto", damping_ratio=0.02), force(1.0, cruise(0.0, 1.0, 1e-7)))
+    for solver in ({"fidelity": "static"}, {"steps": 2000, "fidelity": "force"}):
+        (bucket,) = make_plan(slow.with_values({f"solver.{key}": value for key, value in solver.items()})).buckets
+        assert bucket.full_cost.item() > 1e9

@@ -129,3 +129,17 @@ def test_stairs_are_rounded_counts() -> None:
     steps = stair(1e6)
     assert steps[-1] >= 1e6 > steps[-2] and np.all(np.diff(steps) > 0.0)
     assert np.all(steps[1:] / steps[:-1] <= 2.0)
+
+
+@pytest.mark.parametrize("after", [0.0, 2.0])
+@pytest.mark.parametrize("model", ["force", "mass"])
+def test_comparisons_with_springs_keep_inside_the_limit(model: str, after: float) -> None:
+    """A comparison beyond it would tell errors of any size."""
+    sweep = {"k": {"of": "carriage.car.stiffness", "values": [50.0, 362.0, 1357.0, 5083.0, 1e6]}}
+    moving = oscillator(0.02, 50.0, cruise(0.3, 1.0, 0.1) | {"after": after})
+    found = run(study(UNDAMPED, moving, sweep=sweep, solver={"fidelity": model}))
+    assert np.all(found.error_fidelity.values < 10.0) and np.all(found.error_steps.values < 1e-2)
+    bare = study(UNDAMPED | {"modes": 2}, oscillator(0.1, 500.0, cruise(0.0, 1.0, 0.1)))
+    for solver in ({"steps": 600}, {"fidelity": model}):
+        told = run(bare.with_values({"solver.scheme": "fox-goodwin"} | {f"solver.{k}": v for k, v in solver.items()}))
+        assert 0.0 < told.error_estimate.item() < 1.0

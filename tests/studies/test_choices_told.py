@@ -25,4 +25,5 @@ def test_every_model_has_an_entry_of_its_own() -> None:
     results = found()
     (entry,) = as_json(results)
     assert entry["model"] == "mass" and entry["variants"] == 2 and entry["without_estimate"] == 0
-    assert entry["modes"] == [4, 6] and entry["largest_error_estimate"] == results.dataset.error_estimate.values.max()
+    assert entry["modes"] == [4, 6] and entry["schemes"] == ["average-acceleration", "fox-goodwin"]
+    assert entry["largest_error_estimate"] == results.dataset.error_estimate.values.max()

@@ -9,7 +9,7 @@ import numpy as np
 from engine.ladder import ladder
 from engine.plan import make_plan
 from engine.scene import Study
-from results_schema.status import label
+from studies.choices import NAMES
 from studies.preview import SIMPLER, Table, preview
 from studies.simpler import MOST_SCENES, _looked_at
 from tests.engine.build import beam, cruise, mass, study
@@ -30,10 +30,10 @@ def test_rows_tell_errors_share_and_cost() -> None:
     given = swept(SPEEDS, tolerance=1e-2)
     plan = make_plan(given)
     (table,) = shown(given)
-    assert [row[0] for row in table.rows] == ["static", "force", "mass-without-convective"]
+    assert [row[0] for row in table.rows] == ["statics", "moving force", "moving mass without convective terms"]
     rungs = ladder(plan.base, plan.values(plan.buckets[0], np.arange(plan.size)))
     for row, rung in zip(table.rows, rungs[:-1], strict=True):
-        assert row[0] == label(rung.fidelity)
+        assert row[0] == NAMES[rung.fidelity]
         assert row[2] == f"{100 * float(np.mean(rung.error <= 1e-2)):g} %"
     assert 0 < float(table.rows[0][2].split()[0]) < 100
     assert [row[3] for row in table.rows] == ["0", "1", "1"]
