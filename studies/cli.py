@@ -155,5 +155,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _keep_linear_algebra_to_one_thread() -> None:
     """Tell OpenBLAS so before numpy loads it. The threads are the march's own; those of OpenBLAS wait for each other
-    longer than a product of small matrices takes, and let its last bits depend on the number of cores."""
+    longer than a product of small matrices takes."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
