@@ -1,23 +1,34 @@
 """Every output declared once: name, dimensions, type, unit, meaning.
 
-Checks, attributes in the archive and the table in docs/results.md derive from the declarations here and from those that
-each kind of study adds with `declare`. Names are templates: `{sensor}`, `{carriage}` and `{envelope}` stand for every
-sensor's, carriage's and envelope's name.
+Checks, attributes in the archive and the table in docs/results.md derive from the declarations here (`shared`) and from
+those that each kind of study adds with `declare`. Names are templates: `{sensor}`, `{carriage}` and `{envelope}` stand
+for every sensor's, carriage's and envelope's name.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import IntEnum
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Literal
 
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity, SchemeUsed, Status, flag_meanings, flag_values
+from results_schema.shared import MARCH
+from results_schema.variable import AXES, EVERY_KIND, REGISTRY, Variable, declare
 
-EVERY_KIND = "*"
-AXES = "axes"
+__all__ = [
+    "AXES",
+    "EVERY_KIND",
+    "MARCH",
+    "QUANTITY_UNITS",
+    "RESERVED",
+    "Variable",
+    "axes",
+    "declarations",
+    "declare",
+    "expand",
+    "registered",
+    "sensor_unit",
+]
 
 QUANTITY_UNITS: Mapping[str, str] = {
     "displacement": "m",
@@ -44,75 +55,22 @@ _RESERVED_WORDS = """
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
 
 
-@dataclass(frozen=True)
-class Variable:
-    """One output, or one template for the outputs of every sensor, carriage or envelope.
-
-    dims: dimensions beyond the leading ones; "a|b" allows either.
-    units: udunits text; "{sensor}", "{envelope}" are its own unit, "" dimensionless.
-    lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
-        (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
-    nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
-    planned: no version writes it yet; left out of the table for people.
-    gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
-    """
-
-    name: str
-    dims: tuple[str, ...] = ()
-    dtype: str = "float64"
-    units: str | None = ""
-    long_name: str = ""
-    meaning: str = ""
-    flags: type[IntEnum] | None = None
-    required: bool = True
-    nan_allowed: bool = False
-    gaps_allowed: bool = False
-    planned: bool = False
-    lead: Literal["grid", "history", "none"] = "grid"
-
-    def attributes(self) -> dict[str, Any]:
-        """CF attributes of an expanded variable; `comment` holds the meaning.
-
-        `flag_values` is a list of int: the writer stores it in the variable's dtype.
-        """
-        found: dict[str, Any] = {"long_name": self.long_name}
-        if self.flags is not None:
-            found |= {"flag_values": flag_values(self.flags), "flag_meanings": flag_meanings(self.flags)}
-        elif self.units is not None and self.dtype != "str":
-            found["units"] = self.units or "1"
-        return found | ({"comment": self.meaning} if self.meaning else {})
-
-
-_REGISTRY: dict[str, dict[str, Variable]] = {}
-
-
-def declare(kind: str, *variables: Variable) -> None:
-    """Add the outputs of a kind of study ("*": of every kind, "axes": coordinates, "/audit": of a group).
-
-    Raises ValueError when a name is declared again with another meaning.
-    """
-    known = _REGISTRY.setdefault(kind, {})
-    for variable in variables:
-        if known.setdefault(variable.name, variable) != variable:
-            raise ValueError(f"{variable.name} of {kind} is declared twice: expected {known[variable.name]}")
-
-
 def registered() -> dict[str, tuple[Variable, ...]]:
     """Every kind with the declarations of its own, in the order they were made."""
-    return {kind: tuple(variables.values()) for kind, variables in _REGISTRY.items()}
+    return {kind: tuple(variables.values()) for kind, variables in REGISTRY.items()}
 
 
 def declarations(kind: str) -> tuple[Variable, ...]:
     """What a dataset of this kind may hold: the outputs of every kind, then its own (a group: only its own)."""
     if kind.startswith("/"):
-        return tuple(_REGISTRY.get("/" + kind.split("/")[1], {}).values())
-    shared = {} if kind in (EVERY_KIND, AXES) else _REGISTRY.get(EVERY_KIND, {})
-    return tuple({**shared, **_REGISTRY.get(kind, {})}.values())
+        return tuple(REGISTRY.get("/" + kind.split("/")[1], {}).values())
+    shared = {} if kind in (EVERY_KIND, AXES) else REGISTRY.get(EVERY_KIND, {})
+    return tuple({**shared, **REGISTRY.get(kind, {})}.values())
 
 
 def axes() -> dict[str, Variable]:
     """The declared coordinates by name."""
-    return dict(_REGISTRY[AXES])
+    return dict(REGISTRY[AXES])
 
 
 def expand(
@@ -166,350 +124,6 @@ def _filled(variable: Variable, word: str, name: str, unit: str) -> Variable:
         meaning=variable.meaning.replace(mark, name),
         units=None if variable.units is None else variable.units.replace(mark, unit),
     )
-
-
-def _axis(name: str, long_name: str, units: str = "", dtype: str = "float64", meaning: str = "") -> Variable:
-    return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
-
-
-def _planned(name: str, long_name: str, units: str = "", dtype: str = "float64") -> Variable:
-    return replace(_axis(name, long_name, units, dtype), planned=True)
-
-
-declare(
-    AXES,
-    Variable(
-        "speed_ratio",
-        long_name="speed ratio",
-        meaning="speed over omega_1 L / pi, L the length of the track",
-        required=False,
-    ),
-    Variable("mass_ratio", long_name="mass ratio", meaning="carriage mass over body mass", required=False),
-    _axis("position", "position of the first carriage on its track", "m"),
-    _axis("phase", "phase of the last cycle", meaning="0 to 1, 0 where the motion's formula starts"),
-    _axis("station", "number of the recorded instant", dtype="int64"),
-    Variable(
-        "elapsed",
-        ("position|phase|station",),
-        units="s",
-        long_name="time since the start",
-        required=False,
-        lead="history",
-    ),
-    _axis("history", "flat number of the variant in the sweep's grid, last axis fastest", dtype="int64"),
-    _axis("variant", "number of the variant of a sampled or zipped sweep", dtype="int64"),
-    _axis("direction", "direction of travel", dtype="str", meaning="forward is from start to end"),
-    _axis("sensor", "sensor", dtype="str"),
-    Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
-    _axis("peak", "number of the peak in the cycle", dtype="int64"),
-    _axis("mode", "number of the mode, from 1", dtype="int64"),
-    _axis("sample", "flat number of the variant that was run again", dtype="int64"),
-    _axis("scheme", "time integration scheme", dtype="str"),
-    _axis("step_count", "steps over one passage or cycle", dtype="int64"),
-    _axis("mode_count", "number of modes", dtype="int64"),
-    _axis("quantity", "measured quantity", dtype="str"),
-    _axis("relative_step", "omega_1 times the time step"),
-    _planned("robot", "robot", dtype="str"),
-    _planned("component", "component of the vector", dtype="str"),
-)
-
-declare(
-    EVERY_KIND,
-    Variable("status", (), "int8", None, "status of the variant", "the highest that applies", Status),
-    Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
-    Variable(
-        "modes_used", (), "int32", long_name="number of modes used", meaning="0 for statics, which know all modes"
-    ),
-    Variable("steps_used", (), "int32", long_name="number of steps used", meaning="steps over one passage or cycle"),
-    Variable(
-        "scheme_used",
-        (),
-        "int8",
-        None,
-        "time integration scheme used",
-        "of average acceleration and Fox-Goodwin the cheaper one that holds the tolerance, where it is left open",
-        SchemeUsed,
-        required=False,
-    ),
-    Variable(
-        "diverged_step",
-        (),
-        "int64",
-        long_name="first step at which the variant had diverged",
-        meaning="counted from the start; -1 where it has not",
-        required=False,
-    ),
-    Variable(
-        "error_estimate",
-        long_name="estimated relative error",
-        meaning="sum of the parts from steps, modes and model, each the largest over the sensors of what the study "
-        "reports of them, divided by the largest static value of that sensor (velocity and acceleration: by their own "
-        "largest value); NaN where a part is not known",
-        required=False,
-        nan_allowed=True,
-    ),
-    Variable(
-        "error_steps",
-        long_name="part of the estimated relative error that comes from the time step",
-        meaning="from the difference to a march with half or twice the steps: of extremes and what the kind of study "
-        "makes of histories, no less than 0.3 of the largest difference over time (trajectory: all of it)",
-        required=False,
-        nan_allowed=True,
-    ),
-    Variable(
-        "error_modes",
-        long_name="part of the estimated relative error that comes from the number of modes",
-        meaning="likewise, from the difference between marches with all and with half the modes; 0 for statics, which "
-        "know all modes",
-        required=False,
-        nan_allowed=True,
-    ),
-    Variable(
-        "error_fidelity",
-        long_name="part of the estimated relative error that comes from the choice of model",
-        meaning="what the model leaves out of the carriages' own: the difference to a march of that; told before it "
-        "runs for statics, and where springs or masses would want more steps; 0 for their own",
-        required=False,
-        nan_allowed=True,
-    ),
-    Variable(
-        "relative_cost",
-        long_name="cost over that of the full model",
-        meaning="modes x steps of all marches of the variant, also those that it is compared with and first ones that "
-        "missed the tolerance, over those of the carriages' own model with 20 modes (or what the study fixes) and the "
-        "steps that all rules ask for",
-        required=False,
-        nan_allowed=True,
-    ),
-)
-
-
-def _extreme(which: str, word: str) -> tuple[Variable, Variable]:
-    return (
-        Variable(
-            f"{{sensor}}_{which}",
-            units="{sensor}",
-            long_name=f"{word} value of {{sensor}}",
-            meaning="over all step instants (asymmetry, double-peak: of the last cycle)",
-        ),
-        Variable(
-            f"{{sensor}}_{which}_position",
-            units="m",
-            long_name=f"position of the first carriage at the {word} value of {{sensor}}",
-            meaning="whichever carriage the sensor belongs to; NaN where the first one was off its body",
-            nan_allowed=True,
-        ),
-    )
-
-
-EXTREMES: tuple[Variable, ...] = (*_extreme("max", "largest"), *_extreme("min", "smallest"))
-ROOT_MEAN_SQUARES: tuple[Variable, ...] = (
-    Variable(
-        "{sensor}_rms",
-        units="{sensor}",
-        long_name="root mean square of {sensor}",
-        meaning="over the same instants as the extremes",
-        required=False,
-    ),
-)
-CONTACT_FORCES: tuple[Variable, ...] = (
-    Variable(
-        "{carriage}_contact_force_max",
-        units="N",
-        long_name="largest contact force of {carriage}",
-        meaning="over 0-98 % of the span; NaN where the carriage is never there",
-        nan_allowed=True,
-    ),
-    Variable(
-        "{carriage}_contact_force_min",
-        units="N",
-        long_name="smallest contact force of {carriage}",
-        meaning="over 0-98 % of the span; NaN where the carriage is never there",
-        nan_allowed=True,
-    ),
-    Variable(
-        "{carriage}_contact_force_min_position",
-        units="m",
-        long_name="position of {carriage} at its smallest contact force",
-        meaning="of its reference; NaN where that is off the body, or it never touches it",
-        nan_allowed=True,
-    ),
-    Variable(
-        "{carriage}_separation_position",
-        units="m",
-        long_name="first position of {carriage} with a negative contact force",
-        meaning="NaN where the contact holds",
-        nan_allowed=True,
-        required=False,
-    ),
-)
-HISTORIES: tuple[Variable, ...] = (
-    Variable(
-        "{sensor}",
-        ("position|phase|station",),
-        units="{sensor}",
-        long_name="history of {sensor}",
-        meaning="at the instants of `elapsed`; NaN where a sensor under a carriage is off the body",
-        required=False,
-        lead="history",
-        gaps_allowed=True,
-    ),
-    Variable(
-        "{carriage}_position",
-        ("position|phase|station",),
-        units="m",
-        long_name="position of {carriage}",
-        meaning="NaN where it is off the body",
-        required=False,
-        lead="history",
-        gaps_allowed=True,
-    ),
-)
-ENVELOPES: tuple[Variable, ...] = (
-    *(
-        Variable(
-            f"{{envelope}}_envelope_{which}",
-            ("{envelope}_place",),
-            units="{envelope}",
-            long_name=f"{word} value at each place of {{envelope}}",
-            meaning="over the same instants as the extremes of sensors",
-        )
-        for which, word in (("max", "largest"), ("min", "smallest"))
-    ),
-    Variable(
-        "{envelope}_place",
-        ("{envelope}_place",),
-        units="m",
-        long_name="place of {envelope} along its body",
-        meaning="a coordinate",
-        required=False,
-        lead="none",
-    ),
-)
-MARCH: tuple[Variable, ...] = (*EXTREMES, *ROOT_MEAN_SQUARES, *CONTACT_FORCES, *HISTORIES, *ENVELOPES)
-
-declare("march", *MARCH)
-
-declare(
-    "/model",
-    Variable("frequency", ("mode",), units="Hz", long_name="natural frequency of the body", lead="none"),
-    Variable("damping_ratio", ("mode",), long_name="damping ratio of the mode", lead="none", required=False),
-    Variable(
-        "mode_shape",
-        ("mode", "position"),
-        units="kg-0.5",
-        long_name="mode shape on the track",
-        meaning="unit modal mass",
-        lead="none",
-        required=False,
-    ),
-)
-
-
-def _history(name: str, words: str, meaning: str = "") -> Variable:
-    dims = ("sample", "sensor", "station")
-    return Variable(name, dims, units=None, long_name=words, meaning=meaning, lead="none", nan_allowed=True)
-
-
-def _gap(name: str, words: str, meaning: str) -> Variable:
-    return Variable(name, ("sample", "sensor"), long_name=words, meaning=meaning, lead="none", nan_allowed=True)
-
-
-_SAMPLED = ("sample", "station")
-declare(
-    "/unreduced",
-    _history("marched", "history by the march of modes", "in the unit of its sensor"),
-    _history("marched_static", "static response by the modes at the same places"),
-    _history("unreduced", "history by the unreduced finite-element model"),
-    _history("unreduced_static", "static response by the unreduced model at the same places"),
-    Variable("elapsed", _SAMPLED, units="s", long_name="time since the start", lead="none", nan_allowed=True),
-    Variable(
-        "position",
-        _SAMPLED,
-        units="m",
-        long_name="position of the first carriage",
-        meaning="NaN where it is off its body",
-        lead="none",
-        nan_allowed=True,
-    ),
-    _gap(
-        "difference",
-        "largest difference of both models",
-        "of their histories, over the range of the unreduced model's; NaN where that does not vary",
-    ),
-    _gap(
-        "dynamic_difference",
-        "largest difference of the dynamic parts",
-        "history less static response at the same places, each model with its own; over the range of the unreduced "
-        "model's dynamic part",
-    ),
-    _gap(
-        "static_difference",
-        "largest difference of the static responses",
-        "of both models at the same places, over the range of the unreduced model's",
-    ),
-    _gap("dynamic_range", "range of the unreduced model's dynamic part", "of that part, over the range of its history"),
-    Variable("sensor_quantity", ("sensor",), "str", long_name="quantity of the sensor", lead="none"),
-    Variable(
-        "degrees_of_freedom",
-        ("sample",),
-        "int64",
-        long_name="degrees of freedom of the unreduced model",
-        lead="none",
-    ),
-    Variable(
-        "unreduced_steps",
-        ("sample",),
-        "int64",
-        long_name="steps of the unreduced model over the whole way",
-        lead="none",
-    ),
-)
-
-
-def _audited(name: str, words: str, meaning: str, dtype: str = "float64", nan_allowed: bool = False) -> Variable:
-    return Variable(name, ("sample",), dtype, long_name=words, meaning=meaning, lead="none", nan_allowed=nan_allowed)
-
-
-declare(
-    "/audit",
-    _audited(
-        "observed_error",
-        "observed relative error",
-        "largest difference of what the variant reports from the same computed again with all terms, twice the modes "
-        "and four times the steps or more: of extremes, peaks and harmonics over the largest static value of the "
-        "sensor (velocity and acceleration: over its own largest value), of the lag over the cruise's length, of "
-        "odd_rms and even_excess themselves; NaN where it could not be compared",
-        nan_allowed=True,
-    ),
-    _audited(
-        "estimated_error",
-        "estimated relative error",
-        "the estimate of the archive for the same variant; NaN where it has none",
-        nan_allowed=True,
-    ),
-    _audited("tolerance_asked", "tolerance", "solver.tolerance of the variant"),
-    _audited("worst_result", "result with the largest difference", "and its sensor", dtype="str"),
-    _audited("modes_used", "number of modes of the audit", "", dtype="int32"),
-    _audited("steps_used", "number of steps of the audit", "over one passage or cycle", dtype="int32"),
-    Variable(
-        "variant_status",
-        ("sample",),
-        "int8",
-        long_name="status of the variant",
-        meaning="that of the study: no tolerance is promised but to those that are ok",
-        flags=Status,
-        lead="none",
-    ),
-    Variable(
-        "left_out",
-        (),
-        "int64",
-        long_name="variants that were picked for the audit and have no values",
-        meaning="not among the samples",
-        lead="none",
-    ),
-)
 
 
 def sensor_unit(quantity: str) -> str:

@@ -56,7 +56,7 @@ def test_a_variable_over_sensors_of_different_units_has_none():
         with pytest.raises(ValueError, match="declared twice"):
             declare("test-units", Variable("amount", long_name="other"))
     finally:
-        variables._REGISTRY.pop("test-units")
+        variables.REGISTRY.pop("test-units")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,65 @@
+"""One output as it is declared: name, dimensions, type, unit, meaning; and the registry of all declarations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Literal
+
+from results_schema.status import flag_meanings, flag_values
+
+EVERY_KIND = "*"
+AXES = "axes"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One output, or one template for the outputs of every sensor, carriage or envelope.
+
+    dims: dimensions beyond the leading ones; "a|b" allows either.
+    units: udunits text; "{sensor}", "{envelope}" are its own unit, "" dimensionless.
+    lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
+        (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
+    nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
+    planned: no version writes it yet; left out of the table for people.
+    gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
+    """
+
+    name: str
+    dims: tuple[str, ...] = ()
+    dtype: str = "float64"
+    units: str | None = ""
+    long_name: str = ""
+    meaning: str = ""
+    flags: type[IntEnum] | None = None
+    required: bool = True
+    nan_allowed: bool = False
+    gaps_allowed: bool = False
+    planned: bool = False
+    lead: Literal["grid", "history", "none"] = "grid"
+
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes of an expanded variable; `comment` holds the meaning.
+
+        `flag_values` is a list of int: the writer stores it in the variable's dtype.
+        """
+        found: dict[str, Any] = {"long_name": self.long_name}
+        if self.flags is not None:
+            found |= {"flag_values": flag_values(self.flags), "flag_meanings": flag_meanings(self.flags)}
+        elif self.units is not None and self.dtype != "str":
+            found["units"] = self.units or "1"
+        return found | ({"comment": self.meaning} if self.meaning else {})
+
+
+REGISTRY: dict[str, dict[str, Variable]] = {}
+
+
+def declare(kind: str, *variables: Variable) -> None:
+    """Add the outputs of a kind of study ("*": of every kind, "axes": coordinates, "/audit": of a group).
+
+    Raises ValueError when a name is declared again with another meaning.
+    """
+    known = REGISTRY.setdefault(kind, {})
+    for variable in variables:
+        if known.setdefault(variable.name, variable) != variable:
+            raise ValueError(f"{variable.name} of {kind} is declared twice: expected {known[variable.name]}")
