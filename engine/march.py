@@ -31,7 +31,7 @@ from engine.kernels.march import march_many, march_one
 from engine.kernels.start import settle, strike, watch_start
 from engine.lanes import LaneTable, LaneValues, from_blocks, lane_table
 from engine.starting import initial_state
-from engine.tables import SceneTables
+from engine.tables import SceneTables, SegmentTable
 from engine.timeline import Segment
 from engine.track import tabulate_blow
 
@@ -73,15 +73,16 @@ class March:
         """All segments, once. ``halted`` is asked after each; raises Halted when it says so."""
         before = False
         for segment in self.tables.timeline.segments:
-            self._segment(segment, segment.fresh or (segment.recorded and not before))
+            table = self.tables.table(segment)  # built again each time where there are many
+            self._segment(segment, table, segment.fresh or (segment.recorded and not before))
             before = segment.recorded
             if halted():
                 raise Halted
 
-    def _segment(self, segment: Segment, unseen: bool) -> None:
+    def _segment(self, segment: Segment, table: SegmentTable, unseen: bool) -> None:
         """The impulse and the new accelerations of a segment's event, its first station, its steps."""
-        model, table = self.tables.model, self.tables.table(segment)
-        watch, record = self._observed(segment)
+        model = self.tables.model
+        watch, record = self._observed(segment, table)
         stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
@@ -102,9 +103,8 @@ class March:
             if spring.carriage in arriving:
                 self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0
 
-    def _observed(self, segment: Segment) -> tuple[Watch, Record]:
+    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Watch, Record]:
         """What is observed along a segment, and where it is kept."""
-        table = self.tables.table(segment)
         if not segment.recorded:
             return table.guard, Record(self.guard, rows_sampled(segment, self.counts[:0]), self.history)
         return table.watch, Record(self.marks, rows_sampled(segment, self.counts), self.history)

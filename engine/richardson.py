@@ -18,7 +18,7 @@ from engine.kernels.pairs import extrapolate, survey
 from engine.lanes import LaneValues, from_blocks
 from engine.march import Halted, March, Marched, march, prepare
 from engine.quasistatic import rest
-from engine.tables import SceneTables
+from engine.tables import SceneTables, SegmentTable
 from engine.timeline import Segment
 from results_schema.status import Fidelity
 
@@ -70,24 +70,25 @@ def relative_error(tables: SceneTables, marched: Marched, gap: Array, statics: A
 class _Histories(March):
     """A march that hands over the histories of all its signals, segment by segment."""
 
-    def along(self, segment: Segment) -> Array:
-        """(blocks, S, signals, LANES): march a segment; its signals at all stations, whether they count or not."""
-        signals = self.watch(segment).offset.shape[1]
-        history = np.empty((self.marks.shape[0], segment.steps + 1, signals, LANES))
-        replace(self, history=history)._segment(segment, True)
-        return history
-
-    def watch(self, segment: Segment) -> Watch:
-        """What is observed along a segment."""
+    def along(self, segment: Segment) -> tuple[Array, NDArray[np.bool_]]:
+        """March a segment: its signals (blocks, S, signals, LANES) at all stations, and where they count."""
         table = self.tables.table(segment)
-        return table.watch if segment.recorded else table.guard
+        watch = _watched(segment, table)
+        history = np.empty((self.marks.shape[0], segment.steps + 1, watch.offset.shape[1], LANES))
+        replace(self, history=history)._segment(segment, table, True)
+        return history, watch.counted
 
-    def _observed(self, segment: Segment) -> tuple[Watch, Record]:
-        watch = self.watch(segment)
+    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Watch, Record]:
+        watch = _watched(segment, table)
         marks = np.zeros_like(self.marks[:, : watch.offset.shape[1]])
         marks[:, :, LARGEST], marks[:, :, SMALLEST] = np.inf, -np.inf  # nothing is news: `survey` looks for extremes
         record = Record(marks, np.arange(segment.steps + 1), self.history)
         return watch._replace(counted=np.ones_like(watch.counted)), record
+
+
+def _watched(segment: Segment, table: SegmentTable) -> Watch:
+    """What is observed along a segment."""
+    return table.watch if segment.recorded else table.guard
 
 
 def _whole_histories(tables: SceneTables, values: LaneValues, counts: Counts) -> _Histories:
@@ -115,8 +116,7 @@ class _Pair:
 
     def along(self, segment: Segment, coarse_segment: Segment) -> None:
         """One segment of both, extrapolated and observed."""
-        fine, coarse = self.fine.along(segment), self.coarse.along(coarse_segment)
-        counted = self.fine.watch(segment).counted
+        (fine, counted), (coarse, _) = self.fine.along(segment), self.coarse.along(coarse_segment)
         signals = fine.shape[2]
         gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
         extrapolate(fine, coarse, counted, gap)

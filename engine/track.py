@@ -25,7 +25,8 @@ def tabulate_ties(
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
     `grips.residual`, where it is known."""
     stations = along[0].s.size
-    rows = np.zeros((stations, model.omega.size, model.ties, 4))
+    columns = np.zeros((4, model.ties, stations, model.omega.size))  # each is filled, and looked at, in one piece
+    rows = columns.transpose(2, 3, 1, 0)
     drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
     for r in range(model.ties):
         _tabulate_force(model, r, along, rows[:, :, r, FORCE])
@@ -45,7 +46,7 @@ def tabulate_ties(
     unity = np.ones(model.ties)
     unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
     missed = residual(model, along) if missed is None else missed
-    reaches = np.asarray(rows.any(axis=(0, 3)))
+    reaches = np.ascontiguousarray(((columns.min(axis=2) < 0.0) | (columns.max(axis=2) > 0.0)).any(axis=0).T)
     return Ties(np.ascontiguousarray(rows), drive, level, reacting, given, moves, springs, missed, unity, reaches)
 
 
