@@ -26,7 +26,8 @@ FEW, MORE = 4, 3  # fewer modes than these are compared with so many more, other
 USUAL = 1e-3  # the tolerance at which `STEPS_PER_PERIOD` is right where nothing is known
 MOST_SIMPLER = 0.7  # of the tolerance that a simpler model may take
 FINER = 2.0  # times the steps that are safe: half of them must be so too
-MOST_CHOSEN = 1e6  # steps over a passage or cycle for the sake of the tolerance; what asks for more misses it
+AIM = 0.6  # of the tolerance that choices aim at: of 100 errors some two are beyond 1/0.6 times their estimate
+MOST_CHOSEN = 4e6  # steps over a passage or cycle for the sake of the tolerance; what asks for more misses it
 
 
 class Asked(NamedTuple):

@@ -2,8 +2,8 @@
 
 Differences are of what the study reports, extremes and what its kind makes of histories, but no less than a part of
 what the whole histories differ by at common stations (mechanics section 6: two extremes alone may agree by chance).
-Where every mode that rings noticeably is resolved (`resolution`), a march misses the part of such a difference that
-`checking` tells; elsewhere nothing but the whole difference bounds its error.
+Where both marches resolve every mode that rings noticeably (`resolution`), one misses the part of such a difference
+that `checking` tells; elsewhere nothing but the whole difference bounds its error.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from results_schema.status import Fidelity, Status
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-HISTORY_PART = 0.3  # of what histories differ by that extremes may be off without differing
+HISTORY_PART = 0.5  # of what histories differ by that extremes may be off without differing
 DOUBTED = 1.5  # times what the ratio that is told beforehand makes of a difference of modes
 LEAST_PART, COUPLED_PART = 0.1, 0.6  # of such a difference that is missed at least, without and with a mass
 
@@ -50,11 +50,15 @@ class Errors(NamedTuple):
         """(V,) all parts together."""
         return self.fidelity + self.modes + self.steps
 
-    def status(self, study: Study, values: LaneValues, chosen: tuple[str, ...]) -> NDArray[np.int8]:
-        """(V,) whether what was left open holds the tolerance; chosen: bodies whose modes were left open."""
+    def left_open(self, study: Study, values: LaneValues, chosen: tuple[str, ...]) -> Array:
+        """(V,) error of what the study leaves open; chosen: bodies whose modes are so."""
         none = np.zeros_like(self.total)
         ours = (self.fidelity if study.solver.fidelity == "auto" else none) + (self.modes if chosen else none)
-        ours = ours + (none if fixed_steps(study, values) else self.steps)
+        return np.asarray(ours + (none if fixed_steps(study, values) else self.steps))
+
+    def status(self, study: Study, values: LaneValues, chosen: tuple[str, ...]) -> NDArray[np.int8]:
+        """(V,) whether that holds the tolerance."""
+        ours = self.left_open(study, values, chosen)
         found = np.where(ours > values.of("solver.tolerance"), Status.TOLERANCE_MISSED, Status.OK)
         return np.asarray(np.where(np.isnan(self.total), Status.UNRESOLVED, found), dtype=np.int8)
 
@@ -114,8 +118,8 @@ class Estimator:
         other, steps = own, missed
         if checks.steps is not None:
             other = self._march(checks.steps, own)
-            finer = max(checks.steps, own.tables, key=lambda tables: tables.steps)
-            resolved = phase_errors(finer, self._values, told.felt) <= RESOLVED
+            coarser = min(checks.steps, own.tables, key=lambda tables: tables.steps)
+            resolved = phase_errors(coarser, self._values, told.felt) <= RESOLVED
             steps = self._apart(own, other) * np.where(resolved, checks.missed, max(1.0, checks.missed))
         assert steps is not None
         modes = np.full(self.variants.size, np.nan)

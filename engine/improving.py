@@ -1,4 +1,4 @@
-"""Variants whose error turned out larger than their tolerance, and what they are marched again with."""
+"""Variants whose error turned out too large for their tolerance, and what they are marched again with."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from engine.bodies.body import MAX_MODES
 from engine.bucket import Bucket
-from engine.choice import FINER, LEVELS, MOST_CHOSEN, MOST_SIMPLER, fixed_steps, true_steps, usual_steps
-from engine.fidelity import STEPS_PER_PERIOD, safe_steps
+from engine.choice import FINER, LEVELS, MOST_CHOSEN, MOST_SIMPLER, USUAL, fixed_steps, true_steps
+from engine.estimates import Errors
+from engine.fidelity import safe_steps
 from engine.lanes import LaneValues
 from engine.model import simplified
 from engine.plan import Plan
@@ -22,10 +23,12 @@ from results_schema.status import Status
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-PART = 0.4  # of what the model leaves of the tolerance, for steps and for modes each
+ENOUGH = 0.7  # of the tolerance: a larger estimate may be of an error that misses it
+PART = 0.3  # of what the model leaves of the tolerance, for steps and for modes each
 LEAST_PART = 0.05  # of the tolerance itself, likewise
 MOST_COST = 10.0  # times the full model's at a tolerance of 1e-3 or more: what still misses it says so
-ROUNDS = 3  # of improving
+COST_ORDER = 1.5  # by which that grows with 1/tolerance below: modes k ring by 1/k^2 to 1/k^3, marches cost k^3
+ROUNDS = 4  # of improving
 AT_ONCE = 8  # times the steps before the next look
 NOT_LEFT = -1  # to be improved by modes or steps
 NEXT = (*LEVELS, 32, 48, MAX_MODES)  # numbers of modes to go on with
@@ -35,10 +38,11 @@ def improvements(
     plan: Plan, bucket: Bucket, variants: Counts, flat: Mapping[str, NDArray[Any]]
 ) -> Iterator[tuple[Bucket, Counts]]:
     """Buckets with more modes or steps, and which of the variants (numbers below V) they are for."""
-    status = flat["status"]
-    wanting = np.flatnonzero((status == Status.TOLERANCE_MISSED) | (status == Status.UNRESOLVED))
     done = bucket.rounds >= ROUNDS or bucket.checks is None or bucket.scene.scheme.stride > 1
-    if done or not wanting.size or not plan.study.sensor:  # without any nothing can be known
+    if done or not plan.study.sensor:  # without any nothing can be known
+        return
+    wanting = _wanting(plan, bucket, variants, flat)
+    if not wanting.size:
         return
     values = plan.values(bucket, variants[wanting])
     tolerance = values.of("solver.tolerance")
@@ -61,6 +65,15 @@ def improvements(
         for times in np.unique(by[by <= most]):
             if more or times > 1:
                 yield bucket.finer(more, int(times)), wanting[lanes[by == times]]
+
+
+def _wanting(plan: Plan, bucket: Bucket, variants: Counts, flat: Mapping[str, NDArray[Any]]) -> Counts:
+    """Variants (numbers below V) whose error is unknown or not small enough; none of those that have no result."""
+    values = plan.values(bucket, variants)
+    errors = Errors(*(flat[f"error_{part}"] for part in Errors._fields))
+    large = errors.left_open(plan.study, values, bucket.chosen) > ENOUGH * values.of("solver.tolerance")
+    status = flat["status"]
+    return np.flatnonzero((large & (status <= Status.TOLERANCE_MISSED)) | (status == Status.UNRESOLVED))
 
 
 def _with_own_model(plan: Plan, bucket: Bucket, variants: Counts, lanes: Counts) -> Iterator[tuple[Bucket, Counts]]:
@@ -87,7 +100,8 @@ def _power_of_two(ratio: Array) -> Counts:
 def _most_times(bucket: Bucket, modes: int, plan: Plan, variants: Counts) -> Counts:
     """(V,) powers of two by which the steps may grow, with so many modes, for what that is worth; 0 where not even as
     many as now are."""
-    worth = MOST_COST * np.maximum(1.0, usual_steps(plan.values(bucket, variants)) / STEPS_PER_PERIOD)
+    tighter = np.maximum(1.0, USUAL / plan.values(bucket, variants).of("solver.tolerance"))
+    worth = MOST_COST * tighter**COST_ORDER
     grown = max(1.0, modes * len(bucket.chosen) / bucket.scene.body_modes)
     ratio = worth * bucket.full_cost[bucket.of(variants)] / (bucket.cost * grown)
     ratio = np.minimum(ratio, MOST_CHOSEN / bucket.steps)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.choice import (
+    AIM,
     FEW,
     FINER,
     LEVELS,
@@ -154,7 +155,7 @@ class Options:
     def _option(self, kind: _Kind, error: Array, told: Told, values: LaneValues) -> _Option:
         """One combination for some variants."""
         model, level, scheme = kind
-        tolerance, time = values.of("solver.tolerance"), values.time_scale(self.scene.carriages[0].name)
+        tolerance, time = AIM * values.of("solver.tolerance"), values.time_scale(self.scene.carriages[0].name)
         none = np.zeros(values.size)
         if model is Fidelity.STATIC:
             choice = Choice(none + model, none, none + scheme, none, error, none, none, none, none, none)

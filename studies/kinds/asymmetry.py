@@ -77,7 +77,7 @@ declare("asymmetry", *MARCH, *RESULTS)
 class AsymmetryReduction:
     """lag, loop_area, odd_rms, even_excess of every sensor from the last cycle."""
 
-    stations: int = 400
+    stations: int = 1600
     least_fidelity: Fidelity = Fidelity.FORCE  # statics lag nowhere
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:

@@ -40,6 +40,7 @@ from tests.calibration.choice_references import (
     reference_of,
     steps_by_rules,
 )
+from tests.calibration.choice_references import gaps as reference_gaps
 from tests.calibration.choice_scenes import LANES, Scene, draw, reads_moment
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def measured(scene: Scene, reference: Reference, tolerance: float) -> list[Row]:
     own = march(plan)
     seconds = time.perf_counter() - started
     gaps = compared(scene, own, reference.results, reference.silent)
-    rough = largest(compared(scene, reference.rough, reference.results, reference.silent))
+    rough = reference_gaps(scene, reference)
     rules = round_up(steps_by_rules(plan, full_model(plan, USUAL_MODES, plan.study.solver.scheme)))
     checks = CHECKS if "error_estimate" in own else 1.0
     cost = checks * own["modes_used"].astype(float) * own["steps_used"]
@@ -130,8 +131,7 @@ def verify(seed: int, folder: Path | None, number: int) -> tuple[int, Array, Arr
     """Distances of a scene's reference from a finer one and from its companion (LANES,), of its march from DOP853."""
     scene = draw(seed, number)
     reference = reference_of(scene, folder)
-    gap = largest(compared(scene, reference.rough, reference.results, reference.silent))
-    return number, against_finer(scene, reference), gap, against_exact(scene)
+    return number, against_finer(scene, reference), reference_gaps(scene, reference), against_exact(scene)
 
 
 def on_all(task: Callable[[int], Any], numbers: Iterable[int], workers: int) -> list[Any]:

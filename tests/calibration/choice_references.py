@@ -1,15 +1,15 @@
 """References for the calibration of the choice of models: the full model with many modes and steps, by Fox-Goodwin.
 
 Its period error is (omega h)^4/480 where average acceleration's is (omega h)^2/12. Every variant is marched twice, the
-second time with fewer modes and steps; how far the two are apart bounds the error of the first.
+second time with fewer modes and steps; how far the two are apart bounds the error of the first. Where that is too far
+both are marched again with more modes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ Counts = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 SCHEME = "fox-goodwin"
-MODES, MOMENT_MODES = 40, 64
+MODES, MOMENT_MODES = (40, 64), 64  # in turn, until the companion is near; with a bending moment
+SURE = 3e-5  # apart: near
 SLOW = 0.05  # alpha below which high modes hardly move, so that fewer tell as much; their steps would be many
 SLOW_MODES, SLOW_SPAN = (
     (12, 20),
@@ -51,6 +52,11 @@ class Fineness(NamedTuple):
     modes: int
     least: int
     finer: float = 1.0
+
+    @property
+    def companion(self) -> Self:
+        """Fewer modes and steps."""
+        return self._replace(modes=7 * self.modes // 10, least=self.least // 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +85,12 @@ class Reference:
             return cls(*parts, found["silent"])
 
 
-def fineness(scene: Scene, slow: bool) -> tuple[Fineness, Fineness]:
-    """Of the reference and of its companion. A moment has a kink where the load passes: it wants many stations."""
+def fineness(scene: Scene, slow: bool) -> tuple[Fineness, ...]:
+    """Of references, coarse before fine. A moment has a kink where the load passes: it wants many stations."""
     least = 40_000 if scene.reads_moment else 20_000
-    modes = _slow_modes(scene) if slow else MOMENT_MODES if scene.reads_moment else MODES
-    return Fineness(modes, least), Fineness(7 * modes // 10, least // 2)
+    slow_modes = (_slow_modes(scene),) if slow else ()
+    many = (MOMENT_MODES,) if scene.reads_moment and not slow else MODES
+    return tuple(Fineness(modes, least) for modes in (*slow_modes, *many))
 
 
 def _slow_modes(scene: Scene) -> int:
@@ -97,23 +104,31 @@ def reference_of(scene: Scene, folder: Path | None) -> Reference:
     path = None if folder is None else folder / f"{scene.seed}-{scene.number}-{scene.study().source.sha256[:16]}.npz"
     if path is not None and path.exists():
         return Reference.load(path)
-    results, rough = ({}, {})  # type: tuple[Arrays, Arrays]
-    for variants, fine, coarse in _groups(scene):
-        for arrays, wanted in ((results, fine), (rough, coarse)):
-            _fill(arrays, variants, march(finer_plan(scene.study(variants), wanted)))
     first = finer_plan(scene.study(), Fineness(20, 200)).buckets[0]
-    found = Reference(results, rough, silent(first.scene, first.tables.sensors))
+    found = Reference({}, {}, silent(first.scene, first.tables.sensors))
+    refine(scene, found, 0)
     if path is not None:
         found.save(path)
     return found
 
 
-def _groups(scene: Scene) -> Iterator[tuple[Counts, Fineness, Fineness]]:
-    """Slow and fast variants, and how finely they are marched."""
-    for slow in (True, False):
-        variants = np.flatnonzero((scene.alpha < SLOW) == slow)
-        if variants.size:
-            yield (variants, *fineness(scene, slow))
+def refine(scene: Scene, found: Reference, first: int) -> None:
+    """Fill a reference, and its companion, from a place in the order of `fineness` on: first all variants, then those
+    that are not near their companion."""
+    wanting = np.ones(LANES, dtype=np.bool_) if first == 0 else gaps(scene, found) > SURE
+    slow = scene.alpha < SLOW
+    for turn in range(first, 1 + len(MODES)):
+        for group in (slow, ~slow):
+            variants, fine = np.flatnonzero(wanting & group), fineness(scene, group is slow)[turn : turn + 1]
+            for wanted in fine if variants.size else ():
+                _fill(found.results, variants, march(finer_plan(scene.study(variants), wanted)))
+                _fill(found.rough, variants, march(finer_plan(scene.study(variants), wanted.companion)))
+        wanting = gaps(scene, found) > SURE
+
+
+def gaps(scene: Scene, reference: Reference) -> Array:
+    """(V,) how far a reference is from its companion."""
+    return largest(compared(scene, reference.rough, reference.results, reference.silent))
 
 
 def _fill(arrays: Arrays, variants: Counts, found: Arrays) -> None:
@@ -175,9 +190,11 @@ def largest(differences: dict[str, Array]) -> Array:
 def against_finer(scene: Scene, reference: Reference) -> Array:
     """(V,) how far the reference is from a march with 1.6 times its modes, at most 64, and many more steps."""
     still: Arrays = {}
-    for variants, fine, _ in _groups(scene):
-        finer = Fineness(min(64, fine.modes * 8 // 5), 2 * fine.least, 1.7 if fine.modes == MOMENT_MODES else 1.3)
-        _fill(still, variants, march(finer_plan(scene.study(variants), finer)))
+    for slow in (True, False):
+        variants, fine = np.flatnonzero((scene.alpha < SLOW) == slow), fineness(scene, slow)[0]
+        if variants.size:
+            finer = Fineness(min(64, fine.modes * 8 // 5), 2 * fine.least, 1.7 if fine.modes == MOMENT_MODES else 1.3)
+            _fill(still, variants, march(finer_plan(scene.study(variants), finer)))
     return largest(compared(scene, reference.results, still, reference.silent))
 
 

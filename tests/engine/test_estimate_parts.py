@@ -52,10 +52,26 @@ def test_extremes_may_agree_by_chance(monkeypatch: pytest.MonkeyPatch) -> None:
     truth = np.max(np.abs(extremes(found) - extremes(fine)), axis=1)
     assert truth.min() > 0.0
     told = found.error_steps.values / truth
-    assert told.min() > 0.5 and np.median(told) < 5.0
+    assert told.min() > 0.8 and np.median(told) < 4.0
     halved(monkeypatch, "HISTORY_PART")
     fewer = marched(800).error_steps.values / truth
-    assert fewer.min() < 0.35 and np.sum(fewer < 0.5) >= 4
+    assert fewer.min() < 0.65 and np.sum(fewer < 0.9) >= 6
+
+
+def test_a_march_that_has_lost_the_phase_tells_nothing_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ringing that lasts: of what separates 1,600 steps from 800 more than a third is missed where the 800 have turned
+    it out of phase, though the 1,600 have not."""
+    bed, carriage = beam(damping_ratio=0.002), mass(0.05, cruise(0.0, 1.0, 1.0))
+    speeds = np.geomspace(0.05, 0.4, 96)
+
+    def marched(steps: int) -> Any:
+        return run(crossing(bed, carriage, speeds, steps, sensor={"read": fixed(0.5)}), threads=1)
+
+    found, fine = marched(1600), marched(12_800)
+    truth = np.max(np.abs(extremes(found) - extremes(fine)), axis=1)
+    assert (found.error_steps.values / truth).min() > 1.0
+    monkeypatch.setattr(estimates, "RESOLVED", 4.0 * estimates.RESOLVED)  # of the finer one instead
+    assert (marched(1600).error_steps.values / truth).min() < 0.6
 
 
 def of_modes(carriage: Table, sensor: Mapping[str, Any], speeds: Array) -> Array:
@@ -63,9 +79,9 @@ def of_modes(carriage: Table, sensor: Mapping[str, Any], speeds: Array) -> Array
     output: Table = {"histories": {"every": 3200 // STATIONS}}
     few, many = (
         run(crossing(beam(modes=modes), carriage, speeds, 3200, sensor=sensor, output=output), threads=1)
-        for modes in ("auto", 24)
+        for modes in ("auto", 32)
     )
-    assert few.modes_used.values.max() <= 12
+    assert few.modes_used.values.max() <= 16
     off = np.max(np.abs(few.read.values - many.read.values), axis=1) / many.read_static.values
     found = few.error_modes.values / off
     assert np.isfinite(found).all()
