@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,41 +9,16 @@ from numpy.typing import NDArray
 from engine.execution import run
 from engine.histories import counts_reduced
 from engine.plan import make_plan
-from engine.reduction import Compared, Cycle
-from engine.scene import Study
 from engine.timeline import Rider, build_timeline
-from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, force, study, swing
+from tests.engine.keeping import Kept
 
 Array = NDArray[np.float64]
 
 
-class Kept:
-    """A reduction that keeps what it is given."""
-
-    stations = 1000
-    least_fidelity = Fidelity.STATIC
-
-    def __init__(self) -> None:
-        self.cycles: list[Cycle] = []
-
-    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
-        return {}
-
-    def sizes(self, study: Study) -> Mapping[str, int]:
-        return {}
-
-    def differences(self, compared: Compared) -> dict[str, Array]:
-        return {}
-
-    def __call__(self, cycle: Cycle) -> dict[str, Array]:
-        self.cycles.append(cycle)
-        return {}
-
-
 def test_phases_are_those_of_the_motion_where_steps_are_not_equal() -> None:
     """Another load leaves the beam within the last cycle, where steps are cut: counts of steps tell no phase."""
-    kept, frequency = Kept(), 0.3
+    kept, frequency = Kept(1000), 0.3
     passing = force(1.0, cruise(0.0, 1.0, frequency / 1.37))
     given = study(
         beam(modes=3), {"car": force(1.0, swing(0.5, 0.4, frequency, 2)), "next": passing}, solver={"steps": 97}
@@ -72,7 +45,7 @@ def test_stations_of_a_cycle(steps: int, stations: int, expected: int) -> None:
     """From the beginning of the last of three cycles to its end, as many as wanted and less than twice as many where
     the number of steps has such a divisor."""
     given = study(beam(modes=2), force(1.0, swing(0.5, 0.3, 0.3, 3)), kind="double-peak")
-    motion = make_plan(given, reduction=Kept()).base.riders[0].motion
+    motion = make_plan(given, reduction=Kept(1000)).base.riders[0].motion
     timeline = build_timeline((Rider(motion, 1.0),), steps, "last-cycle")
     counts = counts_reduced(timeline, stations)
     assert (counts[0], counts[-1]) == (2 * steps, 3 * steps)
@@ -81,7 +54,7 @@ def test_stations_of_a_cycle(steps: int, stations: int, expected: int) -> None:
 
 def test_statics_are_made_when_they_are_asked_for() -> None:
     """They cost as much as a march where a cycle has many stations."""
-    kept = Kept()
+    kept = Kept(1000)
     run(study(beam(modes=3), force(2.0, swing(0.5, 0.4, 0.3, 1)), solver={"steps": 64}), reduction=kept)
     cycle = kept.cycles[0]
     assert not {"static", "static_slope"} & set(vars(cycle))

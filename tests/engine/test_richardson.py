@@ -17,14 +17,14 @@ from engine.histories import counts_reduced
 from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, MARKS
 from engine.kernels.pairs import survey
 from engine.plan import make_plan
-from engine.reduction import Compared, Cycle
 from engine.resolution import RESOLVED, phase_errors
 from engine.richardson import march_pair
 from engine.scene import Study
 from engine.tables import SceneTables
-from results_schema.status import Fidelity, Status
+from results_schema.status import Status
 from tests.calibration import richardson as calibration
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.engine.keeping import Kept
 from tests.engine.reading import Reading
 from tests.engine.test_determinism import digest, mixed
 from tests.engine.twin import solve_twin
@@ -284,33 +284,15 @@ def test_a_peak_where_segments_meet_is_found() -> None:
     assert largest((0, 15, False), (15, 30, False)) == (x.max(), 15.0)
 
 
-class Kept:
-    """A reduction that returns the cycle itself."""
-
-    stations = 100
-    least_fidelity = Fidelity.STATIC
-
-    def outputs(self, given: Study) -> Mapping[str, tuple[str, ...]]:
-        return {"cycle": ("station_of_cycle",)}
-
-    def sizes(self, given: Study) -> Mapping[str, int]:
-        return {"station_of_cycle": 101}
-
-    def differences(self, compared: Compared) -> dict[str, Array]:
-        return {}
-
-    def __call__(self, cycle: Cycle) -> dict[str, Array]:
-        return {"cycle": np.ascontiguousarray(cycle.history[:, 0].T)}
-
-
 def test_reduction_gets_the_extrapolated_cycle() -> None:
     """The last of three cycles, the contact force judged in those before too."""
     given = study(beam(modes=3, damping_ratio=0.05), mass(0.5, swing(0.5, 0.3, 0.4, 3)), solver=PAIR | {"steps": 400})
-    reduced = run(given, reduction=Kept())
+    kept = Kept(100)
+    reduced = run(given, reduction=kept)
     whole = run(Study(**(dict(given.data) | {"output": {"histories": "all"}})))
-    plan = make_plan(given, reduction=Kept())
+    plan = make_plan(given, reduction=kept)
     counts = counts_reduced(plan.buckets[0].tables.timeline, 100)
-    np.testing.assert_array_equal(reduced.cycle.values, whole.midspan.values[counts])
+    np.testing.assert_array_equal(kept.cycles[0].history[:, 0, 0], whole.midspan.values[counts])
     last = whole.midspan.values[800:]
     assert float(reduced.midspan_max) == pytest.approx(last.max(), rel=1e-4)
     assert float(reduced.midspan_max) >= last.max()
@@ -320,9 +302,9 @@ def test_reduction_gets_the_extrapolated_cycle() -> None:
 def test_contact_that_opens_before_the_last_cycle_is_seen() -> None:
     motion = shuttle(0.1, 0.9, 1.0, 0.0, 2)
     given = study(beam(modes=4, damping_ratio=0.3), mass(3.0, motion), solver=PAIR | {"steps": 2000}, initial="rest")
-    reduced = run(given, reduction=Kept())
+    reduced = run(given, reduction=Kept(100))
     whole = run(given)
-    alone = run(with_solver(given, scheme="average-acceleration", steps=2000), reduction=Kept())
+    alone = run(with_solver(given, scheme="average-acceleration", steps=2000), reduction=Kept(100))
     assert float(alone.car_separation_position) == pytest.approx(float(whole.car_separation_position), abs=2e-3)
     assert float(reduced.car_separation_position) == float(whole.car_separation_position)
     assert int(reduced.status) == Status.SEPARATED

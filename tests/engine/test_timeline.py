@@ -18,6 +18,7 @@ from engine.timeline import MOST_STATIONS, Rider, build_timeline
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.engine.keeping import Kept
 from tests.reference import closed_forms
 
 Array = NDArray[np.float64]
@@ -118,29 +119,6 @@ def test_many_instant_turns_take_no_time_to_plan() -> None:
     assert sum(len(segment.strikes) for segment in timeline.segments) == 9999
 
 
-class Kept:
-    """A reduction that keeps what it is given."""
-
-    stations = 64
-    least_fidelity = Fidelity.STATIC
-
-    def __init__(self) -> None:
-        self.cycles: list[Cycle] = []
-
-    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
-        return {"largest": ("sensor",)}
-
-    def sizes(self, study: Study) -> Mapping[str, int]:
-        return {"sensor": len(study.sensor)}
-
-    def differences(self, compared: Compared) -> dict[str, Array]:
-        return {}
-
-    def __call__(self, cycle: Cycle) -> dict[str, Array]:
-        self.cycles.append(cycle)
-        return {"largest": cycle.history.max(axis=0).T}
-
-
 SENSORS = {"midspan": fixed(0.5), "moment": fixed(0.3, "bending_moment"), "below": under("car")}
 
 
@@ -148,7 +126,7 @@ SENSORS = {"midspan": fixed(0.5), "moment": fixed(0.3, "bending_moment"), "below
 def test_cycle_of_a_reduction(way: dict[str, Any]) -> None:
     """The last of three cycles with both ends: equidistant phases, mirrored places, the march's histories, exact
     statics."""
-    kept = Kept()
+    kept = Kept(64)
     carriages = {"car": mass(0.5, way), "next": force(2.0, way)}
     given = study(beam(modes=3), carriages, sensor=SENSORS, solver={"steps": 512})
     reduced = run(given, reduction=kept)
@@ -177,7 +155,7 @@ def test_cycle_of_a_reduction(way: dict[str, Any]) -> None:
 
 def test_static_slope_of_a_reduction() -> None:
     """d static/d position of the only carriage; for a sensor under it both the load and the place move."""
-    kept = Kept()
+    kept = Kept(64)
     given = study(beam(modes=3), force(2.0, swing(0.5, 0.4, 0.7, 1)), sensor=SENSORS, solver={"steps": 128})
     run(given, reduction=kept)
     cycle = kept.cycles[0]
