@@ -80,6 +80,18 @@ def test_monotone_whatever_is_fixed(given: Study) -> None:
     assert costs(chosen)[-1] > costs(chosen)[0]
 
 
+def test_choices_aim_at_less_than_the_tolerance() -> None:
+    """All errors that are told beforehand sum up to 0.6 of it at most, as one of them may be larger than told."""
+    plan = make_plan(at_tolerances(study(BED, mass(0.2, CROSSING))))
+    part = np.zeros(TOLERANCES.size)
+    for bucket in plan.buckets:
+        told = bucket.told
+        part[bucket.variants] = told.error_fidelity + told.error_modes + told.error_steps
+    held = TOLERANCES >= 1e-3  # with no more than the 24 modes that are chosen from
+    part = (part / TOLERANCES)[held]
+    assert np.all(part <= 0.6) and np.median(part) > 0.3
+
+
 def test_springs_that_are_as_good_as_none_or_rigid() -> None:
     """A soft spring carries a force, a stiff one a mass; both hold the tolerance against the carriage's own model."""
     springs = {"spring": {"of": "carriage.car.stiffness", "values": [0.01, 3e3]}}

@@ -17,7 +17,7 @@ from engine.lanes import LaneValues
 from engine.plan import make_plan
 from engine.scene import Study
 from results_schema.status import Fidelity, Status
-from tests.engine.build import beam, cruise, fixed, mass, oscillator, study
+from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study
 
 Array = NDArray[np.float64]
 
@@ -107,6 +107,36 @@ def test_variants_that_hold_are_not_marched_again(monkeypatch: pytest.MonkeyPatc
     assert both.modes_used.values.tolist()[0] == 2 < both.modes_used.values.tolist()[1]
     for name in ("midspan_max", "midspan_rms", "error_estimate", "relative_cost", "steps_used"):
         assert both[name].values[0] == alone[name].values[0]
+
+
+@pytest.mark.parametrize(("part", "again"), [(0.9, True), (0.75, True), (0.65, False)])
+def test_what_holds_by_little_is_marched_again(part: float, again: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An estimate of more than 0.7 of the tolerance may be of an error that misses it."""
+    too_cheap(monkeypatch, 2, 200)
+    with monkeypatch.context() as local:
+        local.setattr(improving, "ROUNDS", 0)
+        once = run(improved(sweep={}))
+    tolerance = float(once.error_estimate) / part
+    found = run(improved(sweep={}, solver={"tolerance": tolerance}))
+    assert int(found.status) == Status.OK
+    assert (float(found.relative_cost) > float(once.relative_cost)) == again
+    assert float(found.error_estimate) < 0.7 * tolerance
+    assert (float(found.midspan_max) != float(once.midspan_max)) == again
+
+
+def test_a_tight_tolerance_is_worth_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A force steps on where a spring holds: its high modes ring, undamped."""
+    springs = [{"at": 0.1, "stiffness": 200.0}, {"at": 0.5, "stiffness": 300.0}, {"at": 0.9, "stiffness": 100.0}]
+    bed = beam(modes="auto", supports=springs, damping_ratio=0.0)
+    given = study(bed, force(1.0, CROSSING), solver={"tolerance": 1e-4, "audit": 0})
+    found = run(given)
+    assert int(found.status) == Status.OK and 100.0 < float(found.relative_cost) < 10.0 * 10.0**1.5
+    monkeypatch.setattr(improving, "COST_ORDER", 0.0)
+    cheap = run(given)
+    assert int(cheap.status) == Status.TOLERANCE_MISSED and float(cheap.relative_cost) < 40.0
+    for end in ("max", "min"):
+        gap = abs(float(found[f"midspan_{end}"]) - float(cheap[f"midspan_{end}"])) / float(found.midspan_static)
+        assert gap <= float(cheap.error_estimate) + 1e-4
 
 
 def test_what_the_study_fixes_is_not_improved() -> None:
