@@ -1,0 +1,40 @@
+"""Tables of segments: built when they are needed, once for every march where they are too large to be kept."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine.tables as tables
+from engine.execution import run
+from engine.plan import make_plan
+from tests.engine.build import beam, cruise, mass, oscillator, shuttle, study, under
+
+ONE = mass(0.3, shuttle(0.1, 0.9, 1.0, 0.1, 2))
+TWO = {"car": ONE, "next": oscillator(0.1, 50.0, cruise(0.0, 1.0, 0.4))}
+
+
+@pytest.mark.parametrize("scheme", ["average-acceleration", "richardson"])
+@pytest.mark.parametrize("carriages", [ONE, TWO], ids=["one", "two"])
+def test_tables_that_are_not_kept_are_built_once(carriages: Any, scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As often as there are segments of a march, which is the same to the last bit."""
+    solver = {"steps": 1000, "scheme": scheme}
+    given = study(beam(modes=2), carriages, sensor={"below": under("car")}, solver=solver)
+    kept = run(given, threads=1)
+    monkeypatch.setattr(tables, "KEPT_BYTES", 0)
+    built, real = Counter[tuple[int, int]](), tables.tabulate_ties
+
+    def counted(model: Any, along: Any, *others: Any) -> Any:
+        built[model.body_modes, along[0].s.size] += 1
+        return real(model, along, *others)
+
+    monkeypatch.setattr(tables, "tabulate_ties", counted)
+    (bucket,) = make_plan(given).buckets
+    again = run(given, threads=1)
+    wanted = Counter((bucket.scene.body_modes, segment.steps + 1) for segment in bucket.tables.timeline.segments)
+    assert {size: built[size] for size in wanted} == wanted
+    for name, array in kept.data_vars.items():
+        np.testing.assert_array_equal(again[name].values, array.values)
