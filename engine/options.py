@@ -1,7 +1,7 @@
 """Every combination of model, modes, scheme and steps that a scene may get, its price, and the cheapest that holds.
 
-All three errors are estimates (`ladder`, `omitted`); of all combinations whose sum is within the tolerance the one with
-the fewest modes x steps is taken, so that a tighter tolerance never gets a cheaper one.
+All three errors are estimates (`ladder`, `omitted`); of all combinations whose sum is within `AIM` of the tolerance the
+one with the fewest modes x steps is taken, so that a tighter tolerance never gets a cheaper one.
 """
 
 from __future__ import annotations
