@@ -152,7 +152,7 @@ def test_a_diverging_variant_among_others() -> None:
     """Parametric resonance without damping grows until nothing is left; light carriages beside it do not."""
     way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
     sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
-    ds = run(study(beam(modes=3), mass(0.5, way), sweep=sweep))
+    ds = run(study(beam(modes=3), mass(0.5, way), sweep=sweep, solver={"steps": 4800}))
     assert ds.status.values.tolist() == [0, 5, 0]
     assert ds.diverged_step.values[0] == ds.diverged_step.values[2] == -1
     assert 400 < ds.diverged_step.values[1] < 200 * int(ds.steps_used[1])
