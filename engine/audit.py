@@ -45,9 +45,9 @@ MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may b
 SHARED = 8  # times the steps that a variant takes to share tables, which cost more than that
 FULL_SHARED = 2  # the same once `MOST` share them
 GROUP_SECONDS = 0.05  # besides tables and marching, for expected times only
-STATION_SECONDS = 3e-6  # of tables; likewise
-MODE_SECONDS = 2e-7  # of each mode in tables; likewise
-TABLE_BYTES = 128  # of a mode at a station of tables, at most
+STATION_SECONDS = 1.2e-6  # of tables; likewise
+MODE_SECONDS = 1.5e-7  # of each mode in tables; likewise
+TIE_BYTES, SENSOR_BYTES = 32, 16  # of a mode at a station of tables
 
 
 class Used(NamedTuple):
@@ -79,7 +79,8 @@ class _Group(NamedTuple):
         """Expected time on one thread; no body with more modes is made for that."""
         ties, timeline = self.scene.ties, SceneTables(self.scene, self.steps, plan.window).timeline
         modes = self.modes
-        once = timeline.repeats and TABLE_BYTES * self.steps * modes * ties <= KEPT_BYTES
+        size = (TIE_BYTES * ties + SENSOR_BYTES * len(plan.study.sensor)) * self.steps * modes
+        once = timeline.repeats and size <= KEPT_BYTES
         stations = min(timeline.steps, self.steps) if once else timeline.steps
         table = STATION_SECONDS + MODE_SECONDS * modes
         lanes = LANES * -(-self.variants.size // LANES)
