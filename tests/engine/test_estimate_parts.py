@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import engine.estimates as estimates
 import engine.improving as improving
+from engine.choice import AIM
 from engine.execution import run
 from engine.scene import Study
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, study
@@ -39,23 +40,31 @@ def halved(monkeypatch: pytest.MonkeyPatch, coefficient: str) -> None:
     monkeypatch.setattr(estimates, coefficient, 0.5 * getattr(estimates, coefficient))
 
 
+def of_steps(bed: Table, carriage: Table, speeds: Array, steps: int) -> Array:
+    """(V,) what is told of so many steps, over what extremes miss beside those of eight times as many."""
+    found, fine = (
+        run(crossing(bed, carriage, speeds, many, sensor={"read": fixed(0.5)}), threads=1)
+        for many in (steps, 8 * steps)
+    )
+    truth = np.max(np.abs(extremes(found) - extremes(fine)), axis=1)
+    assert truth.min() > 0.0
+    return np.asarray(found.error_steps.values / truth)
+
+
 def test_extremes_may_agree_by_chance(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 96 speeds some have two marches whose extremes hardly differ, and both are wrong: there a part of what their
     histories differ by tells of it."""
     bed, carriage = beam(damping_ratio=0.01), mass(0.2, cruise(0.0, 1.0, 1.0))
     speeds = np.geomspace(0.15, 1.2, 96)
-
-    def marched(steps: int) -> Any:
-        return run(crossing(bed, carriage, speeds, steps, sensor={"read": fixed(0.5)}), threads=1)
-
-    found, fine = marched(800), marched(6400)
-    truth = np.max(np.abs(extremes(found) - extremes(fine)), axis=1)
-    assert truth.min() > 0.0
-    told = found.error_steps.values / truth
+    told = of_steps(bed, carriage, speeds, 800)
     assert told.min() > 0.8 and np.median(told) < 4.0
     halved(monkeypatch, "HISTORY_PART")
-    fewer = marched(800).error_steps.values / truth
+    fewer = of_steps(bed, carriage, speeds, 800)
     assert fewer.min() < 0.65 and np.sum(fewer < 0.9) >= 6
+    monkeypatch.setattr(estimates, "RESOLVED", np.inf)  # lost phases, which ask for more by themselves, left alone
+    halved(monkeypatch, "HISTORY_PART")
+    fewest = of_steps(bed, carriage, speeds, 800)
+    assert fewest.min() < 0.35 and np.sum(fewest < 0.5) >= 4
 
 
 def test_a_march_that_has_lost_the_phase_tells_nothing_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,25 +72,23 @@ def test_a_march_that_has_lost_the_phase_tells_nothing_of_another(monkeypatch: p
     it out of phase, though the 1,600 have not."""
     bed, carriage = beam(damping_ratio=0.002), mass(0.05, cruise(0.0, 1.0, 1.0))
     speeds = np.geomspace(0.05, 0.4, 96)
-
-    def marched(steps: int) -> Any:
-        return run(crossing(bed, carriage, speeds, steps, sensor={"read": fixed(0.5)}), threads=1)
-
-    found, fine = marched(1600), marched(12_800)
-    truth = np.max(np.abs(extremes(found) - extremes(fine)), axis=1)
-    assert (found.error_steps.values / truth).min() > 1.0
+    assert of_steps(bed, carriage, speeds, 1600).min() > 1.0
     monkeypatch.setattr(estimates, "RESOLVED", 4.0 * estimates.RESOLVED)  # of the finer one instead
-    assert (marched(1600).error_steps.values / truth).min() < 0.6
+    assert of_steps(bed, carriage, speeds, 1600).min() < 0.6
 
 
 def of_modes(carriage: Table, sensor: Mapping[str, Any], speeds: Array) -> Array:
     """(V,) what is told of the modes that are chosen for every speed, over what their histories miss."""
     output: Table = {"histories": {"every": 3200 // STATIONS}}
+    loose = {"solver.tolerance": 1e-3 / AIM}
     few, many = (
-        run(crossing(beam(modes=modes), carriage, speeds, 3200, sensor=sensor, output=output), threads=1)
-        for modes in ("auto", 32)
+        run(
+            crossing(beam(modes=modes), carriage, speeds, 3200, sensor=sensor, output=output).with_values(loose),
+            threads=1,
+        )
+        for modes in ("auto", 24)
     )
-    assert few.modes_used.values.max() <= 16
+    assert few.modes_used.values.max() <= 12
     off = np.max(np.abs(few.read.values - many.read.values), axis=1) / many.read_static.values
     found = few.error_modes.values / off
     assert np.isfinite(found).all()

@@ -25,7 +25,5 @@ def test_every_model_has_an_entry_of_its_own() -> None:
     results = found()
     (entry,) = as_json(results)
     assert entry["model"] == "mass" and entry["variants"] == 2 and entry["without_estimate"] == 0
-    few, many = sorted(results.dataset.modes_used.values.tolist())
-    assert entry["modes"] == [few, many] and few < many
-    assert entry["schemes"] == ["average-acceleration", "fox-goodwin"]
+    assert entry["modes"] == [4, 8] and entry["schemes"] == ["average-acceleration", "fox-goodwin"]
     assert entry["largest_error_estimate"] == results.dataset.error_estimate.values.max()
