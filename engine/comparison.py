@@ -305,4 +305,5 @@ def _nothing_watched(modes: int) -> Watch:
     """A watch without signals."""
     rows, none = np.zeros((1, 0, 4 * -(-modes // 4))), np.zeros(0, dtype=np.int64)
     still = np.zeros((1, 0))
-    return Watch(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, still.astype(np.bool_))
+    never = still.astype(np.bool_)
+    return Watch(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, never, never[0])

@@ -16,7 +16,6 @@ from engine.ways import Way
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-HELD = 1e-9  # of the largest mode shape, below which an end of a track does not move
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 
 
@@ -112,10 +111,8 @@ def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, flo
     """Places between which a contact force counts: an end that is held along the load is left out where the way leads
     to it."""
     length = rider.length
-    modal = model.bodies[body].modal
-    ends, inner = (np.abs(modal.shape(at)) for at in ([0.0, length], np.linspace(0.0, length, 9)))
-    left, right = ("held" if held else "free" for held in (ends <= HELD * inner.max()).all(axis=1))
+    left, right = model.bodies[body].modal.held_ends
     low, high = (1.0 - SPAN_COUNTED) * length, SPAN_COUNTED * length
     forward = rider.stays or float(rider.motion.path(0.0).dS) > 0.0
     backward = rider.stays or not forward
-    return (low if left != "free" and backward else 0.0), (high if right != "free" and forward else length)
+    return (low if left and backward else 0.0), (high if right and forward else length)

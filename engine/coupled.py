@@ -159,7 +159,7 @@ def _rows(model: SceneModel, along: Along, ties: NDArray[np.int64], masses: int)
 def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:
     """(S, T, T) flexibility that the kept modes miss between ties, m/N; masses feel it here as springs do."""
     found = np.zeros((along[0].s.size, len(ties), len(ties)))
-    if not model.study.solver.static_correction:
+    if not model.numerics.static_correction:
         return found
     for i, r in enumerate(ties):
         for j, s in enumerate(ties[: i + 1]):

@@ -1,34 +1,25 @@
-"""What a study makes of sampled histories, and the stations at which they are sampled."""
+"""What a study makes of the histories of a cycle."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.histories import counts_reduced
 from engine.lanes import LaneValues, weights
-from engine.plan import STATIONS, Plan
-from engine.reduction import Cycle
+from engine.reduction import Cycle, Reduction
 from engine.tables import SceneTables
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
-def counts_sampled(plan: Plan, tables: SceneTables) -> Counts:
-    """Stations by their count: those that the study's reduction wants, or some over the whole run, which a march with
-    half the steps has too."""
-    if plan.reduction is not None:
-        return counts_reduced(tables.timeline, plan.reduction.stations)
-    first, last = tables.timeline.window
-    return np.arange(first, last + 1, 2 * max(1, (last - first) // (2 * STATIONS)))
-
-
 def reduced(
-    plan: Plan, tables: SceneTables, values: LaneValues, counts: Counts, history: Array
-) -> dict[str, NDArray[np.generic]]:
+    reduction: Reduction | None, tables: SceneTables, values: LaneValues, counts: Counts, history: Array
+) -> dict[str, NDArray[Any]]:
     """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
-    if plan.reduction is None:
+    if reduction is None:
         return {}
     loads = weights(tables.model, values)
 
@@ -48,4 +39,4 @@ def reduced(
         find_static=static,
         find_slope=lambda: tables.static_slope_at(counts)[:, :, None] * loads[0],
     )
-    return dict(plan.reduction(cycle))
+    return dict(reduction(cycle))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.accuracy.results import results_of, tolerances
 from engine.envelopes import envelope_places
 from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
@@ -49,20 +50,25 @@ class Collector:
 
 
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
-    """The dataset of a study's results; variables that its kind does not declare are left out, except those that the
-    study's own summary is made of (`<sensor>_static`)."""
+    """The dataset of a study's results; variables that are not declared for `plan.results` are left out, except those
+    that the study's own summary is made of (`<sensor>_static`)."""
     import xarray as xr
 
     study = plan.study
     sensors = {name: QUANTITY_UNITS[sensor.quantity] for name, sensor in study.sensor.items()}
     envelopes = {name: QUANTITY_UNITS[envelope.quantity] for name, envelope in study.envelope.items()}
-    declared = expand(_declared_kind(study.kind), sensors, list(study.carriage), envelopes)
+    declared = expand(plan.results, sensors, list(study.carriage), envelopes)
     dataset = xr.Dataset(coords=coordinates(plan.cases))
     dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
     for name, places in envelope_places(plan.base).items():
         dim = f"{name}_place"
         dataset = dataset.assign_coords({dim: (dim, places, declared[dim].attributes())})
     extra = {} if plan.reduction is None else dict(plan.reduction.outputs(study))
+    results = results_of(plan.asked)
+    names = [result.name for result in results]
+    dataset = dataset.assign_coords(result=("result", names, axes()["result"].attributes()))
+    dataset["tolerance"] = ("result", tolerances(results), declared["tolerance"].attributes())
+    extra["estimated_error"] = ("result",)
     extra |= {f"{name}_envelope_{end}": (f"{name}_place",) for name in study.envelope for end in ("max", "min")}
     for name, array in arrays.items():
         dims = (*plan.cases.dims, *extra.get(name, ()))
@@ -78,7 +84,7 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
 
 
 def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
-    """The bodies of an unswept scene, by group: frequencies, damping and mode shapes on the track."""
+    """The bodies of an unswept scene, by group: frequencies, damping and mode shapes on the track, length and mass."""
     import xarray as xr
 
     values = LaneValues(model.study, {}, 1)
@@ -93,6 +99,8 @@ def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
             "frequency": ("mode", omega / (2.0 * np.pi)),
             "damping_ratio": ("mode", np.where(omega > 0.0, ratio, 0.0)),
             "mode_shape": (("mode", "position"), part.modal.shape(x).T),
+            "length": ((), part.modal.length),
+            "mass": ((), part.modal.mass),
         }
         found[f"/model/{part.name}"] = xr.Dataset(
             {name: (dims, array, declared[name].attributes()) for name, (dims, array) in arrays.items()},
@@ -102,11 +110,6 @@ def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
             },
         )
     return found
-
-
-def _declared_kind(kind: str) -> str:
-    """The kind's declarations where it has any, else the march's."""
-    return kind if len(declarations(kind)) > len(declarations("*")) else "march"
 
 
 def _own_attributes(name: str, sensors: dict[str, str]) -> dict[str, str]:
@@ -142,10 +145,10 @@ def _speed_ratio(plan: Plan) -> Array | None:
     if not hasattr(next(iter(plan.study.carriage.values())).motion, "speed"):
         return None
     found = np.empty(plan.size)
-    for bucket in plan.buckets:
-        scene = bucket.scene
-        speed = plan.values(bucket, bucket.variants).of(f"carriage.{scene.carriages[0].name}.motion.speed")
-        found[bucket.variants] = speed * np.pi / (scene.first_omega * scene.leading_body.modal.length)
+    for grid, members in zip(plan.grids, plan.members, strict=True):
+        scene = grid.scene
+        speed = grid.values.of(f"carriage.{scene.carriages[0].name}.motion.speed")
+        found[members] = speed * np.pi / (scene.first_omega * scene.leading_body.modal.length)
     return found
 
 
@@ -155,10 +158,8 @@ def _mass_ratio(plan: Plan) -> Array | None:
     if not plan.study.carriage[first].inertial:
         return None
     found = np.empty(plan.size)
-    for bucket in plan.buckets:
-        found[bucket.variants] = (
-            moving_mass(bucket.scene, plan.values(bucket, bucket.variants), 0) / bucket.scene.leading_body.modal.mass
-        )
+    for grid, members in zip(plan.grids, plan.members, strict=True):
+        found[members] = moving_mass(grid.scene, grid.values, 0) / grid.scene.leading_body.modal.mass
     return found
 
 

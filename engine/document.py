@@ -56,6 +56,10 @@ class Document:
     source: Source
 
 
+class Beside:
+    """What the program itself knows of a table, beside what a user wrote; no text gives one, and none is written."""
+
+
 class _Overflow(str):
     """The text of a float that is not finite; kept as text until the key is known."""
 
@@ -227,7 +231,8 @@ def _tables(header: str, table: Mapping[str, Any]) -> Iterable[tuple[str, Mappin
 
 
 def _block(header: str, table: Mapping[str, Any]) -> str:
-    own = [f"{_key(key)} = {_literal(value)}\n" for key, value in table.items() if not isinstance(value, Mapping)]
+    written = {key: value for key, value in table.items() if not isinstance(value, Mapping | Beside)}
+    own = [f"{_key(key)} = {_literal(value)}\n" for key, value in written.items()]
     needed = own or not table  # an empty table is still a table
     return "".join([f"[{header}]\n" if header and needed else "", *own])
 

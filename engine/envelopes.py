@@ -17,9 +17,10 @@ from engine.contacts import contact_forces
 from engine.model import SceneModel
 from engine.readings import Sensor
 from engine.scene import Study
+from engine.sensors import MOST_PLACES
 from engine.signals import Signal
 from engine.tables import Missed, SceneTables, SegmentTable
-from engine.timeline import Segment
+from engine.timeline import Segment, coarsened
 from engine.ways import Way
 from results_schema.errors import BadInput
 
@@ -95,29 +96,38 @@ class EnvelopeTables(SceneTables):
         found = EnvelopeTables(
             self.model, self.steps // 2, self.window, refinement=self.refinement // 2, places=self.places
         )
-        found._unrefined = self._unrefined
+        found.timeline = coarsened(self.timeline, 2)
         return found
 
 
-def envelope_tables(tables: SceneTables) -> tuple[EnvelopeTables, ...]:
+def with_companions(tables: SceneTables, most: int = MOST_PLACES) -> SceneTables:
+    """Tables together with those of the marches that watch the envelopes, at so many places of each."""
+    tables.companions = envelope_tables(tables, most)
+    return tables
+
+
+def envelope_tables(tables: SceneTables, most: int = MOST_PLACES) -> tuple[EnvelopeTables, ...]:
     """The tables of the marches that watch the envelopes of a scene: one, or several for groups of places where the
     histories are long."""
-    model, count = tables.model, places_read(tables.model.study)
+    model, count = tables.model, sum(min(most, e.places) for e in tables.model.study.envelope.values())
     if not count:
         return ()
     longest = max(segment.steps for segment in tables.timeline.segments)
     readings = MOST_READINGS if tables.model.scheme.stride == 1 else MOST_PAIR_READINGS
     size = -(-count // -(-count // max(LEAST_PLACES, readings // longest)))
-    return tuple(
-        EnvelopeTables(
-            model,
-            tables.steps,
-            tables.window,
-            refinement=tables.refinement,
-            places=_places(model, slice(first, first + size)),
-        )
-        for first in range(0, count, size)
-    )
+    return tuple(_watching(tables, _places(model, slice(first, first + size), most)) for first in range(0, count, size))
+
+
+def _watching(tables: SceneTables, places: tuple[Place, ...]) -> EnvelopeTables:
+    """The tables of the same march that watch some places."""
+    found = EnvelopeTables(tables.model, tables.steps, tables.window, refinement=tables.refinement, places=places)
+    found.timeline = tables.timeline
+    return found
+
+
+def _spread(places: Array, most: int) -> Array:
+    """At most so many of some places, both ends among them."""
+    return places[np.unique(np.rint(np.linspace(0, places.size - 1, min(places.size, most))).astype(np.int64))]
 
 
 def envelope_places(model: SceneModel) -> dict[str, Array]:
@@ -151,10 +161,11 @@ def check_places(study: Study, scenes: Iterable[SceneModel]) -> None:
                 )
 
 
-def _places(model: SceneModel, part: slice) -> tuple[Place, ...]:
-    """Some of the places of all envelopes in a row, each with the name of its envelope."""
+def _places(model: SceneModel, part: slice, most: int) -> tuple[Place, ...]:
+    """Some of the places of all envelopes in a row, ``most`` of each, each with the name of its envelope."""
     bodies = [body.name for body in model.bodies]
-    numbered = [(name, at) for name, places in envelope_places(model).items() for at in places.tolist()][part]
+    spread = {name: _spread(places, most) for name, places in envelope_places(model).items()}
+    numbered = [(name, at) for name, places in spread.items() for at in places.tolist()][part]
     found: list[Place] = []
     for name in dict.fromkeys(name for name, _ in numbered):
         envelope = model.study.envelope[name]

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bucket import Bucket
-from engine.plan import Plan, make_plan
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.groups import Group
+from engine.linear_algebra import one_thread
+from engine.plan import EVERY_MARCH, Plan, make_plan
 from engine.reduction import Reduction
 from engine.scene import Study
 from results_schema.errors import BadInput, Interrupted
@@ -36,27 +38,31 @@ _COUNTING = threading.Lock()
 WAITING = 4  # finished chunks per thread that may wait for the sink
 
 
+@one_thread()
 def run(
     study: Study,
     *,
     threads: int | None = None,
     chunk: int | None = None,
     reduction: Reduction | None = None,
+    results: str = EVERY_MARCH,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Run a study in memory and return the march's dataset. Raises BadInput.
 
     threads: default all processors. chunk: variants per task, chosen by time and memory otherwise; results do not
-    depend on either, bit for bit.
+    depend on either, bit for bit. reduction, results: as of `make_plan`. Until it returns, linear algebra keeps to
+    one thread in the whole process.
     """
     from engine.dataset import Collector, build
 
-    plan = make_plan(study, reduction=reduction)
+    plan = make_plan(study, reduction=reduction, results=results)
     collector = Collector(plan.size)
     execute(plan, collector.add, threads=threads, chunk=chunk, progress=progress)
     return build(plan, collector.arrays, collector.selected)
 
 
+@one_thread()
 def execute(
     plan: Plan,
     sink: Sink,
@@ -73,6 +79,7 @@ def execute(
     """
     _check_threads(threads)
     warm_up(plan)
+    choose(plan, threads, stop)
     tasks = list(plan.chunks(done, chunk))
     finished = 0 if done is None else int(done.size)
     halt = threading.Event()
@@ -97,17 +104,19 @@ def execute(
 
 
 def warm_up(plan: Plan) -> None:
-    """Load or compile the kernels once, and rebuild a damaged cache once."""
-    from engine.kernels import jit
+    """Load or compile the kernels once."""
+    for grid in {min(grid.scene.ties, 2): grid for grid in plan.grids}.values():
+        _first_steps(grid)
 
-    for kind in {min(bucket.scene.ties, 2): bucket for bucket in plan.buckets}.values():
-        try:
-            _first_steps(plan, kind)
-        except Exception as error:
-            if not jit.cache_is_damaged(error):
-                raise
-            jit.forget_compiled()
-            _first_steps(plan, kind)
+
+def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
+    """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
+    from engine.march import Halted
+
+    try:
+        plan.choose(lambda jobs: run_jobs(jobs, threads or os.cpu_count() or 1), partial(_any_set, (stop,)))
+    except Halted:
+        raise Interrupted("stopped; finished work is kept", remedy="run again to go on") from None
 
 
 def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
@@ -119,13 +128,13 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     from engine.tables import SceneTables
 
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
-    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors", stride) for b in plan.buckets}
+    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors", stride) for b in plan.groups}
     workers = threads or os.cpu_count() or 1
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     if stride > 1:
-        pairs = [(tables[id(bucket)], plan.values(bucket, padded(part)), nothing, part.size) for bucket, part in chunks]
+        pairs = [(tables[id(group)], plan.values(group, padded(part)), nothing, part.size) for group, part in chunks]
         return seconds_of_jobs([partial(march_pair, *pair) for pair in pairs], workers) / repeats
-    marches = [prepare(tables[id(bucket)], plan.values(bucket, padded(part)), nothing) for bucket, part in chunks]
+    marches = [prepare(tables[id(group)], plan.values(group, padded(part)), nothing) for group, part in chunks]
     return seconds_of(marches, workers) / repeats
 
 
@@ -141,30 +150,34 @@ def seconds_of(marches: Sequence[March], threads: int) -> float:
 
 def seconds_of_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> float:
     """Wall time of jobs on threads."""
-    import dask.threaded
-
-    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
     start = time.perf_counter()
-    dask.threaded.get(graph, list(graph), num_workers=threads)
+    run_jobs(jobs, threads)
     return time.perf_counter() - start
 
 
-def _first_steps(plan: Plan, bucket: Bucket) -> None:
+def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
+    """Jobs on threads."""
+    import dask.threaded
+
+    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
+    dask.threaded.get(graph, list(graph), num_workers=threads)
+
+
+def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
-    from engine.lanes import padded
     from engine.march import Halted
     from engine.richardson import march_chosen
     from engine.tables import SceneTables
 
-    tables = SceneTables(bucket.scene, 4, plan.window, refinement=bucket.tables.refinement)
+    tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
     with suppress(Halted):
-        values = plan.values(bucket, padded(bucket.variants[:1]))
+        values = grid.values.part(np.zeros(1, dtype=np.int64)).padded
         march_chosen(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 
 def _compute(
     plan: Plan,
-    tasks: list[tuple[Bucket, Counts]],
+    tasks: list[tuple[Group, Counts]],
     threads: int | None,
     results: queue.Queue[Any],
     halts: tuple[threading.Event, threading.Event | None],
@@ -173,10 +186,10 @@ def _compute(
     import dask.threaded
 
     halted = partial(_any_set, halts)
-    left = Counter(id(bucket) for bucket, _ in tasks)
+    left = Counter(id(group) for group, _ in tasks)
     graph = {
-        ("chunk", i): (partial(_task, plan, (bucket, variants), left, results, halted),)
-        for i, (bucket, variants) in enumerate(tasks)
+        ("chunk", i): (partial(_task, plan, (group, variants), left, results, halted),)
+        for i, (group, variants) in enumerate(tasks)
     }
     try:
         dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
@@ -186,26 +199,26 @@ def _compute(
 
 def _task(
     plan: Plan,
-    chunk: tuple[Bucket, Counts],
+    chunk: tuple[Group, Counts],
     left: Counter[int],
     results: queue.Queue[Any],
     halted: Callable[[], bool],
 ) -> None:
     """One chunk; what it raises travels to the caller as its result. The last of a scene drops its tables."""
-    from engine.outcome import run_chunk
+    from engine.chunk import run_chunk
 
     if halted():
         return
-    bucket, variants = chunk
+    group, variants = chunk
     try:
-        found: Any = (variants, *run_chunk(plan, bucket, variants, halted))
+        found: Any = (variants, *run_chunk(plan, group, variants, halted))
     except BaseException as error:
         found = error
     with _COUNTING:
-        left[id(bucket)] -= 1
-        last = left[id(bucket)] == 0
+        left[id(group)] -= 1
+        last = left[id(group)] == 0
     if last:
-        bucket.forget()
+        group.forget()
     _hand_over(found, results, halted)
 
 

@@ -33,11 +33,18 @@ def place(grip: Grip, along: Along) -> Array | str:
 
 def rows(model: SceneModel, grip: Grip, along: Along, derivative: int = 0) -> Array:
     """(S or 1, N of its body) derivative of the mode shapes where it holds; 0 where it does not."""
+    if grip.rider is None and derivative > 0:
+        return np.zeros((1, model.bodies[grip.body].modal.omega.size))
+    return np.asarray(shape_derivatives(model, grip, along, derivative)[derivative])
+
+
+def shape_derivatives(model: SceneModel, grip: Grip, along: Along, highest: int) -> Array:
+    """(``highest`` + 1 or more, S or 1, N) the mode shapes and their derivatives; of a fixed place the shapes alone."""
     modal = model.bodies[grip.body].modal
     if grip.rider is None:
-        return grip.fixed_row(modal)[None, :] if derivative == 0 else np.zeros((1, modal.omega.size))
+        return grip.fixed_row(modal).copy()[None, None]
     way = along[grip.rider]
-    found = way.shape(modal, derivative)
+    found = way.shapes(modal, highest)
     return found if way.here is None else np.where(way.here[:, None], found, 0.0)
 
 
@@ -70,7 +77,7 @@ def residual(model: SceneModel, along: Along) -> Array:
     (0, 0, 0) where there are none, or no static correction."""
     ties = model.ties
     felt = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.held and not spring.rigid]
-    if not felt or not model.study.solver.static_correction:
+    if not felt or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))
     found, known = np.zeros((along[0].s.size, ties, ties)), dict[tuple[Grip, Grip], Array]()
     for r in felt:

@@ -35,8 +35,10 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
     found = np.zeros((along[0].s.size, len(sensors), len(model.carriages) + 1))
     for j, sensor in enumerate(sensors):
         read = np.einsum("sr,srl->sl", *_together(sensor.unit_static(model, along), state.force))
-        loose = sensor.loose(model, along)[:, state.loose]
-        found[:, j] = read + np.einsum("sm,sml->sl", *_together(loose, state.coordinate))
+        if state.loose.size:
+            loose = sensor.loose(model, along)[:, state.loose]
+            read = read + np.einsum("sm,sml->sl", *_together(loose, state.coordinate))
+        found[:, j] = read
         found[:, j, -1] += sensor.sagging(model, along)
         if sensor.under is not None and (here := along[sensor.under].here) is not None:
             found[~here, j] = 0.0

@@ -46,6 +46,16 @@ class LaneValues:
             return np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
         return found
 
+    @property
+    def padded(self) -> LaneValues:
+        """The same filled up to whole blocks by repeating the last variant."""
+        lanes = padded(np.arange(self.size))
+        return LaneValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+
+    def part(self, lanes: NDArray[np.int64]) -> LaneValues:
+        """Some of the variants."""
+        return LaneValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+
     def time_scale(self, carriage: str) -> Array:
         """(V,) seconds per unit of a carriage's own tau."""
         motion = self.study.carriage[carriage].motion
@@ -82,7 +92,8 @@ class LaneValues:
         if isinstance(spec, Rayleigh):
             return self.of(f"{key}.rayleigh.0") + self.of(f"{key}.rayleigh.1") * omega[:, None] ** 2
         if isinstance(spec, tuple):
-            return np.stack([2.0 * self.of(f"{key}.{k}") * w for k, w in enumerate(omega)])
+            last = len(spec) - 1  # goes on for modes beyond the list
+            return np.stack([2.0 * self.of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
         return 2.0 * self.of(key) * omega[:, None]
 
 
@@ -119,12 +130,12 @@ def padded(variants: NDArray[np.int64]) -> NDArray[np.int64]:
 def to_blocks(values: Array) -> Array:
     """(..., V) as (V/LANES, ..., LANES)."""
     cut = values.reshape(*values.shape[:-1], -1, LANES)
-    return np.ascontiguousarray(np.moveaxis(cut, -2, 0))
+    return np.ascontiguousarray(cut.transpose(values.ndim - 1, *range(values.ndim - 1), values.ndim))
 
 
 def from_blocks(blocks: Array, size: int) -> Array:
     """(blocks, ..., LANES) as (..., size)."""
-    joined = np.moveaxis(blocks, 0, -2)
+    joined = blocks.transpose(*range(1, blocks.ndim - 1), 0, blocks.ndim - 1)
     return joined.reshape(*joined.shape[:-2], blocks.shape[0] * blocks.shape[-1])[..., :size]
 
 

@@ -92,6 +92,8 @@ class Motion(Spec):
         times = np.asarray(tau, dtype=np.float64)
         inside = self._inside(np.clip(times, 0.0, self.duration), side)
         waiting, gone = times < 0.0, times > self.duration * (1.0 + ROUNDING)
+        if not (waiting.any() or gone.any()):
+            return inside
         moves = (np.where(waiting, 0.0, part) for part in inside[1:])
         return Path(*(np.where(gone, np.nan, part) for part in (inside.S, *moves)))
 
@@ -102,7 +104,7 @@ class Motion(Spec):
         """
         times = np.clip(np.asarray(tau, dtype=np.float64), segment_start, segment_end)
         found, last = self.path(times, "right"), times == segment_end
-        if last.any():
+        if segment_end < self.duration and last.any():  # at its own end a motion has one limit
             for part, at_end in zip(found, self.path(times[last], "left"), strict=True):
                 part[last] = at_end
         return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -83,7 +82,7 @@ class March:
         """The impulse and the new accelerations of a segment's event, its first station, its steps."""
         model = self.tables.model
         watch, record = self._observed(segment, table)
-        stepped = self.lanes.steps_of(_step(self.tables, segment, self.lanes))
+        stepped = self.lanes.steps_of(self.step(segment))
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
             active[: len(model.carriages)] = segment.active[: len(model.carriages)]
@@ -95,6 +94,13 @@ class March:
         if unseen:
             watch_start(table.ties, stepped, self.state, watch, record, segment.first)
         self._steps(segment, table.ties, stepped, watch, record)
+
+    def step(self, segment: Segment) -> Array:
+        """(blocks, LANES) step of a segment in s; free vibration lasts some first periods of the body."""
+        if not segment.free:
+            return self.lanes.time_scale * segment.step
+        steps = sum(part.steps for part in self.tables.timeline.segments if part.free)
+        return np.full_like(self.lanes.time_scale, self.tables.free_seconds / steps)
 
     def _board(self, segment: Segment) -> None:
         """Sprung masses that arrive were at rest on level ground, whatever they did where they did not matter."""
@@ -147,15 +153,6 @@ def march(
     prepared = prepare(tables, values, counts, sampled)
     prepared.go(halted)
     return prepared.result(size)
-
-
-def _step(tables: SceneTables, segment: Segment, lanes: LaneTable) -> Array:
-    """(blocks, LANES) step of a segment in s; free vibration lasts some first periods of the body."""
-    if not segment.free:
-        return lanes.time_scale * segment.step
-    steps = sum(part.steps for part in tables.timeline.segments if part.free)
-    period = 2.0 * math.pi / tables.model.first_omega
-    return np.full_like(lanes.time_scale, tables.timeline.free_periods * period / steps)
 
 
 def _blank_marks(blocks: int, signals: int) -> Array:

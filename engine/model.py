@@ -8,15 +8,16 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bodies.body import Body
 from engine.bodies.build import build_body
 from engine.bodies.modal import ModalBody
 from engine.carriages import BodyCarriage, OscillatorCarriage
 from engine.kernels.schemes import Scheme
+from engine.numerics import Numerics
 from engine.scene import Study
 from engine.settings import SPRUNG
 from engine.standing import Place, Standing, stand
@@ -49,10 +50,11 @@ class BodyPart:
 @dataclass(frozen=True, eq=False)
 class SceneModel:
     """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
-    them. contacts: the ways of the contacts of bodies that ride. swept: keys of numbers that differ from variant to
-    variant."""
+    them. numerics: what it is computed with. contacts: the ways of the contacts of bodies that ride. swept: keys of
+    numbers that differ from variant to variant."""
 
     study: Study
+    numerics: Numerics
     bodies: tuple[BodyPart, ...]
     carriages: tuple[CarriageTie, ...]
     dampers: tuple[DamperTie, ...]
@@ -80,10 +82,10 @@ class SceneModel:
         """The springs under sprung masses."""
         return tuple(spring for spring in self.springs if spring.mode is not None)
 
-    @cached_property
+    @property
     def scheme(self) -> Scheme:
-        """The time integration scheme of the study."""
-        return self.study.solver.integration
+        """The time integration scheme."""
+        return self.numerics.scheme
 
     @property
     def leading_body(self) -> BodyPart:
@@ -146,7 +148,7 @@ class SceneModel:
     @property
     def fidelity(self) -> Fidelity:
         """The model that this scene marches: the fullest of its carriages'."""
-        if self.study.solver.fidelity == "static":
+        if self.numerics.fidelity == "static":
             return Fidelity.STATIC
         if self.springs:
             return Fidelity.TIED
@@ -164,45 +166,52 @@ class SceneModel:
 
 
 def build_model(
-    study: Study, paces: Mapping[str, float], delays: Mapping[str, float], swept: Collection[str] = ()
+    study: Study,
+    paces: Mapping[str, float],
+    delays: Mapping[str, float],
+    swept: Collection[str] = (),
+    numerics: Numerics | None = None,
 ) -> SceneModel:
     """The model of a study without sweep.
 
     paces: per carriage, the first carriage's time scale over its own. delays: per carriage, in the first one's time
-    scale. swept: keys of numbers that differ between the variants that share the model. Raises BadInput where the
-    scene cannot be marched.
+    scale. swept: keys of numbers that differ between the variants that share the model. numerics: as the study says if
+    not given. Raises BadInput where the scene cannot be marched.
     """
+    numerics = Numerics.of(study) if numerics is None else numerics
     used = [name for name in study.body if _in_use(study, name)]
     parts: list[BodyPart] = []
     first = 0
     for name in used:
-        part = _body_part(study, name, first)
+        part = _body_part(study, name, numerics.body(study, name), first)
         parts.append(part)
         first = part.modes.stop
     carriages = []
     for number, (name, carriage) in enumerate(study.carriage.items()):
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
-        carriages.append(CarriageTie(name, body, rider, _inertia(study, name, swept), ((number, 1.0),)))
+        carriages.append(CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), ((number, 1.0),)))
     dampers = [
         DamperTie(number, at, f"body.{name}.{key}")
         for number, name in enumerate(used)
         for key, at, coefficient in study.body[name].dampers()
         if coefficient > 0.0 or f"body.{name}.{key}" in swept
     ]
-    standing = _standing(study, carriages, parts, swept)
+    standing = _standing(study, numerics, carriages, parts, swept)
     contacts = tuple(rider for stands in standing.values() for rider in stands.riders)
     on_contacts = tuple(spring for stands in standing.values() for spring in stands.springs)
-    springs = (*_springs(study, first, swept), *on_contacts)
+    springs = (*_springs(study, numerics, first, swept), *on_contacts)
     carried = tuple(standing[n].carried(tie) if n in standing else tie for n, tie in enumerate(carriages))
-    model = SceneModel(study, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
+    model = SceneModel(study, numerics, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
     _check_rigid_modes(model)
     return model
 
 
-def simplified(model: SceneModel, changes: Mapping[str, Any]) -> SceneModel:
-    """The same scene with other values at dotted keys of its study, such as fewer modes. Raises BadInput."""
-    return build_model(model.study.with_values(changes), *model.timing, model.swept)
+def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
+    """The same scene computed with something else. Raises BadInput."""
+    if numerics == model.numerics:
+        return model
+    return build_model(model.study, *model.timing, model.swept, numerics)
 
 
 def check_moves(study: Study) -> None:
@@ -220,27 +229,27 @@ def _in_use(study: Study, body: str) -> bool:
     return body in (*rides, *ridden, *read)
 
 
-def _inertia(study: Study, name: str, swept: Collection[str]) -> Inertia:
+def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]) -> Inertia:
     """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
-    fidelity, carriage = study.solver.fidelity, study.carriage[name]
+    fidelity, carriage = numerics.fidelity, study.carriage[name]
     if fidelity in ("force", "static") or not carriage.inertial or isinstance(carriage, BodyCarriage):
         return "force"
-    if _sprung(study, name):
+    if _sprung(study, numerics, name):
         wheel = f"carriage.{name}.wheel_mass"
         return "mass" if study.value(wheel) > 0.0 or wheel in swept else "force"
     return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
 
 
-def _sprung(study: Study, name: str) -> bool:
+def _sprung(study: Study, numerics: Numerics, name: str) -> bool:
     """Whether a carriage's spring acts; below the full fidelity it is locked."""
-    return isinstance(study.carriage[name], OscillatorCarriage) and study.solver.fidelity in SPRUNG
+    return isinstance(study.carriage[name], OscillatorCarriage) and numerics.fidelity in SPRUNG
 
 
-def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
+def _springs(study: Study, numerics: Numerics, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
     """The springs of all sprung masses, whose modes are counted from ``first``."""
     found: list[SpringTie] = []
     for number, name in enumerate(study.carriage):
-        if _sprung(study, name):
+        if _sprung(study, numerics, name):
             key = f"carriage.{name}"
             damped = study.value(f"{key}.damping") > 0.0 or f"{key}.damping" in swept
             found.append(SpringTie(number, number, key, None, first + len(found), damped))
@@ -248,7 +257,7 @@ def _springs(study: Study, first: int, swept: Collection[str]) -> tuple[SpringTi
 
 
 def _standing(
-    study: Study, carriages: list[CarriageTie], parts: list[BodyPart], swept: Collection[str]
+    study: Study, numerics: Numerics, carriages: list[CarriageTie], parts: list[BodyPart], swept: Collection[str]
 ) -> dict[int, Standing]:
     """The bodies that ride, by the number of their carriage."""
     found: dict[int, Standing] = {}
@@ -257,16 +266,14 @@ def _standing(
         carriage = study.carriage[tie.name]
         if isinstance(carriage, BodyCarriage):
             rides = names.index(carriage.body)
-            found[number] = stand(
-                study, Place(number, tie, parts[tie.body].modal, rides, first), parts[rides].modal, swept
-            )
+            place = Place(number, tie, parts[tie.body].modal, rides, first)
+            found[number] = stand(study, numerics, place, parts[rides].modal, swept)
             first += len(carriage.contacts)
     return found
 
 
-def _body_part(study: Study, name: str, first: int) -> BodyPart:
+def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
     """A body of the study in modal coordinates, its modes counted from ``first``."""
-    body = study.body[name]
     try:
         built = build_body(body)
     except BadInput as error:

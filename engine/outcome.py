@@ -3,104 +3,153 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bucket import Bucket
-from engine.choice import scheme_used
 from engine.contacts import contact_forces
-from engine.cycles import counts_sampled, reduced
+from engine.cycles import reduced
 from engine.envelopes import MOST_KEPT, envelope_names
-from engine.estimates import Estimator, Observed, extremes_of, pair_errors
-from engine.improving import improvements
+from engine.histories import counts_reduced
 from engine.kernels.layout import (
     BELOW_AT,
     DIVERGED_AT,
     LARGEST,
     LARGEST_AT,
+    SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
 )
-from engine.lanes import LaneValues, padded, weights
+from engine.kernels.schemes import Scheme
+from engine.lanes import LaneValues, weights
 from engine.march import Marched
 from engine.model import SceneModel
-from engine.moving_load import STILL
-from engine.plan import Plan, reads_accelerations
+from engine.reduction import Reduction
 from engine.richardson import march_chosen
+from engine.scene import Study
 from engine.signals import silent
 from engine.tables import SceneTables
-from results_schema.parts import Rows, joined
-from results_schema.status import Fidelity, Status
+from engine.timeline import Window
+from results_schema.status import Fidelity, SchemeUsed, Status
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+STILL = 1e-6  # of the usual reading on its body: a static reading below, as on a support, is rounding (1e-12 at most)
+
 Flat = dict[str, NDArray[Any]]
 
 
-def run_chunk(
-    plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool] = lambda: False
-) -> tuple[Flat, Rows | None]:
-    """March some variants of a bucket; their results (V, ...) by name, and the histories of those that are kept.
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations."""
 
-    Those that miss their tolerance are marched again with more modes or steps, where the study leaves these open.
-    Raises Halted when ``halted`` says so between two segments.
-    """
-    flat = _computed(plan, bucket, variants, halted)
-    improved, rows = np.zeros(variants.size, dtype=np.bool_), []
-    for finer, lanes in improvements(plan, bucket, variants, flat):
-        better, more = run_chunk(plan, finer, variants[lanes], halted)
-        better["relative_cost"] = better["relative_cost"] + flat["relative_cost"][lanes]
-        for name, array in flat.items():
-            array[lanes] = better[name]
-        improved[lanes] = True
-        rows.append(more)
-    rows.append(_histories(plan, bucket, variants[~improved], halted))
-    return flat, joined([part for part in rows if part is not None])
+    study: Study
+    reduction: Reduction | None
+    window: Window
+    accelerated: bool = False
+
+    @property
+    def keeps_histories(self) -> bool:
+        """Whether histories of the sensors are a result."""
+        return self.study.output.histories != "none"
+
+    @property
+    def least_fidelity(self) -> Fidelity:
+        """The lowest model that tells these results: statics have no accelerations, and nothing that only motion
+        makes."""
+        if self.accelerated:
+            return Fidelity.FORCE
+        return Fidelity.STATIC if self.reduction is None else self.reduction.least_fidelity
 
 
-def _computed(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool]) -> Flat:
-    """The results (V, ...) of some variants of a bucket with their errors."""
-    tables, size = bucket.tables, variants.size
-    counts = counts_sampled(plan, tables)
-    marched, gap = march_chosen(tables, plan.values(bucket, padded(variants)), counts, size, halted)
-    envelopes = _envelopes(bucket, plan.values(bucket, padded(variants)), size, halted)
-    values = plan.values(bucket, variants)
-    own = reduced(plan, tables, values, counts, marched.history)
-    flat: Flat = {
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What V variants report by one march: numbers (V, ...) by name, histories (H, S, V) of all signals at the stations
+    that were asked for, statuses and the first diverged steps (V,), and (V, J) what errors of the sensors are divided
+    by, infinite for those that read but rounding."""
+
+    numbers: Flat
+    history: Array
+    status: NDArray[np.int8]
+    diverged_step: Counts
+    scale: Array
+
+    def of(self, lanes: Counts | NDArray[np.bool_]) -> Outcome:
+        """Some of the variants."""
+        numbers = {name: array[lanes] for name, array in self.numbers.items()}
+        return Outcome(
+            numbers, self.history[..., lanes], self.status[lanes], self.diverged_step[lanes], self.scale[lanes]
+        )
+
+    def replaced(self, lanes: Counts, other: Outcome) -> Outcome:
+        """The same with the outcome of other marches for some of the variants, at the same stations."""
+        found = Outcome(
+            {name: array.copy() for name, array in self.numbers.items()},
+            self.history.copy(),
+            self.status.copy(),
+            self.diverged_step.copy(),
+            self.scale.copy(),
+        )
+        for name, array in found.numbers.items():
+            array[lanes] = other.numbers[name]
+        found.history[..., lanes] = other.history
+        found.status[lanes], found.diverged_step[lanes] = other.status, other.diverged_step
+        found.scale[lanes] = other.scale
+        return found
+
+
+def outcome(
+    asked: Asked,
+    tables: SceneTables,
+    values: LaneValues,
+    stations: Counts,
+    halted: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
+    own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
+    counts = np.union1d(own, stations)
+    lanes, size = values.padded, values.size
+    marched = march_chosen(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
+    history = marched.history[np.searchsorted(counts, stations)]
+    reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
+    numbers = {
         **_extremes(tables, marched),
         **_contact_forces(tables, marched),
-        **envelopes,
+        **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
-        **own,
+        **reduced(asked.reduction, tables, values, own, reduction),
     }
     status, diverged_step = _status(tables.model, marched)
-    scale = _scale(tables, values, flat)
-    missed = None if gap is None else pair_errors(tables, values, gap, scale)
-    observed = Observed(tables, counts, marched.history, extremes_of(tables, marched), own)
-    errors = Estimator(plan, bucket, variants, scale, halted).errors(observed, missed)
-    status = np.maximum(status, errors.status(plan.study, values, bucket.chosen))
-    flat |= {f"error_{part}": column for part, column in errors._asdict().items()} | {"error_estimate": errors.total}
-    flat["relative_cost"] = bucket.cost / bucket.full_cost[bucket.of(variants)]
-    for name, array in flat.items():
+    for array in numbers.values():
         if array.dtype == np.float64:
             array[status >= Status.NOT_CONVERGED] = np.nan
-        flat[name] = array
-    return flat | {
-        "status": status.astype(np.int8),
-        "diverged_step": diverged_step,
+    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
+
+
+def used(tables: SceneTables, size: int) -> Flat:
+    """What so many variants were computed with, by the names of the archive."""
+    marched = 0 if _rests(tables) else tables.steps
+    modes = 0 if _knows_all(tables) else tables.model.body_modes
+    return {
         "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
-        "scheme_used": np.full(size, int(scheme_used(tables.model.study)), dtype=np.int8),
-        "modes_used": np.full(size, 0 if _knows_all(tables) else tables.model.body_modes, dtype=np.int32),
-        "steps_used": np.full(size, 0 if _rests(tables) else tables.steps, dtype=np.int32),
+        "scheme_used": np.full(size, int(number_of(tables.model.scheme)), dtype=np.int8),
+        "modes_used": np.full(size, modes, dtype=np.int32),
+        "steps_used": np.full(size, marched, dtype=np.int32),
+        "work": np.full(size, float(marched * tables.model.body_modes)),
     }
+
+
+def number_of(scheme: Scheme) -> SchemeUsed:
+    """A scheme as archives number it."""
+    return SchemeUsed[scheme.name.upper().replace("-", "_")]
 
 
 def _knows_all(tables: SceneTables) -> bool:
     """Whether these are statics of the whole body, whatever modes it keeps."""
-    return _rests(tables) and tables.model.study.solver.static_correction
+    return _rests(tables) and tables.model.numerics.static_correction
 
 
 def _rests(tables: SceneTables) -> bool:
@@ -111,38 +160,29 @@ def _rests(tables: SceneTables) -> bool:
 def _extremes(tables: SceneTables, marched: Marched) -> Flat:
     """Largest and smallest value of every sensor, where the first carriage was then, and the root mean square."""
     found: Flat = {}
-    counted = _counted(tables)
-    for j, sensor in enumerate(tables.sensors):
+    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         marks = marched.marks[j]
         seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
         found[f"{sensor.name}_max"] = np.where(seen, marks[LARGEST], np.nan)
         found[f"{sensor.name}_min"] = np.where(seen, marks[SMALLEST], np.nan)
         found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, marks[LARGEST_AT])
         found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, marks[SMALLEST_AT])
-        found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / max(1, counted[j]))
+        found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / np.where(marks[SECONDS] > 0.0, marks[SECONDS], 1.0))
     return found
 
 
-def _envelopes(bucket: Bucket, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:
+def _envelopes(own: SceneTables, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:
     """(V, places) largest and smallest values of every envelope, from marches that watch its places alone."""
-    found: dict[str, list[Array]] = {name: [] for name in envelope_names(bucket.scene.study)}
+    found: dict[str, list[Array]] = {name: [] for name in envelope_names(own.model.study)}
     nothing = np.zeros(0, dtype=np.int64)
-    for tables in bucket.envelopes:
-        marched, _ = march_chosen(tables, values, nothing, size, halted)
+    for tables in own.companions:
+        marched = march_chosen(tables, values, nothing, size, halted)
         for j, place in enumerate(tables.sensors):
             for end, mark in (("max", LARGEST), ("min", SMALLEST)):
                 found[f"{place.name}_envelope_{end}"].append(marched.marks[j, mark])
-        if len(bucket.envelopes) > MOST_KEPT:
+        if len(own.companions) > MOST_KEPT:
             tables.forget()
     return {name: np.stack(readings, axis=1) for name, readings in found.items()}
-
-
-def _counted(tables: SceneTables) -> list[int]:
-    """Number of steps at which every sensor counts."""
-    segments = [segment for segment in tables.timeline.segments if segment.recorded]
-    return [
-        sum(s.steps for s in segments if sensor.under is None or s.active[sensor.under]) for sensor in tables.sensors
-    ]
 
 
 def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
@@ -198,7 +238,7 @@ def _statics(tables: SceneTables, values: LaneValues) -> Flat:
     unit = tables.static_over_window
     loads, gravity = weights(tables.model, values), values.of("gravity")
     found: Flat = {}
-    for j, sensor in enumerate(tables.sensors):
+    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
             found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
         else:
@@ -218,48 +258,37 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
     return found
 
 
-def _scale(tables: SceneTables, values: LaneValues, flat: Flat) -> Array:
+def _scale(tables: SceneTables, values: LaneValues, numbers: Flat) -> Array:
     """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body; of a rate its
     own largest; infinite where nothing is but rounding."""
     columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
-    for sensor, usual in zip(tables.sensors, tables.static_scales, strict=True):
-        static = np.asarray(flat[f"{sensor.name}_static"], dtype=np.float64)
-        own = np.maximum(*(np.abs(np.asarray(flat[f"{sensor.name}_{end}"])) for end in ("max", "min")))
+    count = len(tables.model.study.sensor)
+    for sensor, usual in zip(tables.sensors[:count], tables.static_scales, strict=False):
+        static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
+        own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
         columns.append(own if sensor.offset_order else np.maximum(static, STILL * usual * weight))
-    found = np.stack(columns, axis=1) if columns else np.zeros((tables.model.ties, 0))
-    found[:, silent(tables.model, tables.sensors)] = np.inf
+    found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
+    found[:, silent(tables.model, tables.sensors[:count])] = np.inf
     return np.where(found > 0.0, found, np.inf)
 
 
-def _histories(plan: Plan, bucket: Bucket, variants: Counts, halted: Callable[[], bool]) -> Rows | None:
-    """Histories of the kept ones among some variants, marched again with samples."""
-    kept = np.intersect1d(variants, plan.shown)
-    if kept.size == 0:
-        return None
-    tables = bucket.tables.with_accelerations if reads_accelerations(plan.study) else bucket.tables
-    counts = plan.counts_shown(bucket)
-    values = plan.values(bucket, padded(kept))
-    marched, _ = march_chosen(tables, values, counts, kept.size, halted)
-    time_scale = plan.values(bucket, kept).time_scale(tables.model.carriages[0].name)
-    elapsed = _elapsed(tables, counts, time_scale)
-    arrays: dict[str, Array] = {"elapsed": elapsed}
+def histories(tables: SceneTables, values: LaneValues, counts: Counts, halted: Callable[[], bool]) -> dict[str, Array]:
+    """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
+    marched = march_chosen(tables, values.padded, counts, values.size, halted)
+    time_scale = values.time_scale(tables.model.carriages[0].name)
+    arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):
         arrays[sensor.name] = marched.history[:, j].T
     for c, carriage in enumerate(tables.model.carriages):
         path = tables.timeline.motion(c, counts.astype(np.float64))
-        arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], kept.size, axis=0)
+        arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], values.size, axis=0)
         arrays[f"{carriage.name}_speed"] = path.dS / time_scale[:, None]
         arrays[f"{carriage.name}_acceleration_along"] = path.ddS / time_scale[:, None] ** 2
     status, _ = _status(tables.model, marched)
     for name, array in arrays.items():
         if name != "elapsed":
             array[status >= Status.NOT_CONVERGED] = np.nan
-    size = plan.stations_shown
-    return Rows(kept, {name: _filled(np.ascontiguousarray(array), size) for name, array in arrays.items()})
-
-
-def _filled(array: Array, stations: int) -> Array:
-    return np.pad(array, ((0, 0), (0, stations - array.shape[1])), constant_values=np.nan)
+    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
 
 def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
@@ -271,7 +300,6 @@ def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
     if free.any():
         start = next(segment.first for segment in timeline.segments if segment.free)
         steps = timeline.steps - start
-        period = 2.0 * np.pi / tables.model.first_omega
-        rest = (counts - start) * (timeline.free_periods * period / steps)
+        rest = (counts - start) * (tables.free_seconds / steps)
         found = found + np.where(free, rest, 0.0)
     return found

@@ -1,69 +1,72 @@
-"""From a study to work: all variants, grouped by scene and step count, with sizes and times known before anything runs.
+"""From a study to work: all variants, grouped by scene and by what they are computed with, and what that will take.
 
-Scene, step count and bucket of a variant are functions of that variant alone, so no result depends on its neighbours.
+Everything follows from the study alone: neither chunks nor threads nor interruptions change a result.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import cached_property
-from hashlib import sha256
 from math import prod
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bucket import Bucket
-from engine.bucketing import CheckSteps, buckets_of
-from engine.choice import Asked
+from engine.accuracy.choice import PILOTS, Choice, Share, cases_tolerance, choose
+from engine.accuracy.grids import SceneGrid, fixed_steps, unit_steps
+from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
+from engine.accuracy.ladder import ladder_of
+from engine.accuracy.results import results_of
 from engine.envelopes import check_places, places_read
-from engine.histories import counts_shown
-from engine.kernels.layout import LANES, MARKS
+from engine.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
+from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.model import SceneModel, check_moves
+from engine.outcome import Asked
 from engine.reduction import Reduction
-from engine.resonance import check_steps
 from engine.scene import Study
-from engine.scenes import base_scene, scenes
+from engine.scenes import base_scene, scenes, split
+from engine.step_rules import check_even_steps, check_free_vibration, check_most_steps, check_slowest, check_steps
 from engine.sweep import Cases, expand
-from engine.tables import KEPT_BYTES
-from engine.timeline import Window, coarsened
+from engine.tables import SceneTables
+from engine.timeline import Window
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
-from results_schema.variables import declarations
+from results_schema.variables import declarations, registered
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
 
-START_SECONDS, BUCKET_SECONDS = 2.5, 0.02  # besides marching, for expected times only
-STATION_SECONDS, STATION_MODE_SECONDS = 3e-6, 2e-7  # of a station's tables, and of each mode in them; likewise
-CHECKED = 2.0  # times the tables of a march with those that it is compared with; likewise
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
 TASKS = 16  # into which small studies are cut, so that all threads have work
 MOST_LANES = 65536  # of one chunk
-MOST_HISTORY_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
-READING_SECONDS = 6e-7  # of an envelope's place at a station, in tables
-MOST_MARK_BYTES = 32 * 2**20  # of one chunk's extremes along bodies
-MOST_PAIR_BYTES = 12 * 2**20  # of one segment's histories of a chunk of Richardson pairs
 MOST_MEMORY = 16 * 2**30
-REPORTED = 0.5  # of what histories are off by that extremes and the like are expected to be
-STATIONS = 256  # of a whole run, about, at which histories are compared
+CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
+EVERY_MARCH = "march"  # the kind of results that every march has
 SHOWN = 64  # variants whose histories are kept by default
+#: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
+#: about as much as the convergence of two hundred variants of one scene.
+FEW, FEW_IN_SCENE = 256, 16
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Plan:
-    """All work of a study. ``base`` is the scene without sweep."""
+    """All work of a study. base: the scene without sweep. results: the kind whose declared results are kept. grids,
+    members: its scenes, and the variants of each. choice: of what a large sweep is computed with, once it is made."""
 
     study: Study
     cases: Cases
-    buckets: tuple[Bucket, ...]
-    reduction: Reduction | None
+    asked: Asked
+    grids: tuple[SceneGrid, ...]
+    members: tuple[Counts, ...]
     shown: Counts
     base: SceneModel
+    results: str
+    choice: Choice | None = None
+    _groups: tuple[Group, ...] = field(default=())
 
     @property
     def size(self) -> int:
@@ -73,104 +76,117 @@ class Plan:
     @property
     def window(self) -> Window:
         """What extremes and histories cover."""
-        return "whole" if self.reduction is None else "last-cycle"
+        return self.asked.window
 
-    @cached_property
-    def key(self) -> str:
-        """What finished parts belong to: the study's text, the files of its bodies, the kernels, and all that chooses
-        what they are given."""
-        from engine.kernels.jit import kernel_hash
+    @property
+    def reduction(self) -> Reduction | None:
+        """What the study makes of histories."""
+        return self.asked.reduction
 
-        files = [body.content for body in self.study.body.values() if body.content]
-        return "-".join([self.study.source.sha256, *files, kernel_hash(), _sources_hash()])
+    @property
+    def converges(self) -> bool:
+        """Whether every variant is marched until its results stay: where there are few."""
+        return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids))
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Variants that are computed alike; those of a large sweep are known when it is chosen for."""
+        if not self._groups:
+            self._groups = tuple(self._converging() if self.converges else self._marching())
+        return self._groups
+
+    @property
+    def cases_tolerance(self) -> Array:
+        """(V,) `solver.tolerance` of every variant over the study's."""
+        return cases_tolerance(self.asked, self.cases)
+
+    def choose(self, share: Share, halted: Callable[[], bool], pilots: int = PILOTS) -> None:
+        """Measure pilots and choose, where the study has many variants. Raises Halted."""
+        if not self.converges and self.choice is None:
+            self.choice = choose(self.asked, self.cases, self.grids, self.members, share, halted, pilots)
+            self._groups = ()  # those of before the choice told sizes only
+            self.__dict__.pop("seconds", None)
+
+    def _converging(self) -> Iterator[Group]:
+        for grid, members in zip(self.grids, self.members, strict=True):
+            yield ConvergingGroup(grid, members)
+
+    def _marching(self) -> Iterator[Group]:
+        """Variants of one scene by their rung, of like pace side by side: they rise and fall together."""
+        for grid, members in zip(self.grids, self.members, strict=True):
+            rungs = np.zeros(members.size, dtype=np.int64)
+            if self.choice is not None:
+                rungs = self.choice.rung[members].astype(np.int64)
+            for own in split(np.arange(members.size), rungs):
+                yield from self._on_rung(grid, members[own], int(rungs[own[0]]))
+
+    def _on_rung(self, grid: SceneGrid, variants: Counts, rung: int) -> Iterator[Group]:
+        """Variants on a rung, those that must take more steps apart."""
+        ladder = ladder_of(self.asked, grid)
+        column, cut = divmod(rung, len(ladder.cuts))
+        values = LaneValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
+        numerics = ladder.columns[column]
+        by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
+        pace = values.time_scale(grid.scene.carriages[0].name)
+        for part in split(np.arange(variants.size), by):
+            lanes = part[np.argsort(pace[part], kind="stable")]
+            yield MarchGroup(grid, variants[lanes], numerics, int(by[part[0]]))
 
     @cached_property
     def seconds(self) -> float:
         """Expected time of the march on one thread."""
-        return float(sum(bucket.seconds_per_variant * bucket.variants.size for bucket in self.buckets))
+        return float(sum(group.seconds_per_variant * group.variants.size for group in self.groups))
 
-    def total_seconds(self, threads: int) -> float:
-        """Expected wall time of a run: the march in whole blocks, tables and chunks, and starting up."""
-        found = START_SECONDS
-        for bucket in self.buckets:
-            lanes = LANES * -(-bucket.variants.size // LANES)
-            timeline = bucket.tables.timeline
-            again = timeline.repeats and bucket.tables.cycle_bytes <= KEPT_BYTES
-            tabulated = min(timeline.steps, bucket.steps) if again else timeline.steps
-            found += bucket.seconds_per_variant * lanes / threads
-            station = STATION_SECONDS + STATION_MODE_SECONDS * bucket.scene.body_modes
-            found += BUCKET_SECONDS + CHECKED * station * tabulated * bucket.scene.ties
-            found += READING_SECONDS * tabulated * places_read(self.study)
-        return found
-
-    def counts_shown(self, bucket: Bucket) -> Counts:
-        """Stations of the kept histories of a bucket, by their count; steps that were added give none."""
-        timeline = coarsened(bucket.tables.timeline, bucket.added)
-        return bucket.added * counts_shown(timeline, self.window, self.study.output.histories)
-
-    @cached_property
+    @property
     def stations_shown(self) -> int:
-        """The most stations that any kept history has."""
-        return max((self.counts_shown(bucket).size for bucket in self._shown_buckets()), default=0)
+        """About the most stations that a kept history has."""
+        if self.study.output.histories == "auto":
+            return WHOLE_STATIONS
+        units = max(rider.end for rider in self.base.riders)
+        return int(np.ceil(units * max((group.usual_steps for group in self.groups), default=0)))
 
     @cached_property
-    def phases_shown(self) -> NDArray[np.float64] | None:
+    def phases_shown(self) -> Array | None:
         """The phases of the kept histories over a cycle, if all variants have the same."""
         if self.window != "last-cycle" or self.base.riders[0].motion.period is None:
             return None
-        found = []
-        for bucket in self._shown_buckets():
-            first, last = bucket.tables.timeline.window
-            found.append((self.counts_shown(bucket) - first) / (last - first))
-        same = bool(found) and all(np.array_equal(found[0], phases) for phases in found)
-        return found[0] if same else None
-
-    def _shown_buckets(self) -> list[Bucket]:
-        return [bucket for bucket in self.buckets if np.isin(self.shown, bucket.variants).any()]
+        if self.study.output.histories == "auto" and not self.grids[0].fixed:
+            return np.arange(CYCLE_STATIONS) / CYCLE_STATIONS
+        if len({grid.unit for grid in self.grids}) > 1 or not self.grids[0].fixed:
+            return None
+        timeline = self.grids[0].tables(self.grids[0].scene, 1).timeline
+        first, last = timeline.window
+        return (counts_shown(timeline, self.window, self.study.output.histories) - first) / (last - first)
 
     @property
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
         shown = int(self.shown.size) * self.stations_shown * (len(self.study.sensor) + 2)
-        return 8 * (self.size * numbers_per_variant(self.study, self.reduction) + shown) + 65536
+        return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
 
     @property
     def memory_bytes(self) -> int:
         """Expected peak: results, a chunk per thread, and the program itself."""
         return needed_memory(self.disk_bytes)
 
-    def lanes_per_chunk(self, bucket: Bucket) -> int:
+    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Group, Counts]]:
+        """The tasks that are left; ``chunk`` fixes the number of variants of each."""
+        for group in self.groups:
+            left = group.variants if done is None else group.variants[~np.isin(group.variants, done)]
+            size = chunk or _even(left.size, self.lanes_per_chunk(group))
+            for first in range(0, left.size, size):
+                yield group, left[first : first + size]
+
+    def lanes_per_chunk(self, group: Group) -> int:
         """Variants of one task, by time and memory."""
-        task = float(np.clip(self.seconds / TASKS, LEAST_TASK_SECONDS, TASK_SECONDS))
-        lanes = task / bucket.seconds_per_variant
-        rows = min(2 * (STATIONS if self.reduction is None else self.reduction.stations), bucket.steps)
-        lanes = min(lanes, MOST_HISTORY_BYTES / (8 * rows * max(1, len(self.study.sensor))))
-        watched = max(len(tables.signals) for tables in (bucket.tables, *bucket.envelopes))
-        lanes = min(lanes, MOST_MARK_BYTES / (8 * MARKS * watched))
-        if bucket.scene.scheme.stride > 1:  # a pair has all histories of a segment in memory
-            stations = 1.5 * max(segment.steps for segment in bucket.tables.timeline.segments)
-            lanes = min(lanes, MOST_PAIR_BYTES / (8 * stations * watched))
+        least = TASK_SECONDS if self.converges else LEAST_TASK_SECONDS  # each chunk has tables of its own there
+        task = float(np.clip(self.seconds / TASKS, least, TASK_SECONDS))
+        lanes = min(task / max(group.seconds_per_variant, 1e-12), CHUNK_BYTES / group.chunk_bytes)
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
 
-    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Bucket, Counts]]:
-        """The tasks that are left; ``chunk`` fixes the number of variants of each."""
-        for bucket in self.buckets:
-            left = bucket.variants if done is None else bucket.variants[~np.isin(bucket.variants, done)]
-            size = chunk or _even(left.size, self.lanes_per_chunk(bucket))
-            for first in range(0, left.size, size):
-                yield bucket, left[first : first + size]
-
-    def values(self, bucket: Bucket, variants: Counts) -> LaneValues:
-        """Numbers of some variants of a bucket."""
-        return LaneValues(bucket.scene.study, self.cases.columns_of(variants), variants.size)
-
-
-def _sources_hash() -> str:
-    """SHA-256 over the engine's own sources."""
-    digest = sha256()
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
-    return digest.hexdigest()
+    def values(self, group: Group, variants: Counts) -> LaneValues:
+        """Numbers of some variants of a group."""
+        return LaneValues(group.scene.study, self.cases.columns_of(variants), variants.size)
 
 
 def _even(size: int, most: int) -> int:
@@ -179,42 +195,95 @@ def _even(size: int, most: int) -> int:
     return LANES * max(1, -(-size // (parts * LANES)))
 
 
-def make_plan(study: Study, *, reduction: Reduction | None = None, check_steps: CheckSteps = check_steps) -> Plan:
+def make_plan(
+    study: Study,
+    *,
+    reduction: Reduction | None = None,
+    results: str = EVERY_MARCH,
+    check_steps: CheckSteps = check_steps,
+) -> Plan:
     """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed.
 
-    check_steps: refuses fixed steps that cannot be right.
+    results: the kind whose declared results are kept, which must be declared by then; those of every march unless a
+    study names its own. check_steps: refuses fixed steps that cannot be right.
     """
+    if results not in registered():
+        raise BadInput("no such kind of results is declared", where="results", received=repr(results))
     check_moves(study)
     cases = expand(study)
-    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(study, reduction))
     window: Window = "whole" if reduction is None else "last-cycle"
-    asked = Asked(_least(study, reduction), window, 1.0 if reads_accelerations(study) else REPORTED)
-    buckets = tuple(
-        bucket
-        for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64))
-        for bucket in buckets_of(scene, cases, variants, asked, check_steps)
+    asked = Asked(study, reduction, window, reads_accelerations(results))
+    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(asked))
+    grids, members = [], []
+    for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):
+        for grid, own in _grids(asked, cases, scene, variants, check_steps):
+            grids.append(grid)
+            members.append(own)
+    check_places(study, (grid.scene for grid in grids))
+    plan = Plan(
+        study, cases, asked, tuple(grids), tuple(members), _shown(study, cases.size), base_scene(study), results
     )
-    check_places(study, (bucket.scene for bucket in buckets))
-    plan = Plan(study, cases, buckets, reduction, _shown(study, cases.size), base_scene(study))
     check_memory(study, plan.size, plan.disk_bytes)
     return plan
 
 
-def _least(study: Study, reduction: Reduction | None) -> Fidelity:
-    """Statics have no accelerations, and no result that only motion makes."""
-    if reads_accelerations(study):
-        return Fidelity.FORCE
-    return Fidelity.STATIC if reduction is None else reduction.least_fidelity
+def _grids(
+    asked: Asked, cases: Cases, scene: SceneModel, variants: Counts, check_steps: CheckSteps
+) -> Iterator[tuple[SceneGrid, Counts]]:
+    """The variants of a scene, by their steps where the study fixes these. Raises BadInput."""
+    values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
+    check_readings(scene, asked.window)
+    if scene.fidelity is Fidelity.STATIC or not fixed_steps(values):
+        if scene.fidelity is not Fidelity.STATIC:
+            check_slowest(scene, values)
+            check_springs(scene)
+        yield SceneGrid(asked, scene, values, unit_steps(scene)), variants
+        return
+    steps = values.of("solver.steps").astype(np.int64)
+    check_even_steps(scene, steps)
+    check_most_steps(scene, steps)
+    check_steps(scene, values, steps)
+    for lanes in split(np.arange(variants.size), steps):
+        unit = int(steps[lanes[0]]) // scene.scheme.stride
+        yield SceneGrid(asked, scene, values.part(lanes), unit), variants[lanes]
 
 
-def reads_accelerations(study: Study) -> bool:
-    """Whether the kind of study keeps the accelerations of the carriages."""
-    return "{carriage}_acceleration_across" in {variable.name for variable in declarations(study.kind)}
+def check_springs(scene: SceneModel) -> None:
+    """Refuse free vibration with springs by a conditionally stable scheme. Raises BadInput."""
+    if scene.springs:
+        check_free_vibration(scene)
 
 
-def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
+def check_readings(scene: SceneModel, window: Window) -> None:
+    """Refuse a sensor under a carriage that is never on its body while anything is recorded, and rates of what is at
+    rest. Raises BadInput."""
+    tables = SceneTables(scene, 1, window)
+    for sensor in tables.sensors:
+        if scene.fidelity is Fidelity.STATIC and sensor.offset_order:
+            raise BadInput(
+                f'fidelity = "static" has no {sensor.quantity}',
+                where=scene.study.source.where(f"sensor.{sensor.name}.quantity"),
+                expected="a quantity that statics tell, such as displacement",
+            )
+        seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
+        if not seen:
+            raise BadInput(
+                "the carriage is off its body for all of the recorded part, so the sensor reads nothing",
+                where=scene.study.source.where(f"sensor.{sensor.name}.under"),
+                expected="a carriage on its body",
+            )
+
+
+def reads_accelerations(results: str) -> bool:
+    """Whether the results of this kind include the accelerations of the carriages."""
+    return "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
+
+
+def numbers_per_variant(asked: Asked) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
+    study, reduction = asked.study, asked.reduction
     found = 6 * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
+    found += -(-len(results_of(asked)) // 2)  # errors are of half that size
     if reduction is not None:
         sizes = reduction.sizes(study)
         found += sum(prod(sizes[dim] for dim in dims) for dims in reduction.outputs(study).values())
@@ -223,7 +292,7 @@ def numbers_per_variant(study: Study, reduction: Reduction | None) -> int:
 
 def needed_memory(result_bytes: int) -> int:
     """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
-    return 300 * 2**20 + 3 * result_bytes + 6 * MOST_HISTORY_BYTES
+    return 300 * 2**20 + 3 * result_bytes + 6 * CHUNK_BYTES
 
 
 def check_memory(study: Study, size: int, result_bytes: int) -> None:

@@ -16,6 +16,7 @@ from engine.kernels.layout import (
     LARGEST,
     LARGEST_AT,
     MARKS,
+    SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
@@ -34,9 +35,9 @@ Flags = NDArray[np.bool_]
 MOST_READINGS = 2**22  # stations x signals x variants at a time
 
 
-def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> Marched:
+def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int, sampled: int | None = None) -> Marched:
     """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
-    sensors at stations by their count."""
+    first ``sampled`` signals, or of the sensors, at stations by their count."""
     model, signals = tables.model, tables.signals
     loads = np.stack([*weights(model, values), values.of("gravity")])[:, :size]
     at = tables.static_counts
@@ -49,11 +50,14 @@ def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int) -> 
         marks[:, :, part] = _marks(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
     marks = marks[:, :, inverse.reshape(-1)]
     sensors = len(tables.sensors)
+    time_scale = values.time_scale(model.carriages[0].name)[:size]
+    marks[:sensors, SQUARES], marks[:sensors, SECONDS] = _squares(tables, loads, time_scale)
     guard = np.full((len(signals) - sensors, MARKS, size), -1.0)
-    history = np.zeros((counts.size, sensors, size))
+    shown = sensors if sampled is None else sampled
+    history = np.zeros((counts.size, shown, size))
     if counts.size:
-        here = _counted(tables, signals[:sensors], tables.ways_at(counts))[:, :, None]
-        found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :sensors], loads)
+        here = _counted(tables, signals[:shown], tables.ways_at(counts))[:, :, None]
+        found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
     return Marched(marks, guard, history, np.ones(size, dtype=np.bool_))
 
@@ -92,6 +96,27 @@ def _marks(readings: Array, counted: Flags, at: Array) -> Array:
         found[:, where] = np.where(np.asarray(counted.any(axis=0))[:, None], at[place], -1.0)
     below: Flags = np.logical_and(seen, readings < 0.0)
     found[:, BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
-    step = np.gradient(at)[:, None, None]
-    found[:, SQUARES] = np.sum(np.where(seen, readings**2, 0.0) * step, axis=0)
     return found
+
+
+def _squares(tables: SceneTables, loads: Array, time_scale: Array) -> tuple[Array, Array]:
+    """(J, V) integrals over time of the sensors' squared readings, and the time in which they count, s.
+
+    Between two of the stations nothing jumps, so the driven part is summed over the middles between them; in free
+    vibration all stand where they stopped. Readings are linear in the loads (L, V), so their squares are loads Q loads
+    with one matrix Q for all variants, which differ in their pace.
+    """
+    at, timeline, sensors = tables.static_counts, tables.timeline, len(tables.sensors)
+    parts = [(0.5 * (at[:-1] + at[1:]), np.diff(timeline.moments(at)[1]), time_scale)]
+    parked = [segment for segment in timeline.segments if segment.free and segment.recorded]
+    if parked:
+        parts.append((np.array([parked[0].first + 0.5]), np.ones(1), np.full_like(time_scale, tables.free_seconds)))
+    squares, seconds = np.zeros((sensors, time_scale.size)), np.zeros((sensors, time_scale.size))
+    for counts, lengths, scale in parts:
+        weight = _counted(tables, tables.signals[:sensors], tables.ways_at(counts)) * lengths[:, None]
+        unit = _unit(tables, counts)[:, :sensors]
+        products = np.einsum("sj,sjl,sjm->jlm", weight, unit, unit, optimize=True)
+        for row, load in zip(np.moveaxis(products, 1, 0), loads, strict=True):
+            squares += (row @ loads) * load * scale
+        seconds += weight.sum(axis=0)[:, None] * scale
+    return np.maximum(squares, 0.0), seconds

@@ -55,7 +55,7 @@ class Sensor:
     def shape(self, model: SceneModel, along: tuple[Way, ...], derivative: int) -> Array:
         """(1 or stations, modes of its body) mode shapes where it reads."""
         body = model.bodies[self.body].modal
-        return body.shape([self.at], derivative) if self.under is None else along[self.under].shape(body, derivative)
+        return body.shape_at(self.at, derivative) if self.under is None else along[self.under].shape(body, derivative)
 
     def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
         """Its sums over the modes."""
@@ -77,7 +77,7 @@ class Sensor:
     def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
         """(stations, ties): static response per unit force of each tie that the kept modes miss."""
         found = np.zeros((along[0].s.size, model.ties))
-        if self.quantity not in DERIVATIVE or not model.study.solver.static_correction:
+        if self.quantity not in DERIVATIVE or not model.numerics.static_correction:
             return found
         known = dict[Grip, Array]()
         for r, grip in self._felt(model, along):
@@ -98,7 +98,7 @@ class Sensor:
 
     def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
         """(1 or stations,) static reading per unit force where a grip holds its body."""
-        if not model.study.solver.static_correction:
+        if not model.numerics.static_correction:
             return self._kept(model, along, shape_rows(model, grip, along))
         whole = self._full(model, along, place(grip, along))
         here = None if grip.rider is None else along[grip.rider].here

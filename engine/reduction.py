@@ -78,6 +78,10 @@ class Reduction(Protocol):
     def least_fidelity(self) -> Fidelity:
         """The lowest model that tells these results at all."""
 
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Names of the results whose differences are told, in the order of `differences`."""
+
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         """Names of the results with the dimensions beyond the variant."""
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bucket import Bucket
-from engine.lanes import LaneValues, moving_mass, weight
+from engine.accuracy.grids import SceneGrid
+from engine.lanes import moving_mass, weight
 from engine.plan import Plan
 
 Array = NDArray[np.float64]
@@ -50,55 +50,53 @@ def _leaves_between(plan: Plan) -> Iterator[str]:
 
 
 def _fast(plan: Plan) -> Iterator[str]:
-    worst = max((_speed_ratio(plan, bucket).max() for bucket in plan.buckets), default=0.0)
+    worst = max((_speed_ratio(grid).max() for grid in plan.grids), default=0.0)
     if worst > FAST:
         yield f"some variants run at up to {worst:.3g} times the critical speed omega_1 L/pi: are the units right?"
 
 
 def _heavy(plan: Plan) -> Iterator[str]:
     worst = 0.0
-    for bucket, values in _lanes(plan):
-        for number, carriage in enumerate(bucket.scene.carriages):
-            mass = bucket.scene.bodies[carriage.body].modal.mass
-            worst = max(worst, float(moving_mass(bucket.scene, values, number).max()) / mass)
+    for grid in plan.grids:
+        for number, carriage in enumerate(grid.scene.carriages):
+            mass = grid.scene.bodies[carriage.body].modal.mass
+            worst = max(worst, float(moving_mass(grid.scene, grid.values, number).max()) / mass)
     if worst > HEAVY:
         yield f"a carriage weighs up to {worst:.3g} times its body: look at more modes and steps before believing it"
 
 
 def _deep(plan: Plan) -> Iterator[str]:
     worst = 0.0
-    for bucket, values in _lanes(plan):
-        for number, carriage in enumerate(bucket.scene.carriages):
-            body = bucket.scene.bodies[carriage.body].modal
+    for grid in plan.grids:
+        for number, carriage in enumerate(grid.scene.carriages):
+            body = grid.scene.bodies[carriage.body].modal
             if not body.rigid_modes:
                 s = np.linspace(0.0, body.length, 33)
                 flexibility = np.abs(body.influence_at(s, s)).max() / body.length
-                worst = max(worst, float(np.abs(weight(bucket.scene, values, number)).max()) * flexibility)
+                worst = max(worst, float(np.abs(weight(grid.scene, grid.values, number)).max()) * flexibility)
     if worst > DEEP:
         yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
 
 
 def _thin(plan: Plan) -> Iterator[str]:
     """Fewer than 20 fixed steps in a first period."""
-    for bucket in plan.buckets:
-        if bucket.reason == "as the study says":
-            time_scale = plan.values(bucket, bucket.variants).time_scale(bucket.scene.carriages[0].name)
-            periods = float(time_scale.max()) * bucket.scene.first_omega / (2.0 * np.pi)
-            if bucket.steps < 20.0 * periods:
-                yield f"{bucket.steps} steps are only {bucket.steps / periods:.2g} in a first period of the body"
+    for grid in plan.grids:
+        if grid.fixed:
+            periods = float(_time_scale(grid).max()) * grid.scene.first_omega / (2.0 * np.pi)
+            steps = grid.unit * grid.scene.scheme.stride
+            if steps < 20.0 * periods:
+                yield f"{steps} steps are only {steps / periods:.2g} in a first period of the body"
 
 
-def _lanes(plan: Plan) -> Iterator[tuple[Bucket, LaneValues]]:
-    for bucket in plan.buckets:
-        yield bucket, plan.values(bucket, bucket.variants)
+def _time_scale(grid: SceneGrid) -> Array:
+    """(V,) s per unit of scene time."""
+    return grid.values.time_scale(grid.scene.carriages[0].name)
 
 
-def _speed_ratio(plan: Plan, bucket: Bucket) -> Array:
+def _speed_ratio(grid: SceneGrid) -> Array:
     """(V,) top speed of the first carriage over the critical speed."""
-    scene = bucket.scene
-    speed = scene.carriages[0].rider.top_speed / plan.values(bucket, bucket.variants).time_scale(
-        scene.carriages[0].name
-    )
+    scene = grid.scene
+    speed = scene.carriages[0].rider.top_speed / _time_scale(grid)
     return np.asarray(speed * np.pi / (scene.first_omega * scene.leading_body.modal.length))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from engine.histories import rows_sampled
 from engine.kernels.layout import LANES, LARGEST, SMALLEST, Record, Watch
-from engine.kernels.pairs import extrapolate, survey
+from engine.kernels.pairs import extrapolate, integrate, survey
 from engine.lanes import LaneValues, from_blocks
 from engine.march import Halted, March, Marched, march, prepare
 from engine.quasistatic import rest
@@ -27,26 +27,35 @@ Counts = NDArray[np.int64]
 
 
 def march_chosen(
-    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
-) -> tuple[Marched, Array | None]:
-    """March by the study's scheme, or rest at every place; a pair gives its largest estimated errors (sensors, V) too.
-    Raises Halted."""
+    tables: SceneTables,
+    values: LaneValues,
+    counts: Counts,
+    size: int,
+    halted: Callable[[], bool] = lambda: False,
+    sampled: int | None = None,
+) -> Marched:
+    """March by the model's scheme, or rest at every place; sampled: so many signals, or the sensors. Raises Halted."""
     if tables.model.fidelity is Fidelity.STATIC:
-        return rest(tables, values, counts, size), None
+        return rest(tables, values, counts, size, sampled)
     if tables.model.scheme.stride == 1:
-        return march(tables, values, counts, size, halted), None
-    return march_pair(tables, values, counts, size, halted)
+        return march(tables, values, counts, size, halted, sampled)
+    return march_pair(tables, values, counts, size, halted, sampled)[0]
 
 
 def march_pair(
-    tables: SceneTables, values: LaneValues, counts: Counts, size: int, halted: Callable[[], bool] = lambda: False
+    tables: SceneTables,
+    values: LaneValues,
+    counts: Counts,
+    size: int,
+    halted: Callable[[], bool] = lambda: False,
+    sampled: int | None = None,
 ) -> tuple[Marched, Array]:
     """March with the tables' steps, whose refinement is even, and with half of them.
 
     Returns what `march` does of the extrapolated histories, extremes also from between stations, and (sensors, V) the
     largest estimated error of the finer march over its whole recorded history. Raises Halted.
     """
-    fine, coarse = (_whole_histories(part, values, counts) for part in (tables, tables.coarser))
+    fine, coarse = (_whole_histories(part, values, counts, sampled) for part in (tables, tables.coarser))
     pair = _Pair(fine, coarse, *_blank(fine))
     for short, long in zip(fine.tables.timeline.segments, coarse.tables.timeline.segments, strict=True):
         pair.along(short, long)
@@ -55,35 +64,25 @@ def march_pair(
     return fine.result(size), from_blocks(pair.gap, size)[: len(tables.sensors)]
 
 
-def relative_error(tables: SceneTables, marched: Marched, gap: Array, statics: Array) -> Array:
-    """(V,) the largest of the sensors' errors ``gap`` (sensors, V), each relative to its largest static value
-    (``statics``: sensors, V), and to its own largest value where that is none: velocity and acceleration."""
-    worst = np.zeros(gap.shape[1])
-    for j in range(len(tables.sensors)):
-        own = np.maximum(marched.marks[j, LARGEST], -marched.marks[j, SMALLEST])
-        scale = np.where(statics[j] > 0.0, statics[j], own)
-        worst = np.maximum(worst, np.divide(gap[j], scale, out=np.zeros_like(worst), where=scale > 0.0))
-    return worst
-
-
 @dataclass(frozen=True, eq=False)
 class _Histories(March):
     """A march that hands over the histories of all its signals, segment by segment."""
 
-    def along(self, segment: Segment) -> tuple[Array, NDArray[np.bool_]]:
-        """March a segment: its signals (blocks, S, signals, LANES) at all stations, and where they count."""
+    def along(self, segment: Segment) -> tuple[Array, Watch]:
+        """March a segment: its signals (blocks, S, signals, LANES) at all stations, and what was observed."""
         table = self.tables.table(segment)
         watch = _watched(segment, table)
         history = np.empty((self.marks.shape[0], segment.steps + 1, watch.offset.shape[1], LANES))
         replace(self, history=history)._segment(segment, table, True)
-        return history, watch.counted
+        return history, watch
 
     def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Watch, Record]:
         watch = _watched(segment, table)
         marks = np.zeros_like(self.marks[:, : watch.offset.shape[1]])
         marks[:, :, LARGEST], marks[:, :, SMALLEST] = np.inf, -np.inf  # nothing is news: `survey` looks for extremes
         record = Record(marks, np.arange(segment.steps + 1), self.history)
-        return watch._replace(counted=np.ones_like(watch.counted)), record
+        everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)  # `survey` sums squares
+        return watch._replace(counted=everywhere, summed=nowhere), record
 
 
 def _watched(segment: Segment, table: SegmentTable) -> Watch:
@@ -91,9 +90,9 @@ def _watched(segment: Segment, table: SegmentTable) -> Watch:
     return table.watch if segment.recorded else table.guard
 
 
-def _whole_histories(tables: SceneTables, values: LaneValues, counts: Counts) -> _Histories:
+def _whole_histories(tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None) -> _Histories:
     """A march that is ready to go."""
-    ready = prepare(tables, values, counts)
+    ready = prepare(tables, values, counts, sampled)
     return _Histories(ready.tables, ready.lanes, counts, ready.state, ready.marks, ready.guard, ready.history)
 
 
@@ -116,13 +115,14 @@ class _Pair:
 
     def along(self, segment: Segment, coarse_segment: Segment) -> None:
         """One segment of both, extrapolated and observed."""
-        (fine, counted), (coarse, _) = self.fine.along(segment), self.coarse.along(coarse_segment)
-        signals = fine.shape[2]
+        (fine, watch), (coarse, _) = self.fine.along(segment), self.coarse.along(coarse_segment)
+        counted, signals = watch.counted, fine.shape[2]
         gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
         extrapolate(fine, coarse, counted, gap)
         marks = self.fine.marks if segment.recorded else self.fine.guard
         carry = np.ascontiguousarray(self.carry[:, :signals])
         survey(fine, counted, marks, carry, _joined(self.before, segment), segment.first)
+        integrate(fine, watch.summed, marks, self.fine.step(segment))
         self.carry[:, :signals] = carry
         self.before = segment
         if segment.recorded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
-from engine.bodies import AnyBody
+from engine.bodies import BODIES, AnyBody
+from engine.bodies.body import Recorded
 from engine.carriages import AnyCarriage, BodyCarriage
 from engine.checks import Check, on_body
 from engine.document import Document, Source, document_of, read_document, shortened
@@ -142,10 +144,36 @@ class Study(Scene):
 def load(path_or_text: str | Path) -> Study:
     """The study of a file, or of TOML text with line breaks. Raises BadInput."""
     document = read_document(path_or_text)
+    _check_version(document)
+    return Study(document)
+
+
+def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:
+    """The study of an archive from its text: bodies out of files are as recorded, and no file is opened.
+
+    recorded: by the names of bodies; one that is missing, as of a body that nothing uses, has no length. Raises
+    BadInput.
+    """
+    document = read_document(f"{text}\n")
+    _check_version(document)
+    tables = document.data.get("body")
+    if not isinstance(tables, dict):
+        return Study(document)
+    bodies = {name: _beside(table, recorded.get(name, Recorded(math.nan))) for name, table in tables.items()}
+    return Study(Document(document.data | {"body": bodies}, document.source))
+
+
+def _beside(table: Any, recorded: Recorded) -> Any:
+    """The table of a body with what is recorded of it, if it is one that is made of files."""
+    kind = table.get("kind") if isinstance(table, dict) else None
+    made_of_files = isinstance(kind, str) and getattr(BODIES.get(kind), "names_files", False)
+    return table | {"recorded": recorded} if made_of_files else table
+
+
+def _check_version(document: Document) -> None:
     if "schema_version" not in document.data:
         where = document.source.where("schema_version")
         raise BadInput("this key is missing", where=where, expected=f"schema_version = {SCHEMA_VERSION}")
-    return Study(document)
 
 
 def value_in(scene: Scene, path: str) -> Any:

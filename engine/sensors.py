@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from engine.spec import Spec, one_of
-from engine.units import Length, fault
+from engine.spec import NUMBER, WORD, Spec, form_of_amount, one_of
+from engine.units import Dimensionless, Length, fault
 
 OF_A_MASS = ("displacement", "velocity", "acceleration")
 OF_A_BODY = (*OF_A_MASS, "bending_moment", "shear_force", "axial_force", "stress", "strain")
@@ -23,12 +23,20 @@ _MEANT = {
 MOST_PLACES = 201
 
 
+OwnTolerance = Annotated[
+    Annotated[Literal["told"], Tag(WORD)] | Annotated[Annotated[Dimensionless, Field(gt=0, lt=1)], Tag(NUMBER)],
+    Discriminator(lambda value: WORD if value == "told" else form_of_amount(value)),
+]
+
+
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at the point that a carriage touches (`under`),
     of a carriage's own sprung mass (`carriage`), or the contact force of a carriage (of a body that rides, that at one
     `contact`).
 
-    With `under` or `carriage`, the body is that of the carriage and need not be named.
+    With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
+    of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
+    forces where nothing is given.
     """
 
     body: str | None = None
@@ -37,6 +45,7 @@ class Sensor(Spec):
     carriage: str | None = None
     contact: str | None = None
     quantity: Annotated[str, AfterValidator(one_of(*OF_A_BODY, "contact_force", meant=_MEANT))] = "displacement"
+    tolerance: OwnTolerance | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:

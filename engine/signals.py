@@ -67,6 +67,7 @@ def tabulate_watch(
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
     modes = 4 * -(-model.omega.size // 4)
+    counted = np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1))
     return Watch(
         on_q=_stacked(rows["q"], modes),
         on_v=_stacked(rows["v"], modes),
@@ -76,7 +77,25 @@ def tabulate_watch(
         static=tabulate_missed(model, signals, along) if missed is None else missed,
         offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
-        counted=np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1)),
+        counted=counted,
+        summed=np.array([isinstance(s, Sensor) for s in signals], dtype=np.bool_) & counted.all(axis=0),
+    )
+
+
+def last_signals(watch: Watch, count: int) -> Watch:
+    """The last so many signals of a watch, which have no channels, such as contact forces."""
+    part = slice(watch.counted.shape[1] - count, None)
+    return Watch(
+        on_q=_stacked([], watch.on_q.shape[2]),
+        on_v=_stacked([], watch.on_v.shape[2]),
+        on_a=_stacked([], watch.on_a.shape[2]),
+        signal=watch.signal[:0],
+        order=watch.order[:0],
+        static=np.ascontiguousarray(watch.static[:, part]),
+        offset=np.ascontiguousarray(watch.offset[:, part]),
+        offset_order=watch.offset_order[part],
+        counted=np.ascontiguousarray(watch.counted[:, part]),
+        summed=watch.summed[part],
     )
 
 

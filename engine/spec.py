@@ -12,7 +12,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, Discriminator, GetCoreSchemaHandler, Tag, ValidationError
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from engine.document import Source, shortened
+from engine.document import Beside, Source, shortened
 from engine.units import Unit, fault
 from results_schema.errors import BadInput
 
@@ -55,7 +55,8 @@ by_amount_form = Discriminator(form_of_amount)
 class KindOf:
     """Annotation of a table whose class is chosen by its key `kind`.
 
-    table: kind -> class, looked up when a study is read, so that a new kind is one new entry.
+    table: kind -> class, looked up when a study is read, so that a new kind is one new entry. What stands beside the
+    keys that a user wrote (`Beside`) reaches the validators as their context.
     planned: kinds that the interface names and that are not built yet.
     """
 
@@ -72,7 +73,9 @@ class KindOf:
             raise fault("a table is wanted here", expected=f"the keys of a {self.noun}", received=shortened(value))
         kind = value.get("kind")
         if isinstance(kind, str) and kind in self.table:
-            return self.table[kind].model_validate(value)
+            beside = [item for item in value.values() if isinstance(item, Beside)]
+            written = {key: item for key, item in value.items() if not isinstance(item, Beside)}
+            return self.table[kind].model_validate(written, context=beside[0] if beside else None)
         known = ", ".join(self.table)
         if isinstance(kind, str) and kind in self.planned:
             problem = fault(f'{self.noun} kind "{kind}" is not built yet', expected=known, received=shortened(kind))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from engine.bodies.modal import ModalBody
 from engine.carriages import BodyCarriage, Contact
+from engine.numerics import Numerics
 from engine.scene import Study
 from engine.settings import SPRUNG
 from engine.ties import CarriageTie, Grip, SpringTie
@@ -54,7 +55,7 @@ class Standing:
         return replace(tie, loads=loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
 
 
-def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) -> Standing:
+def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swept: Collection[str]) -> Standing:
     """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
     name = place.tie.name
     carriage = study.carriage[name]
@@ -65,7 +66,7 @@ def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) 
     riders = tuple(replace(place.tie.rider, offset=_offset(c, reference)) for c in carriage.contacts.values())
     _check_ways(study, name, carriage, riders)
     _check_joints(study, name, _joints(carriage, riders, place.below, modal))
-    shares = _shares(study, name, carriage, modal)
+    shares = _shares(study, numerics, name, modal)
     springs = []
     for number, (word, contact) in enumerate(carriage.contacts.items()):
         key = f"carriage.{name}.contacts.{word}"
@@ -73,7 +74,7 @@ def stand(study: Study, place: Place, modal: ModalBody, swept: Collection[str]) 
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
         rigid = contact.stiffness == "rigid"
         springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
-    acting = tuple(springs) if study.solver.fidelity in SPRUNG else ()
+    acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
     return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
 
 
@@ -87,12 +88,14 @@ def _offset(contact: Contact, reference: float) -> float:
     return contact.at - reference if contact.at is not None else float(contact.offset or 0.0)
 
 
-def _shares(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -> tuple[float, ...]:
+def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tuple[float, ...]:
     """Parts of the weight at rest on level rigid ground.
 
     N/k + C N = rigid-body motion at the contacts, and N balances the weight; C is the body's flexibility between its
     contacts. Its own weight bends it only through the contacts: a uniform acceleration moves rigid-body modes alone.
     """
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
     grips = [Grip(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
     places = [grip.at if isinstance(grip.at, str) else np.array([grip.at]) for grip in grips]
     shapes = np.stack([grip.fixed_row(modal) for grip in grips])
@@ -106,7 +109,7 @@ def _shares(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -
             remedy="no supports, or only such as leave it free along gravity, and rigid-body modes kept",
         )
     soft = (shapes * modal.modal_flexibility) @ shapes.T
-    if study.solver.static_correction:
+    if numerics.static_correction:
         soft = _flexibility(modal, places)
     own = [0.0 if c.stiffness == "rigid" else 1.0 / float(c.stiffness) for c in carriage.contacts.values()]
     soft = soft + np.diag(own)

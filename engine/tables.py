@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -12,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.contacts import ContactForce
-from engine.fidelity import free_steps
 from engine.grips import residual
 from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
 from engine.readings import OF_SECTIONS, Sensor
-from engine.signals import Signal, build_signals, tabulate_missed, tabulate_watch
+from engine.signals import Signal, build_signals, last_signals, tabulate_missed, tabulate_watch
+from engine.step_rules import free_steps
 from engine.ties import Grip
 from engine.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.track import tabulate_ties
@@ -60,7 +61,9 @@ class SceneTables:
     """Timeline, signals and tables of a scene at ``steps`` per unit of scene time.
 
     refinement: every step of a timeline with so many times fewer steps is cut into so many. stops: what falls on step
-    boundaries: events, and in whole runs where loads pass sensors whose influence lines have a kink there.
+    boundaries: events, and in whole runs where loads pass sensors whose influence lines have a kink there. companions:
+    of the marches with the same steps that watch envelopes. kept_bytes: of tables that are kept for other marches or
+    cycles; the memory of those that are not is used again, which takes an eighth of the time.
     """
 
     model: SceneModel
@@ -69,6 +72,8 @@ class SceneTables:
     readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
     refinement: int = 1
     stops: Literal["events", "kinks"] = "events"
+    companions: tuple[SceneTables, ...] = ()
+    kept_bytes: int = KEPT_BYTES
     _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
     _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -84,17 +89,8 @@ class SceneTables:
         if self.refinement > 1:
             free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
         steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
-        stops = self._kinks if self.stops == "kinks" and self.window == "whole" else ()  # cycles want equal steps
+        stops = kinks(self.model, self.sensors) if self.stops == "kinks" and self.window == "whole" else ()
         return build_timeline(self.model.riders, steps, self.window, free, stops)
-
-    @property
-    def _kinks(self) -> Iterator[float]:
-        """Scene times at which a load passes a sensor whose influence line has a kink there: steps must not miss it."""
-        for sensor in self.sensors:
-            if sensor.under is None and sensor.quantity in OF_SECTIONS:
-                for carriage in self.model.carriages:
-                    for rider, _ in carriage.loads if carriage.body == sensor.body else ():
-                        yield from self.model.riders[rider].passes(sensor.at)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -104,30 +100,12 @@ class SceneTables:
         return tuple(s for s in signals if self.readings != "sensors" or isinstance(s, Sensor))
 
     @cached_property
-    def with_accelerations(self) -> SceneTables:
-        """The same with the accelerations of the carriages read."""
-        found = SceneTables(self.model, self.steps, self.window, "accelerations", self.refinement)
-        found.timeline = self.timeline
-        return found
-
-    @cached_property
     def coarser(self) -> SceneTables:
         """The same with half the steps, for a Richardson pair; ``refinement`` must be even."""
         if self.refinement % 2:
             raise ValueError(f"refinement: expected an even number, received {self.refinement}")
         found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
-        found._unrefined = self._unrefined
-        return found
-
-    def with_steps(self, model: SceneModel, by: int) -> SceneTables:
-        """The sensors of the same way in ``by`` times as many steps, or -``by`` times fewer, of a model that may keep
-        other modes; all segments must have steps that can be divided so."""
-        if by > 0:
-            found = SceneTables(model, self.steps * by, self.window, self.readings, self.refinement * by)
-            found.timeline = refined(self.timeline, by)
-            return found
-        found = SceneTables(model, -(-self.steps // -by), self.window, self.readings)
-        found.timeline = coarsened(self.timeline, -by)
+        found.timeline = coarsened(self.timeline, 2)
         return found
 
     @property
@@ -139,6 +117,12 @@ class SceneTables:
     def scheme(self) -> Newmark | Alpha:
         """The scheme's coefficients."""
         return self.model.scheme.coefficients
+
+    @property
+    def free_seconds(self) -> float:
+        """How long the free vibration lasts, s."""
+        periods = self.timeline.free_periods
+        return periods * (2.0 * math.pi / self.model.first_omega) if periods > 0.0 else 0.0
 
     @property
     def cycle_bytes(self) -> int:
@@ -154,13 +138,12 @@ class SceneTables:
             if found is None:
                 shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
                 found = self._build(shifted, self._missed_of(key))
-                if sum(table.bytes for table in self._kept.values()) + found.bytes <= KEPT_BYTES:
+                if sum(table.bytes for table in self._kept.values()) + found.bytes <= self.kept_bytes:
                     self._kept[key] = found  # and no other goes: marches ask for all in turn, the oldest first
         return found
 
     def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
         along = self._ways(segment)
-        contacts: tuple[Signal, ...] = tuple(s for s in self.signals if isinstance(s, ContactForce))
         if not missed:
             found = residual(self.model, along), tabulate_missed(self.model, self.signals, along)
             if self.timeline.repeats:
@@ -168,7 +151,8 @@ class SceneTables:
         else:
             found = missed[0], missed[1]
         watch = tabulate_watch(self.model, self.signals, along, found[1])
-        guard = tabulate_watch(self.model, contacts, along) if contacts else watch
+        contacts = sum(isinstance(signal, ContactForce) for signal in self.signals)
+        guard = last_signals(watch, contacts) if contacts else watch
         return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, guard)
 
     def _missed_of(self, key: SegmentKey) -> Missed:
@@ -188,8 +172,9 @@ class SceneTables:
         with self._lock:
             self._kept.clear()
             self._missed.clear()
-        for name in ("with_accelerations", "coarser"):
-            self.__dict__.pop(name, None)
+        for companion in self.companions:
+            companion.forget()
+        self.__dict__.pop("coarser", None)
 
     @cached_property
     def static_counts(self) -> Array:
@@ -198,12 +183,9 @@ class SceneTables:
         first, last = self.timeline.window
         last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
         counts = np.linspace(first, last, STATIC_STATIONS)
-        passing = [
-            _crossings(counts, self.timeline.positions(rider, counts), sensor.at)
-            for rider in range(len(self.model.carriages))
-            for sensor in self.sensors
-            if sensor.under is None
-        ]
+        places = {sensor.at for sensor in self.sensors if sensor.under is None}
+        ways = [self.timeline.positions(rider, counts) for rider in range(len(self.model.carriages)) if places]
+        passing = [_crossings(counts, way, at) for way in ways for at in places]
         bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
         return np.unique(np.concatenate([counts, bounds, *passing]))
 
@@ -271,6 +253,15 @@ class SceneTables:
         )
         change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
         return np.asarray(change / (after - before)[:, None])
+
+
+def kinks(model: SceneModel, sensors: Iterable[Sensor]) -> Iterator[float]:
+    """Scene times at which a load passes a sensor whose influence line has a kink there: steps must not miss it."""
+    for sensor in sensors:
+        if sensor.under is None and sensor.quantity in OF_SECTIONS:
+            for carriage in model.carriages:
+                for rider, _ in carriage.loads if carriage.body == sensor.body else ():
+                    yield from model.riders[rider].passes(sensor.at)
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

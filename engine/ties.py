@@ -36,7 +36,7 @@ class Grip:
         if isinstance(self.at, str):
             assert modal.points is not None
             return modal.points.row(self.at)
-        return np.asarray(modal.shape([self.at])[0])
+        return np.asarray(modal.shape_at(self.at)[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,15 +75,14 @@ class Rider:
     def _own(self, tau: float) -> float:
         """The motion's own time; exactly that of an event where rounding puts it beside one."""
         own = (tau - self.delay) * self.pace
-        place = int(np.searchsorted(self._own_events, own))
-        near = self._own_events[max(0, place - 1) : place + 1]
-        closest = float(near[np.argmin(np.abs(near - own))])
+        place = bisect.bisect_left(self._own_events, own)
+        closest = min(self._own_events[max(0, place - 1) : place + 1], key=lambda event: abs(event - own))
         return closest if abs(closest - own) <= 1e-9 * self.motion.duration else own
 
     @cached_property
-    def _own_events(self) -> Array:
+    def _own_events(self) -> tuple[float, ...]:
         """The motion's own times at which its law changes, ascending."""
-        return np.array([0.0, *self.motion.breaks(), self.motion.duration])
+        return (0.0, *self.motion.breaks().tolist(), self.motion.duration)
 
     def touches(self, start: float, end: float) -> bool:
         """Whether the carriage is on the body between two neighbouring events."""
@@ -199,24 +198,30 @@ class Timeline:
 
     def moments(self, counts: Array | Counts) -> tuple[NDArray[np.int64], Array]:
         """Segment and scene time of stations by their count; a boundary belongs to the segment that ends there."""
-        firsts = np.array([segment.first for segment in self.segments])
+        firsts, starts, steps, _ = self._columns
         index = np.maximum(np.searchsorted(firsts, counts, side="left") - 1, 0)
-        starts = np.array([segment.start for segment in self.segments])
-        steps = np.array([segment.step for segment in self.segments])
         return index, starts[index] + (counts - firsts[index]) * steps[index]
+
+    @cached_property
+    def _columns(self) -> tuple[Counts, Array, Array, NDArray[np.bool_]]:
+        """First count, start and step of every segment, and (segments, riders) who is in contact."""
+        firsts, starts, steps = ([getattr(s, name) for s in self.segments] for name in ("first", "start", "step"))
+        active = np.array([segment.active for segment in self.segments])
+        return np.array(firsts, dtype=np.int64), np.array(starts), np.array(steps), active
 
     def motion(self, rider: int, counts: Array | Counts) -> Path:
         """Place of a rider (m) and its derivatives by scene time at stations by their count; NaN where it is off the
         body or the count is negative."""
         found = Path(*(np.full(counts.shape, np.nan) for _ in range(3)))
         index, tau = self.moments(counts)
-        on = np.array([segment.active[rider] for segment in self.segments])
-        firsts = np.array([segment.first for segment in self.segments])
+        firsts, _, _, active = self._columns
+        on = active[:, rider]
         following = np.minimum(index + 1, len(self.segments) - 1)
         index = np.where(~on[index] & (counts == firsts[following]), following, index)  # an arrival
-        for number in np.unique(index[(counts >= 0) & on[index]]):
+        shown = (counts >= 0) & on[index]
+        for number in np.flatnonzero(np.bincount(index[shown], minlength=len(self.segments))):
             segment = self.segments[number]
-            here = (index == number) & (counts >= 0)
+            here = shown & (index == number)
             path = self.riders[rider].path(tau[here], segment.start, segment.end)
             for part, values in zip(found, path, strict=True):
                 part[here] = values
@@ -239,19 +244,60 @@ def build_timeline(
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
     [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
     """
-    end = max(rider.end for rider in riders)
-    segments: list[Segment] = []
-    for part in _parts(riders, window, tuple(stops)):
-        segments += part.stepped(steps, segments[-1].first + segments[-1].steps if segments else 0)
+    return build_grid(riders, steps, window, free_steps, stops).timeline(1, 1)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A scene cut at its events with some steps in every part. All timelines on it cut each of these into equal ones,
+    so that marches with different numbers of steps meet at its stations.
+
+    counts: steps of every part; free: of the free vibration after the last one.
+    """
+
+    riders: tuple[Rider, ...]
+    parts: tuple[_Part, ...]
+    counts: tuple[int, ...]
+    free: int
+    free_periods: float
+
+    def timeline(self, by: int, free_by: int) -> Timeline:
+        """The timeline with ``by`` steps in one of the grid's, and ``free_by`` in one of the free vibration."""
+        segments: list[Segment] = []
+        for part, count in zip(self.parts, self.counts, strict=True):
+            segments += part.stepped(count * by, segments[-1].first + segments[-1].steps if segments else 0)
+        if self.free:
+            end = self.parts[-1].end
+            parked = tuple(rider.stays and rider.touches(end, end) for rider in self.riders)
+            segments += _free_vibration(segments[-1]._replace(active=parked), self.free * free_by)
+        kept = [segment for segment in segments if segment.recorded]
+        span = (kept[0].first, kept[-1].first + kept[-1].steps)
+        repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in self.riders)
+        return Timeline(self.riders, tuple(segments), span, repeats, self.free_periods)
+
+    def stations(self, by: int, free_by: int, most: int) -> Counts:
+        """The grid's own stations in the recorded part, by their count on such a timeline; of more than about ``most``
+        some, the ends of its parts among them."""
+        pieces = [(count, by, part.recorded) for part, count in zip(self.parts, self.counts, strict=True)]
+        if self.free:
+            pieces.append((self.free, free_by, self.parts[-1].recorded))
+        every = max(1, sum(count for count, _, recorded in pieces if recorded) // most)
+        found, reached = [], 0
+        for count, cut, recorded in pieces:
+            if recorded:
+                found += [reached + cut * np.arange(0, count, every), np.array([reached + cut * count])]
+            reached += cut * count
+        return np.unique(np.concatenate(found))
+
+
+def build_grid(
+    riders: tuple[Rider, ...], steps: int, window: Window, free_steps: int = 200, stops: Iterable[float] = ()
+) -> Grid:
+    """Cut the scene at its events; otherwise as `build_timeline`."""
+    parts = _parts(riders, window, tuple(stops))
+    counts = tuple(max(1, math.ceil(steps * (part.end - part.start) - 1e-9 * steps)) for part in parts)
     free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
-    if free > 0.0:
-        parked = tuple(rider.stays and rider.touches(end, end) for rider in riders)
-        last = segments[-1]._replace(active=parked, recorded=_recorded(riders, window)[1] == end)
-        segments += _free_vibration(last, math.ceil(free * free_steps))
-    kept = [segment for segment in segments if segment.recorded]
-    span = (kept[0].first, kept[-1].first + kept[-1].steps)
-    repeats = all(r.motion.period == 1.0 and r.pace == 1.0 and r.delay == 0.0 for r in riders)
-    return Timeline(riders, tuple(segments), span, repeats, free)
+    return Grid(riders, parts, counts, math.ceil(free * free_steps) if free > 0.0 else 0, free)
 
 
 def refined(timeline: Timeline, by: int) -> Timeline:
@@ -285,9 +331,8 @@ class _Part(NamedTuple):
     strikes: tuple[Strike, ...]
     recorded: bool
 
-    def stepped(self, steps: int, count: int) -> Iterator[Segment]:
-        """Its slices at so many steps per unit of scene time, counted from ``count``; an event precedes the first."""
-        total = max(1, math.ceil(steps * (self.end - self.start) - 1e-9 * steps))
+    def stepped(self, total: int, count: int) -> Iterator[Segment]:
+        """Its slices with so many steps in all, counted from ``count``; an event precedes the first."""
         bounds = _slices(total)
         at = [self.start + (self.end - self.start) * n / total for n in bounds[:-1]] + [self.end]
         for i, (first, last) in enumerate(pairwise(bounds)):

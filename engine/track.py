@@ -5,12 +5,15 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.grips import holds, residual
+from engine.grips import holds, residual, shape_derivatives
 from engine.grips import rows as shape_rows
-from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Alpha, Blow, Newmark, Ties
+from engine.kernels.layout import FORCE, RATE, Alpha, Blow, Newmark, Ties
+from engine.kernels.rows import add_grip, close_rows
 from engine.model import SceneModel
 from engine.ties import Grip, SpringTie
 from engine.timeline import Segment
@@ -24,30 +27,33 @@ def tabulate_ties(
 ) -> Ties:
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
     `grips.residual`, where it is known."""
-    stations = along[0].s.size
-    columns = np.zeros((4, model.ties, stations, model.omega.size))  # each is filled, and looked at, in one piece
-    rows = columns.transpose(2, 3, 1, 0)
+    stations, modes = along[0].s.size, model.omega.size
+    rows, reaches = np.zeros((stations, modes, model.ties, 4)), np.zeros((modes, model.ties), dtype=np.bool_)
     drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
-    for r in range(model.ties):
-        _tabulate_force(model, r, along, rows[:, :, r, FORCE])
+    for r, grips in enumerate(model.grips):
+        for grip in grips:
+            if holds(grip, along):
+                motion = _motion(model, r, grip, along)
+                shapes = shape_derivatives(model, grip, along, motion.highest)
+                add_grip(rows, r, model.bodies[grip.body].modes.start, grip.factor, shapes, motion.factors)
     for r, carriage in enumerate(model.carriages):
         if along[r].active and carriage.inertia == "mass":
-            _tabulate_convection(model, carriage.grips[0], along, rows[:, :, r], drive[:, r])
-    for r in range(len(model.carriages), model.first_spring):
-        rows[:, :, r, RATE] = rows[:, :, r, FORCE]
+            drive[:, r] = _curved_sag(model, carriage.grips[0], along)
     for r, spring in enumerate(model.springs, start=model.first_spring):
-        _tabulate_spring(model, spring, along, rows[:, :, r], (drive[:, r], level[:, r]))
+        if spring.mode is not None:
+            rows[:, spring.mode, r, FORCE] = -1.0
+            rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
+        if along[spring.rider].active:
+            drive[:, r], level[:, r] = _sag_under(model, spring, model.grips[r][0], along)
     inertial, springs = _kinds(model)
-    rows[..., CLOSED] = np.where(inertial, rows[..., FORCE], 0.0)
-    rows[1:, ..., CLOSED] += scheme.gamma * rows[1:, ..., RATE] + scheme.beta * rows[1:, ..., CURVE]
+    close_rows(rows, inertial, scheme.beta, scheme.gamma, reaches)
     damped = [False] * len(model.carriages) + [True for _ in model.dampers] + [s.damped for s in model.springs]
     moves = inertial | np.array(damped, dtype=np.bool_)
     given, reacting = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
     unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
     missed = residual(model, along) if missed is None else missed
-    reaches = np.ascontiguousarray(((columns.min(axis=2) < 0.0) | (columns.max(axis=2) > 0.0)).any(axis=0).T)
-    return Ties(np.ascontiguousarray(rows), drive, level, reacting, given, moves, springs, missed, unity, reaches)
+    return Ties(rows, drive, level, reacting, given, moves, springs, missed, unity, reaches)
 
 
 def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -58,45 +64,49 @@ def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return np.array(inertial, dtype=np.bool_), np.array(springs, dtype=np.bool_)
 
 
-def _tabulate_force(model: SceneModel, r: int, along: tuple[Way, ...], force: Array) -> None:
-    """p of a tie (stations, modes): the mode shapes wherever it takes hold of a body."""
-    for grip in model.grips[r]:
-        if holds(grip, along):
-            force[:, model.bodies[grip.body].modes] += grip.factor * shape_rows(model, grip, along)
+class _Motion(NamedTuple):
+    """How a grip moves along its body: the highest derivative of shapes that its ties read, and `add_grip`'s motion."""
+
+    highest: int
+    factors: Array
 
 
-def _tabulate_convection(model: SceneModel, grip: Grip, along: tuple[Way, ...], rows: Array, drive: Array) -> None:
-    """A = 2 s' phi';  B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28), the sag's own curve as the drive."""
+def _motion(model: SceneModel, r: int, grip: Grip, along: tuple[Way, ...]) -> _Motion:
+    """Of a grip of the tie r. Of a mass or rigid joint A = 2 s' phi', B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28); of
+    a damper A = phi, B = s' phi' (mechanics section 4)."""
+    stations, number = along[0].s.size, r - model.first_spring
+    way = None if grip.rider is None else along[grip.rider]
+    if number < 0:
+        convected = r < len(model.carriages) and model.carriages[r].inertia == "mass"
+        damped = r >= len(model.carriages)
+    else:
+        convected, damped = model.springs[number].rigid, model.springs[number].damped
+    if way is not None and convected:
+        return _Motion(2, np.stack([np.zeros(stations), 2.0 * way.ds, way.dds, way.ds**2]))
+    if not damped or convected:
+        return _Motion(0, np.zeros((4, 0)))
+    factors = np.zeros((4, stations))
+    factors[0] = 1.0
+    if way is None:
+        return _Motion(0, factors)
+    factors[2] = way.ds
+    return _Motion(1, factors)
+
+
+def _curved_sag(model: SceneModel, grip: Grip, along: tuple[Way, ...]) -> Array:
+    """(stations,) what the curve of the body's own sag accelerates a mass by on its way, per unit gravity."""
     assert grip.rider is not None
-    way, modes = along[grip.rider], model.bodies[grip.body].modes
-    slope, bend = shape_rows(model, grip, along, 1), shape_rows(model, grip, along, 2)
-    ds, dds = way.ds[:, None], way.dds[:, None]
-    rows[:, modes, RATE] = 2.0 * ds * slope
-    rows[:, modes, CURVE] = ds**2 * bend + dds * slope
-    drive[:] = way.ds**2 * model.sag(grip.body, way.s, 2) + way.dds * model.sag(grip.body, way.s, 1)
+    way = along[grip.rider]
+    return np.asarray(way.ds**2 * model.sag(grip.body, way.s, 2) + way.dds * model.sag(grip.body, way.s, 1))
 
 
-def _tabulate_spring(
-    model: SceneModel, spring: SpringTie, along: tuple[Way, ...], rows: Array, own: tuple[Array, Array]
-) -> None:
-    """p = (phi, -v);  A = p;  B = s' phi' (mechanics section 4): the deflection of the body and its material rate less
-    those of what rides; without phi where that stands on level ground. A rigid joint has the accelerations instead.
-    own: rate and gap of the body's own sag, which this fills."""
-    way, (drive, level) = along[spring.rider], own
-    below = model.grips[model.first_spring + model.springs.index(spring)][0]
-    if spring.mode is not None:
-        rows[:, spring.mode, FORCE] = -1.0
-    if spring.damped:
-        rows[..., RATE] = rows[..., FORCE]
-    if not way.active:
-        return
+def _sag_under(model: SceneModel, spring: SpringTie, below: Grip, along: tuple[Way, ...]) -> tuple[Array, Array]:
+    """(stations,) rate, of a rigid joint acceleration, and gap of a spring by the sag of the body that it stands on."""
+    way = along[spring.rider]
     if spring.rigid:
-        _tabulate_convection(model, below, along, rows, drive)
-        return
-    level[:] = model.sag(below.body, way.s, 0)
-    if spring.damped:
-        rows[:, model.bodies[below.body].modes, CURVE] = way.ds[:, None] * shape_rows(model, below, along, 1)
-        drive[:] = way.ds * model.sag(below.body, way.s, 1)
+        return _curved_sag(model, below, along), np.zeros_like(way.s)
+    level = model.sag(below.body, way.s, 0)
+    return (way.ds * model.sag(below.body, way.s, 1) if spring.damped else np.zeros_like(level)), level
 
 
 def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tuple[Array, Array, Array]:
@@ -108,7 +118,9 @@ def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tup
         np.zeros(len(ties)),
     )
     for place, r in enumerate(ties):
-        _tabulate_force(model, r, along, force[None, :, place])
+        for grip in model.grips[r]:
+            if holds(grip, along):
+                force[model.bodies[grip.body].modes, place] += grip.factor * shape_rows(model, grip, along)[0]
         below = model.grips[r][0]
         if below.rider is not None and along[below.rider].active:
             way = along[below.rider]

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bucket import Bucket
+from engine.accuracy.again import marches_again
 from engine.histories import counts_shown
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues, weights
 from engine.model import SceneModel, build_model
+from engine.outcome import Flat
 from engine.plan import Plan
 from engine.scene import Study
 from engine.tables import SceneTables
@@ -54,19 +55,20 @@ class Compared:
     steps: int
 
 
-def compare_variant(plan: Plan, variant: int, check: Callable[[], None] = lambda: None) -> Compared:
-    """Both models of one variant over the recorded part. Raises BadInput as `unreduced_model`, and what `check`
-    raises, which is called now and then."""
+def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], None] = lambda: None) -> Compared:
+    """Both models of one variant over the recorded part; spent: what it was computed with, as (1,). Raises BadInput as
+    `unreduced_model`, and what `check` raises, which is called now and then."""
     from engine.richardson import march_chosen  # here, as the check of a study marches nothing
 
-    bucket = next(bucket for bucket in plan.buckets if variant in bucket.variants)
+    number = next(number for number, members in enumerate(plan.members) if variant in members)
     study = reading_contacts(plan.cases.study_of(plan.study, variant))
-    tables = _tables(plan, bucket, study)
+    [(own, _)] = marches_again(plan.grids[number], spent)
+    tables = _tables(own, study)
     values = LaneValues(study, {}, LANES)
     wanted = plan.study.output.histories
     counts = counts_shown(tables.timeline, plan.window, "auto" if wanted == "none" else wanted)
-    marched, _ = march_chosen(tables, values, counts, 1)
-    whole = unreduced_model(study, *bucket.scene.timing)
+    marched = march_chosen(tables, values, counts, 1)
+    whole = unreduced_model(study, *plan.grids[number].scene.timing)
     by = int(np.clip(MOST_STEPS // tables.timeline.steps, 1, FINER))
     course = Course(
         refined(tables.timeline, by),
@@ -109,10 +111,12 @@ def reading_contacts(study: Study) -> Study:
     return study.with_values({"sensor": dict(study.data.get("sensor", {})) | more})
 
 
-def _tables(plan: Plan, bucket: Bucket, study: Study) -> SceneTables:
-    """The bucket's scene with the variant's own numbers and sensors."""
-    model = build_model(study, *bucket.scene.timing)
-    return SceneTables(model, bucket.steps, plan.window, refinement=bucket.tables.refinement)
+def _tables(own: SceneTables, study: Study) -> SceneTables:
+    """The march's scene with the variant's own numbers and sensors."""
+    model = build_model(study, *own.model.timing, (), own.model.numerics)
+    found = SceneTables(model, own.steps, own.window, refinement=own.refinement)
+    found.timeline = own.timeline
+    return found
 
 
 def _first_period(model: SceneModel) -> float:

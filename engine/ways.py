@@ -22,28 +22,44 @@ NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
 @dataclass(frozen=True, eq=False)
 class Way:
     """One rider along one segment, station by station: place (m), its first and second change per step, and whether
-    it touches the body; where it does not, its rows are zero. here: at which stations, where that differs."""
+    it touches the body; where it does not, its rows are zero. here: at which stations, where that differs. highest:
+    derivative of the mode shapes that its ties read."""
 
     s: Array
     ds: Array
     dds: Array
     active: bool
     here: NDArray[np.bool_] | None = None
-    _shapes: dict[tuple[int, int], Array] = field(default_factory=dict)
+    highest: int = 0
+    _shapes: dict[int, Array] = field(default_factory=dict)
 
     def shape(self, body: ModalBody, derivative: int = 0) -> Array:
-        """(S, N) mode shapes of its body along the way, evaluated once."""
-        key = (id(body), derivative)
-        if key not in self._shapes:
-            self._shapes[key] = body.shape(self.s, derivative)
-        return self._shapes[key]
+        """(S, N) mode shapes of its body along the way."""
+        return np.asarray(self.shapes(body, derivative)[derivative])
+
+    def shapes(self, body: ModalBody, highest: int) -> Array:
+        """(``highest`` + 1 or more, S, N) the same with their derivatives, evaluated together once."""
+        found = self._shapes.get(id(body))
+        if found is None or len(found) <= highest:
+            found = body.shape_derivatives(self.s, range(max(highest, self.highest) + 1))
+            self._shapes[id(body)] = found
+        return found
 
 
 def ways(model: SceneModel, segment: Segment) -> tuple[Way, ...]:
     """The ways of all riders at the stations 0..steps of a segment."""
     tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end
-    return tuple(_way(rider, segment, tau, active) for rider, active in zip(model.riders, segment.active, strict=True))
+    parts = zip(model.riders, segment.active, _highest(model), strict=True)
+    return tuple(_way(rider, segment, tau, active, highest) for rider, active, highest in parts)
+
+
+def _highest(model: SceneModel) -> list[int]:
+    """Per rider, the highest derivative that its ties read: convection needs two, dampers one."""
+    found = [2 if carriage.inertia == "mass" else 0 for carriage in model.carriages] + [0] * len(model.contacts)
+    for spring in model.springs:
+        found[spring.rider] = max(found[spring.rider], 2 if spring.rigid else int(spring.damped))
+    return found
 
 
 def frozen(model: SceneModel, places: Array) -> tuple[Way, ...]:
@@ -60,10 +76,10 @@ def frozen(model: SceneModel, places: Array) -> tuple[Way, ...]:
     return tuple(found)
 
 
-def _way(rider: Rider, segment: Segment, tau: Array, active: bool) -> Way:
+def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> Way:
     if not active:
         nowhere = np.zeros_like(tau)
         return Way(nowhere, nowhere, nowhere, active)
     path = rider.path(tau, segment.start, segment.end)
     place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
-    return Way(place, path.dS * segment.step, path.ddS * segment.step**2, active)
+    return Way(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)

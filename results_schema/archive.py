@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
 
 REQUIRED_ATTRIBUTES = ("Conventions", "title", "history", "schema_version", "study_kind", "study", "study_sha256")
 
-OutputState = Literal["absent", "same study, finished", "another study"]
+FILES = "study_files"  # the attribute that says what the files of the study held
+
+OutputState = Literal["absent", "same study, finished", "same study, other files", "another study"]
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,17 @@ class Summary:
         return not self.damage
 
 
-def write_archive(path: Path | str, root: xr.Dataset, groups: Mapping[str, xr.Dataset] | None = None) -> None:
+def write_archive(
+    path: Path | str,
+    root: xr.Dataset,
+    groups: Mapping[str, xr.Dataset] | None = None,
+    look: Callable[[], None] = lambda: None,
+) -> None:
     """Write an archive whole; the same datasets give the same bytes.
 
     root.attrs hold REQUIRED_ATTRIBUTES and whatever else the caller records. groups: dataset by path ("/audit",
-    "model/bed"). Raises OutputFailed, and ValueError for datasets that an archive cannot hold.
+    "model/bed"). look: called just before the archive takes its place; it may refuse what has come there meanwhile.
+    Raises OutputFailed, and ValueError for datasets that an archive cannot hold.
     """
     missing = [name for name in REQUIRED_ATTRIBUTES if name not in root.attrs]
     if missing or "status" not in root:
@@ -86,7 +95,7 @@ def write_archive(path: Path | str, root: xr.Dataset, groups: Mapping[str, xr.Da
     def fill(temporary: Path) -> None:
         write_tables(temporary, tables, added)
 
-    files.write_whole(path, fill)
+    files.write_whole(path, fill, look)
 
 
 def open_archive(path: Path | str) -> Archive:
@@ -105,10 +114,27 @@ def open_archive(path: Path | str) -> Archive:
     return Archive(path, root, datasets)
 
 
-def output_state(path: Path | str, study_sha256: str) -> OutputState:
+def files_text(hashes: Mapping[str, str]) -> str:
+    """SHA-256 by path as archives hold them, one file in a line.
+
+    >>> files_text({"bed.op4": "ab"})
+    'ab  bed.op4'
+    """
+    return "\n".join(f"{digest}  {path}" for path, digest in sorted(hashes.items()))
+
+
+def changed_files(path: Path | str, hashes: Mapping[str, str]) -> list[str]:
+    """Those files, of SHA-256 by path, of which an archive was not made as they are. Raises as `open_archive`."""
+    with checked(Path(path)) as dataset:
+        known = set(str(getattr(dataset, FILES, "")).split("\n"))
+    return [name for name in sorted(hashes) if files_text({name: hashes[name]}) not in known]
+
+
+def output_state(path: Path | str, study_sha256: str, hashes: Mapping[str, str] = MappingProxyType({})) -> OutputState:
     """What is at the place of the output: nothing, this study's finished archive, or something else.
 
-    Raises ArchiveError when this study's archive is there but damaged, or when the file is newer.
+    hashes: SHA-256 by path of the files that the study names. Raises ArchiveError when this study's archive is there
+    but damaged, or when the file is newer.
     """
     path = Path(path)
     if not path.exists():
@@ -118,6 +144,8 @@ def output_state(path: Path | str, study_sha256: str) -> OutputState:
     with checked(path) as dataset:
         if getattr(dataset, "study_sha256", "") != study_sha256:
             return "another study"
+        if getattr(dataset, FILES, "") != files_text(hashes):
+            return "same study, other files"
         verify(path, dataset)
     return "same study, finished"
 

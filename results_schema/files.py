@@ -35,10 +35,11 @@ class Faults:
 FAULTS = Faults()
 
 
-def write_whole(path: Path | str, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path | str, write: Callable[[Path], None], look: Callable[[], None] = lambda: None) -> None:
     """Let `write` fill a temporary file beside `path`, then put it in the place of `path`.
 
-    Raises OutputFailed (path, free bytes) when the system or the netCDF library cannot write; the old file stays.
+    look: called just before that; what it raises leaves the old file. Raises OutputFailed (path, free bytes) when the
+    system or the netCDF library cannot write; the old file stays.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_TEMPORARY}")
@@ -49,6 +50,7 @@ def write_whole(path: Path | str, write: Callable[[Path], None]) -> None:
         write(temporary)
         _sync(temporary)
         FAULTS.before("replace", path)
+        look()
         os.replace(temporary, path)
         _sync(path.parent)
     except BaseException as error:

@@ -1,13 +1,14 @@
 """The finished chunks of a run: one immutable netCDF-4 file each, from which a killed run goes on.
 
 Beside an archive `a.nc` lie `a.nc.lock`, held by the run, and the folder `a.nc.parts` with a file `key` (what the
-parts were computed from), the parts, and the SHA-256 of each part. A part counts when its SHA-256 does.
+parts were computed from), the parts, and the SHA-256 of each part. A part counts when its SHA-256 does and it carries
+the same key.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,12 +17,13 @@ import numpy as np
 
 from results_schema import files
 from results_schema.errors import ArchiveError
-from results_schema.run_folder import RunFolder, folder_of
+from results_schema.run_folder import RunFolder, folder_of, stored_key
 
 Arrays = dict[str, np.ndarray]
 
 _SELECTED = "selected"
 _VARIANTS = "variants"
+_KEY = "run_key"
 _SUFFIX = ".nc"
 _CHUNK_BYTES = 1 << 20
 
@@ -34,20 +36,29 @@ class Rows(NamedTuple):
 
 
 def joined(parts: Sequence[Rows]) -> Rows | None:
-    """Rows of different variants as one, ascending; None of none. All must have the same arrays."""
+    """Rows of different variants as one, ascending; None of none. All must have the same arrays; shorter histories are
+    filled up with NaN."""
     if not parts:
         return None
     variants = np.concatenate([part.variants for part in parts])
     order = np.argsort(variants)
     names = parts[0].arrays
-    return Rows(variants[order], {name: np.concatenate([p.arrays[name] for p in parts])[order] for name in names})
+    return Rows(variants[order], {name: _stacked([part.arrays[name] for part in parts])[order] for name in names})
+
+
+def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Arrays (n, ...) one after another, those with shorter rows filled up with NaN."""
+    longest = max((array.shape[1] for array in arrays if array.ndim > 1), default=0)
+    if all(array.ndim < 2 or array.shape[1] == longest for array in arrays):
+        return np.concatenate(arrays)
+    return np.concatenate([np.pad(a, ((0, 0), (0, longest - a.shape[1])), constant_values=np.nan) for a in arrays])
 
 
 class PartStore(RunFolder):
     """The parts of one archive, locked while the `with` block lasts. Entering raises as `RunFolder`."""
 
-    def __init__(self, archive_path: Path | str, key: str) -> None:
-        super().__init__(archive_path, key)
+    def __init__(self, archive_path: Path | str, key: str, look: Callable[[], object] = lambda: None) -> None:
+        super().__init__(archive_path, key, look)
         self._valid: dict[Path, np.ndarray] | None = None
 
     def write(self, variants: np.ndarray, arrays: Mapping[str, np.ndarray], selected: Rows | None = None) -> Path:
@@ -62,7 +73,7 @@ class PartStore(RunFolder):
         path = self._folder / (hashlib.sha1(indices.tobytes()).hexdigest() + _SUFFIX)
 
         def fill(temporary: Path) -> None:
-            _write_tables(temporary, tables)
+            _write_tables(temporary, tables, self._key)
 
         files.write_whole(path, fill)
         files.write_sidecar(path)
@@ -89,7 +100,7 @@ class PartStore(RunFolder):
     def _admit(self, path: Path) -> None:
         assert self._valid is not None
         try:
-            self._valid[path] = _read_tables(path, [_VARIANTS])["/"].variants
+            self._valid[path] = _read_tables(path, self._key, [_VARIANTS])["/"].variants
         except ArchiveError:
             files.remove_file(path)
 
@@ -132,7 +143,7 @@ class PartStore(RunFolder):
             return Rows(np.empty(0, np.int64), {})
         variants, first = np.unique(np.concatenate([rows.variants for rows in found]), return_index=True)
         names = found[0].arrays
-        arrays = {name: np.concatenate([rows.arrays[name] for rows in found])[first] for name in names}
+        arrays = {name: _stacked([rows.arrays[name] for rows in found])[first] for name in names}
         return Rows(variants, arrays)
 
     def _parts(self) -> Iterator[tuple[Path, dict[str, Rows]]]:
@@ -140,7 +151,7 @@ class PartStore(RunFolder):
             self.finished()
         for path in sorted(self._valid or {}):
             try:
-                tables = _read_tables(path)
+                tables = _read_tables(path, self._key)
             except ArchiveError:
                 files.remove_file(path)
                 raise
@@ -160,11 +171,12 @@ def finished_so_far(archive_path: Path | str) -> int | None:
     folder = folder_of(archive_path)
     if not folder.is_dir():
         return None
+    key = stored_key(folder)
     found = [np.empty(0, np.int64)]
     for path in sorted(folder.glob(f"*{_SUFFIX}")):
         with suppress(ArchiveError):
             if files.sidecar_matches(path):
-                found.append(_read_tables(path, [_VARIANTS])["/"].variants)
+                found.append(_read_tables(path, key, [_VARIANTS])["/"].variants)
     return int(np.unique(np.concatenate(found)).size)
 
 
@@ -194,10 +206,11 @@ def _require_same_arrays(path: Path, result: Arrays, arrays: Mapping[str, np.nda
         )
 
 
-def _write_tables(path: Path, tables: Mapping[str, Rows]) -> None:
+def _write_tables(path: Path, tables: Mapping[str, Rows], key: str) -> None:
     import netCDF4
 
     with files.NETCDF_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
+        dataset.setncattr(_KEY, key)
         for group, rows in tables.items():
             place = dataset if group == "/" else dataset.createGroup(group)
             _store(place, _VARIANTS, rows.variants)
@@ -219,19 +232,22 @@ def _store(place: Any, name: str, array: np.ndarray) -> None:
     variable[...] = array
 
 
-def _read_tables(path: Path, names: list[str] | None = None) -> dict[str, Rows]:
-    """The tables of a part, or only the arrays called `names`. Raises ArchiveError naming a damaged part."""
+def _read_tables(path: Path, key: str, names: list[str] | None = None) -> dict[str, Rows]:
+    """The tables of a part, or only the arrays called `names`. Raises ArchiveError naming a part that is damaged, or
+    that belongs to another run than that of the key."""
     import netCDF4
 
     try:
         with files.NETCDF_LOCK, netCDF4.Dataset(path, "r") as dataset:
+            if getattr(dataset, _KEY, "") != key:
+                raise ValueError("it belongs to another run")
             dataset.set_auto_maskandscale(False)
             tables = {"/": _read_rows(dataset, names)}
             if _SELECTED in dataset.groups:
                 tables[_SELECTED] = _read_rows(dataset.groups[_SELECTED], names)
     except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
         raise ArchiveError(
-            f"this part is damaged ({error})", where=str(path), remedy="run again: it is computed again"
+            f"this part cannot be used ({error})", where=str(path), remedy="run again: it is computed again"
         ) from error
     return tables
 

@@ -1,7 +1,7 @@
 """The finished pieces of a run that measures: one immutable netCDF-4 file each, from which a killed run goes on.
 
-They lie in the folder of the run (see `results_schema.run_folder`). A piece counts when its SHA-256 does, and is
-sealed like an archive.
+They lie in the folder of the run (see `results_schema.run_folder`). A piece counts when its SHA-256 does and it
+carries the key of the run; it is sealed like an archive.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _START, _SUFFIX = "piece-", ".nc"
-_NAME = "piece"
+_NAME, _KEY = "piece", "run_key"
 
 
 class PieceStore(RunFolder):
@@ -33,7 +33,7 @@ class PieceStore(RunFolder):
 
         Raises OutputFailed when the disk cannot take it, ValueError for what an archive cannot hold.
         """
-        tables = {"/": from_dataset(dataset.assign_attrs({_NAME: name}))}
+        tables = {"/": from_dataset(dataset.assign_attrs({_NAME: name, _KEY: self._key}))}
         added = seal(tables)
         path = self._folder / (_START + hashlib.sha1(name.encode()).hexdigest() + _SUFFIX)
 
@@ -51,7 +51,7 @@ class PieceStore(RunFolder):
             try:
                 if not files.sidecar_matches(path):
                     raise ArchiveError("this piece is not what was written", where=str(path))
-                name, dataset = _read(path)
+                name, dataset = _read(path, self._key)
                 found[name] = dataset
             except ArchiveError:
                 files.remove_file(path)
@@ -71,8 +71,8 @@ def pieces_so_far(archive_path: Path | str) -> int:
     return found
 
 
-def _read(path: Path) -> tuple[str, xr.Dataset]:
-    """Name and dataset of a piece. Raises ArchiveError."""
+def _read(path: Path, key: str) -> tuple[str, xr.Dataset]:
+    """Name and dataset of a piece. Raises ArchiveError, also where it belongs to another run than that of the key."""
     import netCDF4
 
     try:
@@ -80,7 +80,9 @@ def _read(path: Path) -> tuple[str, xr.Dataset]:
             dataset = to_dataset(read_tables(path, stored)["/"])
     except (OSError, RuntimeError) as error:
         raise ArchiveError(f"this piece is damaged ({error})", where=str(path)) from error
+    if dataset.attrs.get(_KEY) != key:
+        raise ArchiveError("this piece belongs to another run", where=str(path))
     name = str(dataset.attrs[_NAME])
-    for added in (CONTENTS, DIGEST, _NAME):
+    for added in (CONTENTS, DIGEST, _NAME, _KEY):
         dataset.attrs.pop(added, None)
     return name, dataset

@@ -14,7 +14,7 @@ from results_schema.errors import ArchiveError, BadInput, WanderlastError
 from results_schema.links import refuse_pointers
 from results_schema.tables import CONTENTS, DIGEST, Column, Table, checksum, contents, digest
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # archives of version 1 are of before `estimated_error`
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # zlib cannot shrink anything by more than 1032; a file that claims more was never written in full.
@@ -115,6 +115,14 @@ def _check_schema(path: Path, dataset: Any) -> None:
             expected=f"schema_version up to {SCHEMA_VERSION}",
             received=str(version),
             remedy="update wanderlast",
+        )
+    if version < SCHEMA_VERSION:
+        raise ArchiveError(
+            "written before archives held estimated_error of every reported number",
+            where=str(path),
+            expected=f"schema_version {SCHEMA_VERSION}",
+            received=str(version),
+            remedy="run the study again with --overwrite",
         )
 
 

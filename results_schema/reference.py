@@ -18,7 +18,12 @@ def reference_table() -> str:
 
 
 def _row(where: str, variable: Variable) -> str:
-    lead = {"grid": ["the sweep's"], "history": ["the sweep's or `history`"], "none": []}[variable.lead]
+    lead = {
+        "grid": ["the sweep's"],
+        "history": ["the sweep's or `history`"],
+        "some": ["some of the sweep's"],
+        "none": [],
+    }[variable.lead]
     dims = ", ".join(lead + [" or ".join(f"`{name}`" for name in dim.split("|")) for dim in variable.dims])
     own = {"{sensor}": "the sensor's", "{envelope}": "the envelope's"}
     unit = own.get(variable.units or "", variable.units or "1")

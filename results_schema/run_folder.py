@@ -6,6 +6,7 @@ work in the folder was computed from. Only work with the run's own key is gone o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -14,6 +15,8 @@ from results_schema import files
 from results_schema.errors import BadInput
 from results_schema.locks import Lock
 
+_KEY_FILE = "key"
+
 
 def folder_of(archive_path: Path | str) -> Path:
     """The folder of an archive's unfinished run."""
@@ -21,32 +24,42 @@ def folder_of(archive_path: Path | str) -> Path:
     return archive_path.with_name(archive_path.name + ".parts")
 
 
+def stored_key(folder: Path) -> str:
+    """The key of the work in a folder, "" where it cannot be told."""
+    try:
+        return (folder / _KEY_FILE).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
 class RunFolder:
     """The folder of one archive's run, locked while the `with` block lasts.
 
-    key: what the results depend on: the study's hash with the kernels' hash.
+    key: what the results depend on. look: called under the lock, before anything is touched; it may refuse what lies
+    at the archive's place.
     Entering raises ArchiveBusy when another run holds the archive, and BadInput when the work there has another
     key (see `discard_foreign`).
     """
 
-    def __init__(self, archive_path: Path | str, key: str) -> None:
+    def __init__(self, archive_path: Path | str, key: str, look: Callable[[], object] = lambda: None) -> None:
         archive_path = Path(archive_path)
         self._archive = archive_path
         self._folder = folder_of(archive_path)
         self._lock = Lock(archive_path.with_name(archive_path.name + ".lock"))
-        self._key = key
+        self._key, self._look = key, look
         self._discard = False
 
     @classmethod
-    def discard_foreign(cls, archive_path: Path | str, key: str) -> Self:
+    def discard_foreign(cls, archive_path: Path | str, key: str, look: Callable[[], object] = lambda: None) -> Self:
         """A folder that removes work with another key on entering instead of refusing it (`--overwrite`)."""
-        store = cls(archive_path, key)
+        store = cls(archive_path, key, look)
         store._discard = True
         return store
 
     def __enter__(self) -> Self:
         self._lock.take()
         try:
+            self._look()
             self._open()
         except BaseException:
             self._lock.release()
@@ -62,7 +75,7 @@ class RunFolder:
         files.clean_leftovers(self._archive)
         if self._folder.exists() and not self._folder.is_dir():
             raise BadInput("a file is in the way of the parts", where=str(self._folder), remedy="move it away")
-        found = self._stored_key()
+        found = stored_key(self._folder)
         if found and found != self._key and not self._discard:
             raise BadInput(
                 "unfinished parts of another study or program version are there",
@@ -79,14 +92,13 @@ class RunFolder:
             files.write_text(self._key_file, self._key + "\n")
 
     @property
-    def _key_file(self) -> Path:
-        return self._folder / "key"
+    def key(self) -> str:
+        """What the work in the folder belongs to."""
+        return self._key
 
-    def _stored_key(self) -> str:
-        try:
-            return self._key_file.read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError):
-            return ""
+    @property
+    def _key_file(self) -> Path:
+        return self._folder / _KEY_FILE
 
     def remove(self) -> None:
         """Remove all of it: the archive is written."""

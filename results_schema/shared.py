@@ -41,6 +41,7 @@ declare(
     _axis("direction", "direction of travel", dtype="str", meaning="forward is from start to end"),
     _axis("sensor", "sensor", dtype="str"),
     Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
+    _axis("result", "reported number", dtype="str"),
     _axis("peak", "number of the peak in the cycle", dtype="int64"),
     _axis("mode", "number of the mode, from 1", dtype="int64"),
     _axis("sample", "flat number of the variant that was run again", dtype="int64"),
@@ -80,46 +81,38 @@ declare(
         required=False,
     ),
     Variable(
+        "work",
+        long_name="work of the variant",
+        meaning="modes x steps of its own march over one passage or cycle; 0 for statics",
+        required=False,
+    ),
+    Variable(
         "error_estimate",
         long_name="estimated relative error",
-        meaning="sum of the parts from steps, modes and model, each the largest over the sensors of what the study "
-        "reports of them, divided by the largest static value of that sensor (velocity and acceleration: by their own "
-        "largest value); NaN where a part is not known",
+        meaning="the largest of estimated_error over the results that are held to a tolerance; NaN where none is, or "
+        "where no estimate exists",
         required=False,
         nan_allowed=True,
     ),
     Variable(
-        "error_steps",
-        long_name="part of the estimated relative error that comes from the time step",
-        meaning="from the difference to a march with half or twice the steps: of extremes and what the kind of study "
-        "makes of histories, no less than 0.3 of the largest difference over time (trajectory: all of it)",
+        "estimated_error",
+        ("result",),
+        "float32",
+        long_name="estimated error of every reported number",
+        meaning="over the largest static value of the sensor (velocity and acceleration: over its own largest value; "
+        "contact forces: over the weight; positions and lags: over the length of the track and of the cruise; indices: "
+        "as they are); of places no less than a step; NaN where no estimate exists",
         required=False,
         nan_allowed=True,
     ),
     Variable(
-        "error_modes",
-        long_name="part of the estimated relative error that comes from the number of modes",
-        meaning="likewise, from the difference between marches with all and with half the modes; 0 for statics, which "
-        "know all modes",
+        "tolerance",
+        ("result",),
+        long_name="tolerance of every reported number",
+        meaning="that of its sensor, else solver.tolerance; NaN where the error is only told",
         required=False,
         nan_allowed=True,
-    ),
-    Variable(
-        "error_fidelity",
-        long_name="part of the estimated relative error that comes from the choice of model",
-        meaning="what the model leaves out of the carriages' own: the difference to a march of that; told before it "
-        "runs for statics, and where springs or masses would want more steps; 0 for their own",
-        required=False,
-        nan_allowed=True,
-    ),
-    Variable(
-        "relative_cost",
-        long_name="cost over that of the full model",
-        meaning="modes x steps of all marches of the variant, also those that it is compared with and first ones that "
-        "missed the tolerance, over those of the carriages' own model with 20 modes (or what the study fixes) and the "
-        "steps that all rules ask for",
-        required=False,
-        nan_allowed=True,
+        lead="none",
     ),
 )
 
@@ -148,7 +141,7 @@ ROOT_MEAN_SQUARES: tuple[Variable, ...] = (
         "{sensor}_rms",
         units="{sensor}",
         long_name="root mean square of {sensor}",
-        meaning="over the same instants as the extremes",
+        meaning="of the average over the recorded time; of sensors that ride, over the time that they are on the body",
         required=False,
     ),
 )
@@ -243,6 +236,16 @@ declare(
         lead="none",
         required=False,
     ),
+    Variable("length", units="m", long_name="length of the track", lead="none"),
+    Variable("mass", units="kg", long_name="mass of the body", lead="none"),
+    Variable(
+        "first_frequency",
+        units="Hz",
+        long_name="lowest elastic natural frequency of the body",
+        meaning="of a body out of files, over the axes of the sweep that change it",
+        lead="some",
+        required=False,
+    ),
 )
 
 
@@ -307,31 +310,21 @@ declare(
 )
 
 
-def _audited(name: str, words: str, meaning: str, dtype: str = "float64", nan_allowed: bool = False) -> Variable:
-    return Variable(name, ("sample",), dtype, long_name=words, meaning=meaning, lead="none", nan_allowed=nan_allowed)
+def _audited(name: str, words: str, meaning: str, dims: tuple[str, ...] = ("sample", "result")) -> Variable:
+    return Variable(name, dims, long_name=words, meaning=meaning, lead="none", nan_allowed=True)
 
 
 declare(
     "/audit",
     _audited(
         "observed_error",
-        "observed relative error",
-        "largest difference of what the variant reports from the same computed again with all terms, twice the modes "
-        "and four times the steps or more: of extremes, peaks and harmonics over the largest static value of the "
-        "sensor (velocity and acceleration: over its own largest value), of the lag over the cruise's length, of "
-        "odd_rms and even_excess themselves; NaN where it could not be compared",
-        nan_allowed=True,
+        "observed error of every reported number",
+        "difference from the same variant marched with all terms, more modes and more steps until nothing that is held "
+        "changes, and one level beyond; over what estimated_error is divided by; NaN where it could not be compared",
     ),
-    _audited(
-        "estimated_error",
-        "estimated relative error",
-        "the estimate of the archive for the same variant; NaN where it has none",
-        nan_allowed=True,
-    ),
-    _audited("tolerance_asked", "tolerance", "solver.tolerance of the variant"),
-    _audited("worst_result", "result with the largest difference", "and its sensor", dtype="str"),
-    _audited("modes_used", "number of modes of the audit", "", dtype="int32"),
-    _audited("steps_used", "number of steps of the audit", "over one passage or cycle", dtype="int32"),
+    _audited("estimated_error", "estimated error of every reported number", "that of the archive"),
+    _audited("tolerance", "tolerance of every reported number", "NaN where the error is only told", ("result",)),
+    _audited("tolerance_asked", "solver.tolerance of the variant over that of the study", "", ("sample",)),
     Variable(
         "variant_status",
         ("sample",),
@@ -345,7 +338,7 @@ declare(
         "left_out",
         (),
         "int64",
-        long_name="variants that were picked for the audit and have no values",
+        long_name="variants that were picked for the audit and have no values, or whose truth has none",
         meaning="not among the samples",
         lead="none",
     ),

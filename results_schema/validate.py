@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _TEXT_KINDS = "UTO"
 _COUNT_SHOWN = 3
+LARGEST = 1e150  # of a number: the square of a larger one is none
 _NONE: Mapping[str, str] = MappingProxyType({})
 
 
@@ -63,10 +64,59 @@ def findings_of(
         yield from _coordinate_findings(dataset, name)
 
 
+def root_findings(
+    dataset: xr.Dataset,
+    kind: str,
+    sensors: Mapping[str, str],
+    carriages: Sequence[str],
+    envelopes: Mapping[str, str] = _NONE,
+) -> Iterator[str]:
+    """Every difference of what an archive holds from the declarations, and every number that cannot be."""
+    yield from _number_findings(dataset)
+    yield from findings_of(dataset, kind, sensors, carriages, envelopes)
+    yield from _index_findings(dataset, "history", int(dataset["status"].size))
+
+
+def group_findings(dataset: xr.Dataset, path: str, size: int) -> Iterator[str]:
+    """The same of a group of an archive ("/audit"). size: variants of the study."""
+    yield from _number_findings(dataset)
+    yield from findings_of(dataset, path, {}, ())
+    yield from _index_findings(dataset, "sample", size)
+
+
+def _number_findings(dataset: xr.Dataset) -> Iterator[str]:
+    """Flags that mean nothing, and numbers that are too large to reckon with."""
+    for name, array in dataset.variables.items():
+        if array.dtype.kind not in "iuf":
+            continue
+        if "flag_values" in array.attrs and not np.isin(array.values, array.attrs["flag_values"]).all():
+            strange = np.setdiff1d(array.values, array.attrs["flag_values"])
+            yield f"{name}: expected one of its flag_values, received {_shown(strange)}"
+        with np.errstate(invalid="ignore"):
+            large = np.abs(array.values.astype(np.float64)) > LARGEST
+        if large.any():
+            yield f"{name}: expected numbers below {LARGEST:g}, received {array.values[large].flat[0]:g}"
+
+
+def _index_findings(dataset: xr.Dataset, name: str, size: int) -> Iterator[str]:
+    """Flat numbers of variants, where a coordinate has such."""
+    if name not in dataset.coords:
+        return
+    values = dataset[name].values
+    known = values.dtype.kind in "iu" and values.min() >= 0 and values.max() < size
+    if not known or len(np.unique(values)) < values.size:
+        yield f"{name}: expected different numbers from 0 to {size - 1}, received {_shown(values)}"
+
+
+def _shown(values: np.ndarray) -> str:
+    return ", ".join(str(value) for value in values.ravel()[:_COUNT_SHOWN]) + ", ..." * (values.size > _COUNT_SHOWN)
+
+
 def _shape_findings(array: xr.DataArray, variable: Variable, grid: tuple[str, ...]) -> Iterator[str]:
     leads: dict[str, list[tuple[str, ...]]] = {"grid": [grid], "history": [grid, ("history",)], "none": [()]}
     dims = tuple(map(str, array.dims))
-    if not any(_dims_fit(dims, (*lead, *variable.dims)) for lead in leads[variable.lead]):
+    fits = variable.lead == "some" or any(_dims_fit(dims, (*lead, *variable.dims)) for lead in leads[variable.lead])
+    if not fits:
         wanted = " or ".join(str((*lead, *variable.dims)) for lead in leads[variable.lead])
         yield f"{array.name}: expected dimensions {wanted}, received {dims}"
     if _type_name(array) != variable.dtype:

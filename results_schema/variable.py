@@ -19,7 +19,8 @@ class Variable:
     dims: dimensions beyond the leading ones; "a|b" allows either.
     units: udunits text; "{sensor}", "{envelope}" are its own unit, "" dimensionless.
     lead: the leading dimensions: "grid" those of `status`; "history" those or the single dimension `history`
-        (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "none".
+        (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "some" those of the
+        study's sweep that matter (in a group, which has no status); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
     planned: no version writes it yet; left out of the table for people.
     gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
@@ -36,7 +37,7 @@ class Variable:
     nan_allowed: bool = False
     gaps_allowed: bool = False
     planned: bool = False
-    lead: Literal["grid", "history", "none"] = "grid"
+    lead: Literal["grid", "history", "some", "none"] = "grid"
 
     def attributes(self) -> dict[str, Any]:
         """CF attributes of an expanded variable; `comment` holds the meaning.

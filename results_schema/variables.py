@@ -44,12 +44,12 @@ QUANTITY_UNITS: Mapping[str, str] = {
 
 _RESERVED_WORDS = """
     direction position phase peak sensor variant speed_ratio mass_ratio station elapsed history mode
-    status fidelity_used modes_used steps_used error_estimate error_steps error_modes error_fidelity
+    status fidelity_used modes_used steps_used error_estimate result tolerance work
     dynamic_amplification lag loop_area odd_rms even_excess peaks_per_cycle peak_value peak_phase odd_even_ratio
     harmonic frequency error seconds_per_variant fitted_order scheme step_count mode_count quantity critical_step
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
-    tolerance_asked worst_result left_out relative_cost scheme_used
+    tolerance_asked worst_result left_out scheme_used
 """
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())

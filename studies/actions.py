@@ -44,7 +44,7 @@ def check(study: str) -> None:
         shown = preview_of_pieces(kind, loaded)
     else:
         check_unreduced(loaded)
-        plan = engine.make_plan(loaded, reduction=kind.reduction(loaded))
+        plan = engine.make_plan(loaded, reduction=kind.reduction(loaded), results=kind.name)
         shown = preview(plan, len(os.sched_getaffinity(0)))
     console.show_preview(shown)
 

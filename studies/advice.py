@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.status import Status
-from studies.trade import Choice, cheapest, choices, is_out_of_reach, step_choices
+from studies.trade import Automatic, Choice, automatic_choices, cheapest, choices, is_out_of_reach, step_choices
 from studies.words import counted, listed, number
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def findings(dataset: xr.Dataset, wanted: Sequence[float]) -> list[str]:
     told = [advice(dataset, scene, quantity, wanted) for quantity in quantities for scene in scenes]
     told += [steps_alone(dataset, scene, "history", wanted) for scene in scenes]
     rest = [_orders(dataset), _gain(dataset), _failed(dataset), *_solvers(dataset), _jax(dataset), _references(dataset)]
-    return [_lead(dataset, max(wanted)), READING, *told, *(text for text in rest if text)]
+    return [_lead(dataset, max(wanted)), READING, *automatic(dataset), *told, *(text for text in rest if text)]
 
 
 def advice(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[float]) -> str:
@@ -79,6 +79,34 @@ def steps_alone(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence
     modes = counted(int(dataset["modes_used"].sel(scene=scene).values.flat[0]), "mode")
     said = _advised(points, known, wanted, _taken)
     return f"{_named(scene)}, the error of the steps alone in {QUANTITY_WORDS[quantity]}, {modes}: {said}."
+
+
+def automatic(dataset: xr.Dataset) -> list[str]:
+    """How far the program's own choices are from the front, the loosest tolerance first."""
+    if "automatic_error" not in dataset:
+        return []
+    tolerances = sorted(map(float, dataset["asked_tolerance"].values), reverse=True)
+    return [_automatic(automatic_choices(dataset, tolerance), tolerance) for tolerance in tolerances]
+
+
+def _automatic(found: Sequence[Automatic], tolerance: float) -> str:
+    """The program's own choices at a tolerance."""
+    costs = [(ratio, point.scene) for point in found if (ratio := point.over_front) is not None]
+    errors = _span([point.error / tolerance for point in found], _times)
+    beyond = [point.scene for point in found if point.error > tolerance]
+    erring = f"Its histories err {errors} times what was asked{f', too much in {listed(beyond)}' if beyond else ''}."
+    who = f"The automatic choice at {_plain(tolerance)}"
+    if not costs:
+        return f"{who} cannot be compared with the front, where no point surely errs so little. {erring}"
+    worst, scene = max(costs)
+    where = f"in all {len(found)} scenes" if len(found) > 1 else "in the one scene"
+    if len(costs) < len(found):
+        where = f"in {len(costs)} of {len(found)} scenes; in the others no point surely errs so little"
+    return f"{who} costs at most {number(worst, 2)} times the front at the error asked ({scene}), {where}. {erring}"
+
+
+def _times(ratio: float) -> str:
+    return number(ratio, 2) if np.isfinite(ratio) else "infinitely many"
 
 
 def _named(scene: str) -> str:

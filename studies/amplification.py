@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from results_schema.variables import Variable
 
@@ -22,7 +25,7 @@ DYNAMIC_AMPLIFICATION = Variable(
 
 
 def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """The dataset with `dynamic_amplification`, from `<sensor>_max`, `_min` and `_static`."""
+    """The dataset with `dynamic_amplification`, from `<sensor>_max`, `_min` and `_static`, and its errors."""
     import xarray as xr
 
     ratios = []
@@ -31,6 +34,33 @@ def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
         static = dataset[f"{sensor}_static"]
         ratios.append(largest.where(largest > smallest, smallest) / static.where(static > 0.0))
     joined = xr.concat(ratios, "sensor").transpose(*dataset["status"].dims, "sensor")
-    return dataset.assign(
+    found = dataset.assign(
         dynamic_amplification=(joined.dims, joined.values, DYNAMIC_AMPLIFICATION.attributes()),
     )
+    return with_derived_errors(found, derived_from(study))
+
+
+def derived_from(study: Study) -> Mapping[str, tuple[str, ...]]:
+    """The results whose errors the amplifications have: that of the larger extreme, as both are over the static
+    value."""
+    return {f"dynamic_amplification {sensor}": (f"{sensor}_max", f"{sensor}_min") for sensor in study.sensor}
+
+
+def with_derived_errors(dataset: xr.Dataset, derived: Mapping[str, tuple[str, ...]]) -> xr.Dataset:
+    """The dataset with errors of results that a study derives from others: the largest of theirs, with the tolerance of
+    the first."""
+    import xarray as xr
+
+    if "estimated_error" not in dataset:
+        return dataset
+    errors = dataset[["estimated_error", "tolerance"]]
+    parts = [errors]
+    for name, sources in derived.items():
+        largest = errors["estimated_error"].sel(result=list(sources)).max("result", skipna=False)
+        tolerance = errors["tolerance"].sel(result=sources[0], drop=True)
+        own = xr.Dataset({"estimated_error": largest, "tolerance": tolerance})
+        parts.append(own.expand_dims(result=np.array([name])))
+    joined = xr.concat(parts, "result", combine_attrs="override")
+    joined["estimated_error"] = joined["estimated_error"].transpose(*errors["estimated_error"].dims)
+    joined["result"].attrs = dict(dataset["result"].attrs)
+    return dataset.drop_dims("result").assign(joined)

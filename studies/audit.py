@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.errors import BadInput, Interrupted
+from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
+from studies.amplification import derived_from
 from studies.choices import is_marched
 from studies.measuring import Work, described
 from studies.results import Results
@@ -20,59 +21,17 @@ from studies.words import counted, scientific
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.audit import Sample
-    from engine.lanes import LaneValues
+    from engine.accuracy.audit import Audit
     from engine.plan import Plan
-    from engine.reduction import Compared, Reduction
     from engine.scene import Study
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Arrays = Mapping[str, NDArray[Any]]
 
 GROUP = "/audit"
-EXTREMES = ("max", "min")
-NONE_AUDITED = "no variant was audited: it would have taken too long; audit = N asks for N variants all the same"
-AT_REST = 1e-9  # of what a sensor reads: statics of less are rounding
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """What n variants report, and what they report when they are computed again, by the names of results.
-
-    scale (n, J): of every sensor, by which its differences are divided. silent (n, J): sensors that read but rounding.
-    values: the study's numbers in these variants.
-    """
-
-    sensors: tuple[str, ...]
-    reported: Arrays
-    again: Arrays
-    scale: Array
-    silent: NDArray[np.bool_]
-    values: LaneValues
-
-    @property
-    def compared(self) -> Compared:
-        """Both, as the study's reduction compares them."""
-        from engine.reduction import Compared
-
-        return Compared(self.reported, self.again, self.scale, self.values)
-
-
-class Again:
-    """A sink that keeps the results of some variants, given by ascending flat numbers."""
-
-    def __init__(self, variants: Counts) -> None:
-        self.arrays: dict[str, NDArray[Any]] = {}
-        self._variants = variants
-
-    def add(self, variants: Counts, arrays: Mapping[str, NDArray[Any]], selected: object) -> None:
-        """Take one chunk's results."""
-        here = np.searchsorted(self._variants, variants)
-        for name, array in arrays.items():
-            if name not in self.arrays:
-                self.arrays[name] = np.zeros((self._variants.size, *array.shape[1:]), dtype=array.dtype)
-            self.arrays[name][here] = array
+NONE_AUDITED = (
+    "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
+)
 
 
 def refuse_audit(study: Study) -> None:
@@ -82,148 +41,106 @@ def refuse_audit(study: Study) -> None:
         raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
 
 
-def planned_audit(plan: Plan) -> Sample | None:
-    """The variants that are to be audited, if any are. Raises BadInput."""
-    from engine.audit import sampled
-
-    sample = sampled(plan)
-    return sample if sample.variants.size else None
-
-
-def audit_group(plan: Plan, sample: Sample | None, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
+def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
     """The group of an archive by its path; {} where nothing is audited, or no audited variant has values.
 
-    sample: of `planned_audit`. dataset: the study's own. Raises Interrupted.
+    dataset: the study's own. Raises Interrupted.
     """
-    if sample is None:
+    from engine.accuracy.audit import sampled
+    from engine.execution import choose
+
+    choose(plan, work.threads, work.stop.event)
+    variants = sampled(plan)
+    kept = _flat(plan, dataset["status"])[variants] < int(Status.NOT_CONVERGED)
+    found = _on_threads(plan, variants[kept], work)
+    work.check()
+    if not found.variants.size:
         return {}
-    from engine.audit import Used, audit_plan
-
-    names = (f"{name}_used" for name in Used._fields)
-    used = Used(*(_flat(plan, dataset, name, np.arange(plan.size)) for name in names))
-    kept = _flat(plan, dataset, "status", sample.variants) < int(Status.NOT_CONVERGED)
-    finer = audit_plan(plan, sample._replace(variants=sample.variants[kept]), used)
-    if finer is None:
-        return {}
-    picked = np.sort(np.concatenate([bucket.variants for bucket in finer.buckets]))
-    pair = _pair(plan, dataset, picked, _march(finer, picked, work), _silent(finer, picked))
-    return {GROUP: _dataset(plan, dataset, picked, pair, int(np.count_nonzero(~kept)))}
+    return {GROUP: _dataset(plan, dataset, found, int(np.count_nonzero(~kept)) + found.left_out)}
 
 
-def _march(finer: Plan, variants: Counts, work: Work) -> dict[str, NDArray[Any]]:
-    """Results (n, ...) of the audit's plan."""
-    from engine.execution import execute
+def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
+    """The audit, shared out among threads."""
+    from engine.accuracy.audit import audit, joined
+    from engine.execution import run_jobs
+    from engine.march import Halted
 
-    found = Again(variants)
+    found: dict[int, Audit] = {}
+
+    def one(number: int, part: Counts) -> None:
+        found[number] = audit(plan, part, work.halted)
+
+    parts = np.array_split(variants, work.threads)
     try:
-        execute(finer, found.add, threads=work.threads, stop=work.stop.event)
-    except Interrupted:
+        run_jobs([partial(one, number, part) for number, part in enumerate(parts)], work.threads)
+    except Halted:
         work.check()
         raise
-    return found.arrays
+    return joined([found[number] for number in range(len(parts))], plan, variants.size)
 
 
-def _flat(plan: Plan, dataset: xr.Dataset, name: str, variants: Counts) -> NDArray[Any]:
-    """(n, ...) a result of some variants by their flat numbers."""
-    array = dataset[name].transpose(*plan.cases.dims, ...)
-    return np.asarray(array.values).reshape(plan.size, *array.shape[len(plan.cases.dims) :])[variants]
+def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:
+    """(V,) a result of every variant by its flat number."""
+    return np.asarray(array.transpose(*plan.cases.dims).values).reshape(plan.size)
 
 
-def _silent(finer: Plan, variants: Counts) -> NDArray[np.bool_]:
-    """(n, J) sensors that read but rounding."""
-    from engine.signals import silent
-
-    found = np.zeros((variants.size, len(finer.study.sensor)), dtype=np.bool_)
-    for bucket in finer.buckets:
-        found[np.searchsorted(variants, bucket.variants)] = silent(bucket.scene, bucket.tables.sensors)
-    return found
-
-
-def _pair(plan: Plan, dataset: xr.Dataset, variants: Counts, again: Arrays, silent: NDArray[np.bool_]) -> Pair:
-    from engine.lanes import LaneValues
-
-    sensors = tuple(plan.study.sensor)
-    names = [name for name in again if name in dataset]
-    reported = {name: _flat(plan, dataset, name, variants) for name in names}
-    values = LaneValues(plan.study, plan.cases.columns_of(variants), variants.size)
-    return Pair(sensors, reported, again, _scale(sensors, again), silent, values)
-
-
-def _scale(sensors: Iterable[str], again: Arrays) -> Array:
-    """(n, J) the largest static value of every sensor; of one that statics leave at rest, but for rounding, its own."""
-    columns = []
-    for name in sensors:
-        static = np.asarray(again[f"{name}_static"], dtype=np.float64)
-        own = np.maximum(*(np.abs(again[f"{name}_{end}"]) for end in EXTREMES))
-        columns.append(np.where(static > AT_REST * own, static, own))
-    return np.stack(columns, axis=1)
-
-
-def _differences(pair: Pair, reduction: Reduction | None) -> dict[str, Array]:
-    """(n, J) by the names of results: extremes of all sensors, and what the kind of study makes of its cycles."""
-    compared = pair.compared
-    found = {
-        end: compared.relative(np.stack([compared.gap(f"{sensor}_{end}") for sensor in pair.sensors], axis=1))
-        for end in EXTREMES
-    }
-    found |= {} if reduction is None else dict(reduction.differences(compared))
-    return {name: np.where(pair.silent, 0.0, gaps) for name, gaps in found.items()}
-
-
-def _dataset(plan: Plan, dataset: xr.Dataset, variants: Counts, pair: Pair, left_out: int) -> xr.Dataset:
+def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr.Dataset:
     import xarray as xr
 
-    found = _differences(pair, plan.reduction)
-    gaps = np.stack(list(found.values()), axis=1).reshape(variants.size, -1)  # results, then sensors
-    names = [_named(name, sensor) for name in found for sensor in pair.sensors]
-    known = pair.again["status"] < int(Status.NOT_CONVERGED)
+    names, derived = _names(plan), derived_from(plan.study)
+    whole = [str(name) for name in dataset["result"].values]
+    rows = [[names.index(own) for own in ([name] if name in names else derived[name])] for name in whole]
+    observed = np.where(np.isfinite(found.observed), found.observed, np.nan)
     arrays: dict[str, NDArray[Any]] = {
-        "observed_error": np.where(known, gaps.max(axis=1), np.nan),
-        "estimated_error": _estimated(plan, dataset, variants),
-        "tolerance_asked": pair.values.of("solver.tolerance"),
-        "worst_result": np.array([names[place] for place in np.nan_to_num(gaps).argmax(axis=1)]),
-        "modes_used": pair.again["modes_used"],
-        "steps_used": pair.again["steps_used"],
-        "variant_status": _flat(plan, dataset, "status", variants),
+        "observed_error": np.stack([observed[own].max(axis=0) for own in rows], axis=1),
+        "estimated_error": np.stack([found.told[own].max(axis=0) for own in rows], axis=1),
+        "tolerance": np.asarray(dataset["tolerance"].values),
+        "tolerance_asked": plan.cases_tolerance[found.variants],
+        "variant_status": _flat(plan, dataset["status"])[found.variants],
         "left_out": np.array(left_out),
     }
     declared = {variable.name: variable for variable in declarations(GROUP)}
     own = {
-        axis.name: ("sample", axis.values[plan.cases.positions(variants)[axis.dim]], dataset[axis.name].attrs)
+        axis.name: ("sample", axis.values[plan.cases.positions(found.variants)[axis.dim]], dataset[axis.name].attrs)
         for axis in plan.cases.axes
+    }
+    coordinates = {
+        "sample": ("sample", found.variants, axes()["sample"].attributes()),
+        "result": ("result", whole, axes()["result"].attributes()),
     }
     return xr.Dataset(
         {name: described(declared[name], declared[name].dims, array) for name, array in arrays.items()},
-        coords={"sample": ("sample", variants, axes()["sample"].attributes())} | own,
+        coords=coordinates | own,
     )
 
 
-def _named(name: str, sensor: str) -> str:
-    """A result of a sensor in words, extremes as in the archive."""
-    return f"{sensor}_{name}" if name in EXTREMES else f"{name} of {sensor}"
+def _names(plan: Plan) -> list[str]:
+    """The results of a plan's march."""
+    from engine.accuracy.results import results_of
+
+    return [result.name for result in results_of(plan.asked)]
 
 
-def _estimated(plan: Plan, dataset: xr.Dataset, variants: Counts) -> Array:
-    """(n,) what the archive itself estimates; NaN where it does not."""
-    name = next((name for name in ("error_estimate", "error_steps") if name in dataset), None)
-    return np.full(variants.size, np.nan) if name is None else _flat(plan, dataset, name, variants)
+def relative_errors(group: xr.Dataset, name: str = "observed_error") -> Array:
+    """(n, R) errors over the tolerances of their results; NaN where these are only told."""
+    tighter = np.asarray(group["tolerance_asked"].values)[:, None]  # `solver.tolerance` over the study's
+    return np.asarray(group[name].values / (np.asarray(group["tolerance"].values) * tighter), dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Verdict:
     """What an audit found among the variants that the archive calls ok.
 
-    asked: the tolerance, the smallest where it varies. worst: the largest observed error beside its tolerance, NaN
-    where none is known; place: its number in the group. missed: variants beyond their tolerance. unknown: those
-    without a number. marked: variants to which the archive itself gives another status than ok, and so no promise;
-    marked_worst: the largest observed error among them, NaN where none is known.
+    worst: the largest observed error over its tolerance, NaN where none is known; place, result: its number in the
+    group, and the result. missed: variants beyond a tolerance. unknown: those without a number. marked: variants to
+    which the archive itself gives another status than ok, and so no promise; marked_worst: the largest among them.
     """
 
     count: int
     left_out: int
-    asked: float
     worst: float
     place: int
+    result: int
     missed: int
     unknown: int
     marked: int
@@ -237,20 +154,21 @@ class Verdict:
     @classmethod
     def of(cls, group: xr.Dataset) -> Verdict:
         """The verdict of the archive's group."""
-        observed, tolerance = (np.asarray(group[name].values) for name in ("observed_error", "tolerance_asked"))
+        errors = relative_errors(group)
+        over = np.nanmax(np.where(np.isfinite(group["tolerance"].values), errors, -1.0), axis=1)
         ours = np.asarray(group["variant_status"].values) == int(Status.OK)
-        known = np.isfinite(observed)
-        place = int(np.argmax(np.where(known & ours, observed / tolerance, -1.0)))
+        known = ~np.isnan(over)
+        place = int(np.argmax(np.where(known & ours, over, -1.0)))
         return cls(
             count=int(np.count_nonzero(ours)),
             left_out=int(group["left_out"]),
-            asked=float(tolerance.min()),
-            worst=float(observed[place]) if ours[place] else np.nan,
+            worst=float(over[place]) if ours[place] else np.nan,
             place=place,
-            missed=int(np.count_nonzero(observed[known & ours] > tolerance[known & ours])),
+            result=int(np.nanargmax(np.where(np.isnan(errors[place]), -1.0, errors[place]))),
+            missed=int(np.count_nonzero(over[known & ours] > 1.0)),
             unknown=int(np.count_nonzero(~known & ours)),
             marked=int(np.count_nonzero(~ours)),
-            marked_worst=float(observed[known & ~ours].max(initial=-1.0)) if (known & ~ours).any() else np.nan,
+            marked_worst=float(over[known & ~ours].max()) if (known & ~ours).any() else np.nan,
         )
 
 
@@ -266,7 +184,7 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     if verdict.unknown:
         told.append(f"{counted(verdict.unknown, 'variant')} could not be compared, which counts as not held")
     if verdict.marked:
-        found = f"; there it found at most {scientific(verdict.marked_worst)}" if verdict.marked_worst >= 0.0 else ""
+        found = f"; there it found at most {verdict.marked_worst:.2g} of it" if verdict.marked_worst >= 0.0 else ""
         also = "further " if verdict.count else ""
         told.append(f"audit of {counted(verdict.marked, f'{also}variant')} that the archive marks itself{found}")
     if verdict.left_out:
@@ -276,26 +194,34 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
 
 def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
     """The sentence on variants that the archive calls ok."""
-    said = f"asked {scientific(verdict.asked)}, audit of {counted(verdict.count, 'variant')} found "
-    if not np.isfinite(verdict.worst):
+    said = f"audit of {counted(verdict.count, 'variant')} found "
+    if not np.isfinite(verdict.worst) or verdict.worst < 0.0:
         return f"{said}no number to compare"
+    asked, observed, name = _worst(group, verdict)
     at = results.at(results.index_of(int(group["sample"].values[verdict.place])))
-    result = str(group["worst_result"].values[verdict.place])
-    return f"{said}at most {scientific(verdict.worst)}, worst{f' at {at}' if at else ''} ({result})"
+    return f"asked {scientific(asked)}, {said}at most {scientific(observed)}, worst{f' at {at}' if at else ''} ({name})"
+
+
+def _worst(group: xr.Dataset, verdict: Verdict) -> tuple[float, float, str]:
+    """The tolerance and the observed error of the worst result, and its name."""
+    tighter = float(group["tolerance_asked"].values[verdict.place])
+    asked = float(group["tolerance"].values[verdict.result]) * tighter
+    return asked, verdict.worst * asked, str(group["result"].values[verdict.result])
 
 
 def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
     """What `run --json` says of it."""
     verdict = Verdict.of(group)
     place = dict(zip(results.dims, results.index_of(int(group["sample"].values[verdict.place])), strict=True))
+    asked, observed, name = _worst(group, verdict)
     return {
         "variants": verdict.count,
         "marked": verdict.marked,
         "left_out": verdict.left_out,
         "not_compared": verdict.unknown,
-        "tolerance": verdict.asked,
-        "largest_observed_error": verdict.worst,
-        "worst_result": str(group["worst_result"].values[verdict.place]),
+        "tolerance": asked,
+        "largest_observed_error": observed,
+        "worst_result": name,
         "at": {axis.name: float(axis.values[place[axis.dim]]) for axis in results.axes},
         "held": verdict.held,
     }

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.execution import execute, march_seconds, warm_up
-from engine.fidelity import allow_any_steps
 from engine.kernels.schemes import SCHEMES
 from engine.plan import make_plan
 from engine.scene import Study
+from engine.step_rules import allow_any_steps
 from results_schema.errors import BadInput
 
 BEST_OF = 7

@@ -130,7 +130,7 @@ def show_outcome(outcome: Outcome) -> None:
     from studies.choices import told_choices
     from studies.results import Results
 
-    results = outcome.results
+    results, whole = outcome.results, Results.of(outcome.results)
     rows = [
         (
             f"{found.name} {found.sensor}".strip(),
@@ -139,11 +139,10 @@ def show_outcome(outcome: Outcome) -> None:
             quantity(found.largest.value, found.units, beside=found.size),
             found.largest.where,
         )
-        for found in summary.ranges(results)
+        for found in summary.ranges(whole)
     ]
     table(results.attrs["title"], ("result", "smallest", "where", "largest", "where"), rows)
-    found = Results.of(results)
-    told = [*told_choices(found), *told_audit(outcome.audit, found)]
+    told = [*told_choices(whole), *told_audit(outcome.audit, whole)]
     say(*_about_statuses(summary.counts(results), summary.noun(results)), *told, _about_work(outcome))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from results_schema.variables import Variable
 from studies.measuring import described, usual
-from studies.positions import Asked, positions_of
+from studies.positions import Asked, Positions, positions_of
 from studies.results import sensor_units
 
 if TYPE_CHECKING:
@@ -63,6 +63,17 @@ def gathered(kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked
     return _Gathering(kind, pieces, study, asked).dataset()
 
 
+def asked_coordinates(places: Positions, asked: Asked) -> dict[str, NDArray[Any]]:
+    """The coordinates that follow from what is asked."""
+    return {
+        "position": places.all,
+        "checked_position": places.all[places.checked],
+        "unreduced_position": places.all[places.unreduced],
+        "mode_count": np.array(asked.mode_counts, dtype=np.int64),
+        "correction": np.array([1, 0]),
+    }
+
+
 class _Gathering:
     """The pieces of one study with what their dimensions mean."""
 
@@ -90,11 +101,7 @@ class _Gathering:
 
         known = {**axes(), **self.declared}
         values: dict[str, NDArray[Any]] = {
-            "position": self.places.all,
-            "checked_position": self.places.all[self.places.checked],
-            "unreduced_position": self.places.all[self.places.unreduced],
-            "mode_count": np.array(self.asked.mode_counts, dtype=np.int64),
-            "correction": np.array([1, 0]),
+            **asked_coordinates(self.places, self.asked),
             "on_body": np.array([part.name for part in self.model.bodies]),
             "body_place": np.linspace(0.0, 1.0, BODY_PLACES),
             **dict(self.inner.values()),

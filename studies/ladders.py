@@ -1,4 +1,5 @@
-"""The measurements of a work-precision study: one scene over schemes, steps, modes, and SciPy's solvers."""
+"""The measurements of a work-precision study: one scene over schemes, steps, modes, SciPy's solvers, and the program's
+own choice."""
 
 from __future__ import annotations
 
@@ -9,13 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from engine.axes import sobol_points
+from engine.execution import run_jobs
 from engine.ode import ModalEquations
+from engine.plan import make_plan
 from engine.scene import Study
+from engine.tables import SceneTables
+from results_schema.errors import BadInput
 from studies import jax_march, precision
 from studies.measuring import Work
 
 SOLVERS = {"DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10), "Radau": (1e-2, 1e-4, 1e-6, 1e-8)}
 REFERENCE_TOLERANCES = (1e-12, 1e-10)
+AROUND, FACTOR = 2048, 2.0  # variants of the sweep around a scene: many more than pilots; from 1/2 to 2 of its values
 
 
 class Ladder(NamedTuple):
@@ -117,3 +124,51 @@ def modes(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work)
             "reference_error": ("quantity", apart),
         }
     )
+
+
+def automatic(study: Study, overrides: Mapping[str, Any], asked: Ladder, tolerance: float, work: Work) -> xr.Dataset:
+    """What the program chooses for a scene by itself in a sweep around it: error of histories against what is
+    converged, seconds per variant."""
+    tables = chosen_tables(around(study.with_values(overrides), tolerance), work)
+    scheme = tables.model.scheme.name
+    reference, _ = precision.converged(study, overrides, asked.reference_modes, asked.step_counts[-1], work)
+    error = reference.errors(precision.run_scheme(tables, scheme, work))[precision.QUANTITIES.index("history")]
+    seconds = precision.seconds_per_variant(tables, scheme, work)
+    return xr.Dataset(
+        {"error": error, "seconds": seconds, "modes": tables.model.body_modes, "steps": tables.steps},
+    )
+
+
+def leaves_modes_open(study: Study) -> bool:
+    """Whether the program may choose the number of modes of the body."""
+    name = f"body.{next(iter(study.carriage.values())).on}"
+    try:
+        return study.with_values({f"{name}.modes": "auto"}).body[name.partition(".")[2]].modes_are_open
+    except BadInput:
+        return False
+
+
+def around(study: Study, tolerance: float) -> Study:
+    """A sweep around a scene with everything left open: its own variant first, then others with a sample of masses,
+    speeds and damping ratios."""
+    name, carriage = next(iter(study.carriage.items()))
+    keys = (
+        *(f"carriage.{name}.{key}" for key in ("mass", "motion.speed", "motion.frequency")),
+        f"body.{carriage.on}.damping_ratio",
+    )
+    own = {key: value for key, value in study.numbers().items() if key in keys and value > 0.0}
+    points = 2.0 * sobol_points(AROUND, len(own)) - 1.0
+    points[0] = 0.0
+    axes = {
+        f"around_{number}": {"of": key, "values": (value * FACTOR ** points[:, number]).tolist()}
+        for number, (key, value) in enumerate(own.items())
+    }
+    everything = {f"body.{carriage.on}.modes": "auto", "solver.tolerance": tolerance, "output.histories": "auto"}
+    return study.with_values(everything | {"sweep": {"zip": True} | axes})
+
+
+def chosen_tables(study: Study, work: Work) -> SceneTables:
+    """The tables of the march that is chosen for the first variant of a study of many. Raises Halted."""
+    plan = make_plan(study)
+    plan.choose(lambda jobs: run_jobs(jobs, work.threads), work.halted)
+    return next(group.tables for group in plan.groups if 0 in group.variants)

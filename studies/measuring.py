@@ -7,7 +7,6 @@ blowing up, is the answer of such a study and no failure of the run.
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -157,16 +156,6 @@ def _check_names(study: Study, kind: MeasuringKind) -> None:
         if name in declared:
             where = study.source.where(f"sweep.{name}")
             raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
-
-
-def key_of(study: Study, pieces: Sequence[Piece]) -> str:
-    """What finished pieces belong to: the study's text, the files of its bodies, the kernels, the pieces' names."""
-    from engine.kernels.jit import kernel_hash
-
-    names = "\n".join(piece.name for piece in pieces)
-    files = [body.content for body in study.body.values() if body.content]
-    texts = "-".join([study.source.sha256, *files])
-    return f"{texts}-{kernel_hash()}-{hashlib.sha256(names.encode()).hexdigest()[:16]}"
 
 
 def disk_bytes(pieces: Sequence[Piece]) -> int:

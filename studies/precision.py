@@ -19,6 +19,7 @@ from engine.comparison import COMPARISON, march_comparison, prepare_comparison
 from engine.execution import seconds_of, seconds_of_jobs
 from engine.histories import counts_shown
 from engine.kernels.layout import DIVERGED_AT, LANES, LARGEST, SMALLEST
+from engine.kernels.schemes import SCHEMES
 from engine.lanes import LaneValues
 from engine.march import Marched, march, prepare
 from engine.model import SceneModel, build_model
@@ -104,14 +105,12 @@ def scene_model(study: Study, overrides: Mapping[str, Any], modes: int | None = 
 
 def with_scheme(model: SceneModel, scheme: str) -> SceneModel:
     """The same model marched by one of the schemes of the march, with the parameters that are compared here."""
-    own: dict[str, Any] = dict.fromkeys(("beta", "gamma", "alpha", "rho_inf"))
-    own |= {"scheme": scheme, **_OWN.get(scheme, {})}
-    return replace(model, study=model.study.with_values({f"solver.{key}": value for key, value in own.items()}))
+    return replace(model, numerics=model.numerics._replace(scheme=SCHEMES[scheme](_OWN.get(scheme, {}))))
 
 
 def with_correction(model: SceneModel, corrected: bool) -> SceneModel:
     """The same model with or without the static part of the modes that are left out."""
-    return replace(model, study=model.study.with_values({"solver.static_correction": corrected}))
+    return replace(model, numerics=model.numerics._replace(static_correction=corrected))
 
 
 @dataclass(eq=False)

@@ -115,9 +115,55 @@ JAX_SECONDS = Variable(
     required=False,
     nan_allowed=True,
 )
+_AUTOMATIC = ("scene", "asked_tolerance")
+_CHOSEN = "what is chosen for the scene in a sweep of its mass, speed and damping from half to twice its own"
+AUTOMATIC_ERROR = Variable(
+    "automatic_error",
+    _AUTOMATIC,
+    long_name="error of histories of the automatic choice",
+    meaning=f"as the history of `total_error`, of {_CHOSEN}; NaN where the number of modes cannot be left open",
+    lead="none",
+    required=False,
+    nan_allowed=True,
+)
+AUTOMATIC_SECONDS = Variable(
+    "automatic_seconds_per_variant",
+    _AUTOMATIC,
+    units="s",
+    long_name="wall time per variant of the automatic choice",
+    meaning="as seconds_per_variant, of the march alone: the pilots that the choice is measured by are left out",
+    lead="none",
+    required=False,
+    nan_allowed=True,
+)
+AUTOMATIC_MODES = Variable(
+    "automatic_modes",
+    _AUTOMATIC,
+    "int32",
+    long_name="modes of the automatic choice",
+    meaning="0 where there is no automatic choice",
+    lead="none",
+    required=False,
+)
+AUTOMATIC_STEPS = Variable(
+    "automatic_steps",
+    _AUTOMATIC,
+    "int32",
+    long_name="steps of the automatic choice over one passage or cycle",
+    meaning="0 where there is no automatic choice",
+    lead="none",
+    required=False,
+)
+AUTOMATIC = {
+    "error": AUTOMATIC_ERROR,
+    "seconds": AUTOMATIC_SECONDS,
+    "modes": AUTOMATIC_MODES,
+    "steps": AUTOMATIC_STEPS,
+}
 RESULTS = (
     *(ERROR, SECONDS, ORDER, COMPARISON_ONLY, REFERENCE_ERROR, TOTAL_ERROR, TOTAL_SECONDS, TOTAL_REFERENCE_ERROR),
     *(ON_FRONT, SOLVER_ERROR, SOLVER_SECONDS, JAX_ERROR, JAX_SECONDS),
+    *AUTOMATIC.values(),
 )
 
 
@@ -129,4 +175,5 @@ COORDINATES = (
     _axis("scene", "scene", "str"),
     _axis("correction", "whether the static correction is added", "int8", "1 with, 0 without"),
     _axis("solver", "solver of SciPy and its relative tolerance", "str"),
+    _axis("asked_tolerance", "tolerance asked of the automatic choice", "float64", "`solver.tolerance`"),
 )

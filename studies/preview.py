@@ -1,4 +1,4 @@
-"""What a run would do, from its plan alone: the scene's numbers, the work and its cost, as tables for people."""
+"""What a run would do, from its plan and about a second of measuring: the scene, the work and its time, as tables."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.audit import audit_seconds, sampled
-from engine.bucket import Bucket
+from engine.accuracy.audit import audit_size
+from engine.accuracy.grids import SceneGrid
 from engine.lanes import LaneValues, moving_mass
 from engine.model import SceneModel
 from engine.plan import Plan
 from engine.remarks import remarks
 from engine.scenes import base_scene
 from engine.sweep import Cases, expand
-from studies import chosen, simpler
+from studies import chosen
+from studies.forecast import Forecast, forecast
 from studies.measuring import disk_bytes
 from studies.words import counted, number, unit_text
 
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
-CHOSEN = "The choice per variant; cost is modes x steps, checks included, over the full model's"
-SIMPLER = "What simpler models would leave out of the worst sensor, over its largest static value"
 
 
 class Table(NamedTuple):
@@ -50,37 +49,29 @@ class Preview:
 
 
 def preview(plan: Plan, threads: int) -> Preview:
-    """The explanation of a plan for so many threads; computes nothing large."""
+    """The explanation of a plan for so many threads, from about a second of measuring."""
+    seen = forecast(plan, threads)
     tables = (
         *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan)),
-        Table(CHOSEN, chosen.HEADINGS, chosen.choices(plan)),
-        Table(SIMPLER, simpler.HEADINGS, simpler.simpler_models(plan)),
+        Table(seen.title, chosen.HEADINGS, seen.rows),
     )
-    cost = (
-        f"About {duration(plan.total_seconds(threads))} on {counted(threads, 'thread')}, at most "
-        f"{size(plan.memory_bytes)} of memory and {size(plan.disk_bytes)} on the disk.{_audit(plan)}"
+    room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
+    cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}"
+    remark = (seen.remark,) if seen.remark else ()
+    return Preview(tuple(table for table in tables if table.rows), cost, (*remarks(plan), *remark))
+
+
+def _audit(seen: Forecast) -> str:
+    """How many variants are audited."""
+    wanted = seen.plan.study.solver.audit
+    if wanted == "auto" and not seen.plan.converges and seen.plan.choice is None:
+        return ""
+    variants = audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size)
+    if variants:
+        return f" Then {counted(variants, 'variant')} are audited." if variants > 1 else " Then 1 variant is audited."
+    return (
+        " No audit." if wanted == 0 else " No audit: it would take too long; audit = N audits N variants all the same."
     )
-    return Preview(tuple(table for table in tables if table.rows), cost, (*_foreseen(plan), *remarks(plan)))
-
-
-def _foreseen(plan: Plan) -> Iterator[str]:
-    """How far the table of the choice can be believed."""
-    told = np.concatenate([bucket.told.error_modes + bucket.told.error_steps for bucket in plan.buckets])
-    if np.isnan(told).any():
-        yield (
-            "errors of rates, contact forces and whatever rides are not known before the march: it begins with the "
-            "carriages' own model, and what misses the tolerance is marched again, which may take many times as long"
-        )
-
-
-def _audit(plan: Plan) -> str:
-    """What the audit costs."""
-    if plan.study.solver.audit == 0:
-        return " No audit."
-    variants, seconds = audit_seconds(plan, sampled(plan))
-    if not variants:
-        return " No audit: it would take too long; audit = N asks for one of N variants all the same."
-    return f" The audit of {counted(variants, 'variant')} takes about {duration(seconds)} more."
 
 
 def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
@@ -183,21 +174,21 @@ def _ratios(plan: Plan) -> Table:
     """Ratios of the first carriage that decide how dynamic the scene is, over all variants."""
     name = plan.base.carriages[0].name
     found: dict[str, list[Array]] = {}
-    for bucket in plan.buckets:
-        for ratio, values in _ratios_of(plan, bucket, name):
+    for grid in plan.grids:
+        for ratio, values in _ratios_of(grid, name):
             found.setdefault(ratio, []).append(values)
     rows = [(ratio, span(np.concatenate(values))) for ratio, values in found.items()]
     return Table(f"Ratios of {name}", ("ratio", "range"), rows)
 
 
-def _ratios_of(plan: Plan, bucket: Bucket, name: str) -> Iterator[tuple[str, Array]]:
-    scene, values = bucket.scene, plan.values(bucket, bucket.variants)
+def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:
+    scene, values = grid.scene, grid.values
     rider, time_scale = scene.carriages[0].rider, values.time_scale(name)
     critical = scene.first_omega * scene.leading_body.modal.length / np.pi
     yield "top speed over the critical speed omega_1 L/pi", rider.top_speed / time_scale / critical
     if rider.motion.period is not None:
         yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
-    if plan.study.carriage[name].inertial:
+    if scene.study.carriage[name].inertial:
         yield "mass over the body's mass", moving_mass(scene, values, 0) / scene.leading_body.modal.mass
 
 

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from engine.scene import Study
+from results_schema.archive import FILES, files_text
 from results_schema.reading import SCHEMA_VERSION
+from studies.identity import files_of
 from studies.study import study_attributes
 
 CONVENTIONS = "CF-1.11"
@@ -22,11 +24,12 @@ OF_TIME_AND_MACHINE = ("history", "machine", "run_seconds")
 
 
 def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
-    """Root attributes of an archive. key: the study's and the kernels' hash; seconds: duration of this run."""
+    """Root attributes of an archive. key: what the results belong to; seconds: duration of this run."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return {
         "Conventions": CONVENTIONS,
         **study_attributes(study),
+        **({FILES: files_text(hashes)} if (hashes := files_of(study)) else {}),
         "schema_version": SCHEMA_VERSION,
         "results_key": key,
         "packages": [f"{name} {_version(name)}" for name in ("wanderlast", *PACKAGES)],

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from markupsafe import Markup, escape
 
+from engine.document import Beside
 from results_schema import files
 from results_schema.archive import Archive, open_archive
 from results_schema.errors import BadInput
@@ -23,6 +24,7 @@ from results_schema.status import Status, label
 from results_schema.variables import Variable, expand
 from studies import audit
 from studies.answers import figures_of, findings_of
+from studies.archived import results_of
 from studies.audit import told_audit
 from studies.figures import Figure, png, svg
 from studies.pictures import audit as audited
@@ -94,7 +96,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     folder = Path(folder)
     _check_folder(folder)
     source = open_archive(archive)
-    results = Results.of(source.root)
+    results = results_of(source)
     figures = [
         *figures_of(results),
         *audited.pictures(results, source.groups.get(audit.GROUP)),
@@ -240,6 +242,8 @@ def _rows(results: Results, here: str, table: Mapping[str, Any], swept: Mapping[
     found = []
     for key, value in table.items():
         path = f"{here}.{key}"
+        if isinstance(value, Beside):
+            continue
         if isinstance(value, dict):
             inner = _rows(results, path, value, swept)
             found += [row._replace(name=f"{key}.{row.name}") for row in inner]
@@ -284,7 +288,7 @@ def _sweep_row(results: Results, place: int) -> Row:
 def _results(results: Results) -> list[tuple[str, ...]]:
     """Name, sensor, smallest and largest with their places, of every result that is a number per variant."""
     rows: list[tuple[str, ...]] = []
-    for found in ranges(results.dataset):
+    for found in ranges(results):
         ends = [quantity(end.value, found.units, 4) for end in (found.smallest, found.largest)]
         rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where))
     return rows
@@ -311,7 +315,8 @@ def _provenance(source: Archive) -> list[Row]:
     wanted = {
         "history": "made by",
         "study_sha256": "study file, SHA-256",
-        "results_key": "study and kernels",
+        "study_files": "files of the model, SHA-256",
+        "results_key": "study, files and program",
         "packages": "packages",
         "python": "Python",
         "machine": "machine",

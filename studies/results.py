@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -82,10 +82,11 @@ class Trace(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A study's dataset, from memory or from its archive, and the study itself."""
+    """A study's dataset, from memory or from its archive, and the study; models: the archive's bodies by name."""
 
     dataset: xr.Dataset
     study: Study
+    models: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Results:
@@ -139,6 +140,10 @@ class Results:
     def carriage_name(self) -> str:
         """Name of the first carriage."""
         return next(iter(self.study.carriage))
+
+    def recorded(self, body: str) -> xr.Dataset | None:
+        """What the archive holds of a body out of files, whose model cannot be built without them; else None."""
+        return None if self.study.body[body].recorded is None else self.models[body]
 
     @cached_property
     def envelopes(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,15 +16,19 @@ import numpy as np
 
 from engine.scene import Study
 from results_schema import files
-from results_schema.archive import OutputState, open_archive, output_state, write_archive
+from results_schema.archive import OutputState, changed_files, open_archive, output_state, write_archive
 from results_schema.errors import ArchiveError, BadInput, Interrupted
 from results_schema.parts import PartStore
 from results_schema.pieces import PieceStore
-from studies.audit import GROUP, audit_group, planned_audit, refuse_audit
+from results_schema.run_folder import RunFolder
+from studies.archived import with_first_frequency
+from studies.audit import GROUP, audit_group, refuse_audit
 from studies.gathering import Gatherer
-from studies.measuring import MeasuringKind, Work, disk_bytes, key_of, measure
+from studies.identity import check_unchanged, files_of, run_key
+from studies.measuring import MeasuringKind, Work, disk_bytes, measure
 from studies.options import RunOptions
 from studies.provenance import attributes
+from studies.results import Results
 from studies.stopping import Stop
 from studies.study import Kind, finish, gathered, kind_of
 from studies.unreduced import check_unreduced, refuse_unreduced, unreduced_group
@@ -66,12 +71,9 @@ def run_to_archive(
     started, stop = time.perf_counter(), stop or Stop()
     kind = kind_of(study)
     files.check_output_place(archive)
-    _check_target(study, archive)
-    if _state(study, archive, options) == "same study, finished":
-        found = open_archive(archive)
-        seconds, audit = time.perf_counter() - started, found.groups.get(GROUP)
-        return Outcome(archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
     run = _Run(study, archive, options, progress, stop, started)
+    if _look(run) == "same study, finished":
+        return _found_finished(run)
     return _measured(kind, run) if isinstance(kind, MeasuringKind) else _marched(kind, run)
 
 
@@ -93,19 +95,21 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
     from engine.remarks import remarks
 
     check_unreduced(run.study)
-    plan = make_plan(run.study, reduction=kind.reduction(run.study))
-    sample = planned_audit(plan)
+    plan = make_plan(run.study, reduction=kind.reduction(run.study), results=kind.name)
     files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
-    worth_knowing = tuple(remarks(plan))
-    with (PartStore.discard_foreign if run.options.overwrite else PartStore)(run.archive, plan.key) as store:
+    worth_knowing, key = tuple(remarks(plan)), run_key(run.study)
+    make_store = PartStore.discard_foreign if run.options.overwrite else PartStore
+    with make_store(run.archive, key, partial(_look, run)) as store:
+        if _look(run) == "same study, finished":
+            return _given_up(store, run)
         done = store.finished()
         _march(plan, store, done, run)
         run.stop.check()
         root = _finished_dataset(plan, store)
-        audit = audit_group(plan, sample, root, Work(run.options.threads, run.stop))
-        groups = model_groups(plan.base) | unreduced_group(plan, root, run.stop.check) | audit
-        seconds = _write(run, root, plan.key, groups)
-        store.remove()
+        audit = audit_group(plan, root, Work(run.options.threads, run.stop))
+        models = with_first_frequency(model_groups(plan.base), Results(root, run.study))
+        groups = models | unreduced_group(plan, root, run.stop.check) | audit
+        seconds = _write(run, root, store, groups)
     return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing, audit.get(GROUP))
 
 
@@ -115,16 +119,18 @@ def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
     refuse_audit(run.study)
     pieces = kind.pieces(run.study)
     files.check_free(run.archive.parent, disk_bytes(pieces), "the pieces and the archive")
-    key = key_of(run.study, pieces)
-    with (PieceStore.discard_foreign if run.options.overwrite else PieceStore)(run.archive, key) as store:
+    key = run_key(run.study, [piece.name for piece in pieces])
+    make_store = PieceStore.discard_foreign if run.options.overwrite else PieceStore
+    with make_store(run.archive, key, partial(_look, run)) as store:
+        if _look(run) == "same study, finished":
+            return _given_up(store, run)
         names = {piece.name for piece in pieces}
         done = {name: found for name, found in store.finished().items() if name in names}
         work, progress = Work(run.options.threads, run.stop), run.progress or (lambda finished, total: None)
         found = measure(pieces, work, done=done, keep=store.write, progress=progress)
         run.stop.check()
         root = _as_declared(gathered, found, run.study)
-        seconds = _write(run, root, key, _bodies(run.study) if kind.sweeps else {})
-        store.remove()
+        seconds = _write(run, root, store, _bodies(run.study))
     return Outcome(run.archive, root, len(done), False, seconds)
 
 
@@ -136,13 +142,50 @@ def _bodies(study: Study) -> Mapping[str, xr.Dataset]:
     return model_groups(base_scene(study))
 
 
-def _write(run: _Run, root: xr.Dataset, key: str, groups: Mapping[str, xr.Dataset]) -> float:
-    """Write the archive; the seconds that the run has taken."""
+def _write(run: _Run, root: xr.Dataset, store: RunFolder, groups: Mapping[str, xr.Dataset]) -> float:
+    """Write the archive and remove its parts; the seconds that the run has taken."""
     seconds = time.perf_counter() - run.started
-    root = root.assign_attrs(attributes(run.study, key, seconds))
+    root = root.assign_attrs(attributes(run.study, store.key, seconds))
     run.stop.check()
-    write_archive(run.archive, root, groups)
+    try:
+        check_unchanged(run.study)
+    except BadInput:
+        store.remove()  # some may be of the files as they were, some as they are
+        raise
+    write_archive(run.archive, root, groups, partial(_check_vacant, run))
+    store.remove()
     return seconds
+
+
+def _found_finished(run: _Run) -> Outcome:
+    """There was nothing to do."""
+    found = open_archive(run.archive)
+    seconds, audit = time.perf_counter() - run.started, found.groups.get(GROUP)
+    return Outcome(run.archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
+
+
+def _given_up(store: RunFolder, run: _Run) -> Outcome:
+    """Somebody else has finished this very study since the run began."""
+    store.remove()
+    return _found_finished(run)
+
+
+def _look(run: _Run) -> OutputState:
+    """What is at the output's place, as far as it matters; refuses what must not be replaced. Raises BadInput."""
+    _check_target(run.study, run.archive)
+    return _state(run.study, run.archive, run.options)
+
+
+def _check_vacant(run: _Run) -> None:
+    """Refuse to replace what has come to the output's place since the run began. Raises BadInput."""
+    _check_target(run.study, run.archive)
+    if run.archive.exists() and not run.options.overwrite:
+        raise BadInput(
+            "something else has come there while the study ran",
+            where=str(run.archive),
+            expected="no file",
+            remedy="choose another place with -o, or replace it with --overwrite; finished work is kept",
+        )
 
 
 def _check_target(study: Study, archive: Path) -> None:
@@ -157,7 +200,16 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
     """What is at the output's place, as far as it matters; refuses another study's archive."""
     if options.overwrite:
         return "absent"
-    state = output_state(archive, study.source.sha256)
+    hashes = files_of(study)
+    state = output_state(archive, study.source.sha256, hashes)
+    if state == "same study, other files":
+        raise BadInput(
+            "the archive there was computed with other contents of the study's files",
+            where=str(archive),
+            expected="the files as they were",
+            received=f"changed: {', '.join(changed_files(archive, hashes)) or 'which files there are'}",
+            remedy="choose another place with -o, or compute it again with --overwrite",
+        )
     if state == "another study":
         raise BadInput(
             "there is something else already",

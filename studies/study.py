@@ -102,7 +102,7 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     if isinstance(kind, MeasuringKind):
         work = Work(options.pop("threads", None))
         return gathered(measure(kind.pieces(study), work, **options), study)
-    return finish(march(study, reduction=kind.reduction(study), **options), study)
+    return finish(march(study, reduction=kind.reduction(study), results=kind.name, **options), study)
 
 
 def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:

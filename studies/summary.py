@@ -15,6 +15,8 @@ from studies.words import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
+    from engine.scene import Study
+    from studies.results import Results
     from studies.runner import Outcome
     from studies.study import AnyKind
 
@@ -85,12 +87,13 @@ def all_ok(results: xr.Dataset) -> bool:
     return bool((results["status"].values == Status.OK).all())
 
 
-def ranges(results: xr.Dataset) -> Iterator[Range]:
+def ranges(study_results: Results) -> Iterator[Range]:
     """The range of every result that is one number per variant, or one per variant and sensor or place; of studies
     in pieces of every result, but where they take a sweep without what belongs to no variant."""
+    results = study_results.dataset
     grid = results["status"].dims
     if is_pieced(results):
-        beside = () if is_measured(results) else _beside_the_grid(results)
+        beside = () if is_measured(results) else _beside_the_grid(study_results.study)
         for name, array in results.data_vars.items():
             if array.dtype.kind == "f" and name not in beside:
                 yield from _range(results, str(name), "", array)
@@ -106,11 +109,10 @@ def ranges(results: xr.Dataset) -> Iterator[Range]:
                 yield from _range(results, str(name), str(sensor), array.isel(sensor=place))
 
 
-def _beside_the_grid(results: xr.Dataset) -> set[str]:
+def _beside_the_grid(study: Study) -> set[str]:
     """Results whose dimensions do not begin with the sweep's."""
-    from studies.results import Results, sensor_units
+    from studies.results import sensor_units
 
-    study = Results.of(results).study
     declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
     return {name for name, variable in declared.items() if variable.lead != "grid"}
 
@@ -120,7 +122,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
     from studies.audit import as_json as audit_as_json
     from studies.results import Results
 
-    results = outcome.results
+    results, told = outcome.results, Results.of(outcome.results)
     return {
         "archive": str(outcome.archive),
         "kind": results.attrs["study_kind"],
@@ -132,7 +134,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
         "seconds": outcome.seconds,
         "exit_code": exit_code,
         "remarks": list(outcome.remarks),
-        "audit": None if outcome.audit is None else audit_as_json(outcome.audit, Results.of(results)),
+        "audit": None if outcome.audit is None else audit_as_json(outcome.audit, told),
         "results": [
             {
                 "name": found.name,
@@ -141,7 +143,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
                 "smallest": _end_as_json(found.smallest),
                 "largest": _end_as_json(found.largest),
             }
-            for found in ranges(results)
+            for found in ranges(told)
         ],
     }
 

@@ -29,16 +29,21 @@ def first_omega(results: Results) -> xr.DataArray | float:
     """Lowest elastic natural frequency (rad/s) of the first carriage's body, over the axes that change that body."""
     import xarray as xr
 
+    recorded = results.recorded(results.carriage.on)
+    if recorded is not None:
+        stored = recorded["first_frequency"]
+        found = 2.0 * math.pi * stored.values
+        return xr.DataArray(found, dims=stored.dims) if stored.dims else float(found)
     axes = [axis for axis in results.axes if any(_changes_modes(results, path) for path in axis.paths)]
     dims = list(dict.fromkeys(axis.dim for axis in axes))
     if not dims:
         return _model(results, {}).first_omega
     sizes = [len(results.dataset[dim]) for dim in dims]
-    found = np.empty(sizes)
+    omega = np.empty(sizes)
     for place in np.ndindex(*sizes):
         index = dict(zip(dims, place, strict=True))
-        found[place] = _model(results, {path: a.values[index[a.dim]] for a in axes for path in a.paths}).first_omega
-    return xr.DataArray(found, dims=dims)
+        omega[place] = _model(results, {path: a.values[index[a.dim]] for a in axes for path in a.paths}).first_omega
+    return xr.DataArray(omega, dims=dims)
 
 
 def damping_ratio(results: Results) -> Any:
@@ -52,7 +57,7 @@ def damping_ratio(results: Results) -> Any:
         mass, stiffness = (results.parameter(f"{key}.rayleigh.{i}") for i in (0, 1))
         return 0.5 * (mass / omega + stiffness * omega)
     if isinstance(spec, tuple) and not _is_swept(results, key):
-        return results.parameter(f"{key}.{_model(results, {}).leading_body.modal.rigid_modes}")
+        return results.parameter(f"{key}.{_rigid_modes(results)}")
     return results.parameter(key)
 
 
@@ -112,10 +117,36 @@ def loaded_frequency(results: Results, mass_ratio: Array) -> Array:
     omega_eff = omega_1 (1 + m <phi_1^2>)^(-1/2), the mean taken over the cycle; for a shuttle about the middle of a
     pinned beam <phi_1^2> is (1 + J0(2 pi a/L)) over the beam's mass.
     """
-    part = _model(results, {}).leading_body
     tau = np.arange(CYCLE_POINTS) / CYCLE_POINTS
-    first = part.modal.shape(results.carriage.motion.path(tau).S, 0)[:, part.modal.rigid_modes]
-    return np.asarray((1.0 + mass_ratio * part.modal.mass * float(np.mean(first**2))) ** -0.5)
+    first = _first_shape(results, results.carriage.motion.path(tau).S)
+    mass = body_mass(results, results.carriage.on)
+    return np.asarray((1.0 + mass_ratio * mass * float(np.mean(first**2))) ** -0.5)
+
+
+def body_mass(results: Results, name: str) -> float:
+    """Mass of a body without sweep, kg."""
+    from engine.bodies.build import build_body
+
+    recorded = results.recorded(name)
+    return float(build_body(results.study.body[name]).modal.mass if recorded is None else recorded["mass"])
+
+
+def _rigid_modes(results: Results) -> int:
+    """Number of rigid-body modes of the first carriage's body."""
+    recorded = results.recorded(results.carriage.on)
+    if recorded is not None:
+        return int(np.count_nonzero(recorded["frequency"].values == 0.0))
+    return _model(results, {}).leading_body.modal.rigid_modes
+
+
+def _first_shape(results: Results, places: Array) -> Array:
+    """(S,) shape of the first elastic mode of the first carriage's body at places (S,), kg^(-1/2)."""
+    from scipy.interpolate import CubicSpline
+
+    recorded, number = results.recorded(results.carriage.on), _rigid_modes(results)
+    if recorded is not None:
+        return np.asarray(CubicSpline(recorded["position"].values, recorded["mode_shape"].values[number])(places))
+    return np.asarray(_model(results, {}).leading_body.modal.shape(places, 0)[:, number])
 
 
 def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:

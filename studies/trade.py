@@ -164,3 +164,35 @@ def is_out_of_reach(points: Sequence[Choice], tolerance: float, known: float) ->
     """Whether every point errs more than the tolerance even where the reference's own error, known, is all against
     it."""
     return all(point.error - known > tolerance for point in points)
+
+
+class Automatic(NamedTuple):
+    """The program's own choice for one scene: the tolerance asked, the error of its histories (infinite where it
+    diverged), seconds per variant, and those of the cheapest point that surely holds the tolerance; None where no point
+    does."""
+
+    scene: str
+    asked: float
+    error: float
+    seconds: float
+    front: float | None
+
+    @property
+    def over_front(self) -> float | None:
+        """How many times as long it takes as the cheapest point."""
+        return None if self.front is None else self.seconds / self.front
+
+
+def automatic_choices(dataset: xr.Dataset, tolerance: float) -> list[Automatic]:
+    """The program's own choices at a tolerance, of the scenes that have one."""
+    found = []
+    for scene in map(str, dataset["scene"].values):
+        own = dataset.sel(scene=scene, asked_tolerance=tolerance)
+        if not int(own["automatic_steps"]):
+            continue
+        known = float(dataset["total_reference_error"].sel(scene=scene, quantity="history"))
+        best = cheapest(choices(dataset, scene, "history"), tolerance, known)
+        error, seconds = float(own["automatic_error"]), float(own["automatic_seconds_per_variant"])
+        error = error if np.isfinite(error) else float("inf")
+        found.append(Automatic(scene, tolerance, error, seconds, None if best is None else best.seconds))
+    return found

@@ -56,8 +56,15 @@ def unreduced_group(plan: Plan, dataset: xr.Dataset, check: Callable[[], None] =
     found = []
     for variant in variants:
         check()
-        found.append(compare_variant(plan, variant, check))
+        found.append(compare_variant(plan, variant, _used(dataset, variant), check))
     return {GROUP: _dataset(variants, found)} if found else {}
+
+
+def _used(dataset: xr.Dataset, variant: int) -> dict[str, NDArray[Any]]:
+    """What a variant was computed with, by the names of the archive."""
+    from engine.accuracy.again import USED
+
+    return {name: dataset[name].values.reshape(-1)[[variant]] for name in USED}
 
 
 def _chosen(plan: Plan, dataset: xr.Dataset) -> list[int]:

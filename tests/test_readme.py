@@ -38,7 +38,7 @@ def test_the_study_file_runs() -> None:
     block = next(block for block in re.findall(r"```toml\n(.*?)```", text, re.S) if "schema_version" in block)
     study = load(block)
     kind = kind_of(study)
-    assert make_plan(study, reduction=kind.reduction(study)).size == 160
+    assert make_plan(study, reduction=kind.reduction(study), results=kind.name).size == 160
 
 
 def test_the_python_example_runs() -> None:

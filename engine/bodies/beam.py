@@ -102,6 +102,10 @@ class Beam(Body):
     def lacks_for_stress(self) -> str:
         return "fibre_distance" if self.fibre_distance is None else ""
 
+    @property
+    def modes_are_open(self) -> bool:
+        return self.modes == "auto" and not isinstance(self.damping_ratio, tuple)
+
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
 

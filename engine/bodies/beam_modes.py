@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,10 +131,11 @@ class BeamShapes:
     mass: float
     unit: UnitModes
 
-    def rows(self, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j phi_k/ds^j at the stations `s` (S,), as (S, N), kg^(-1/2) m^(-j)."""
-        x = stations(s, self.length, derivative)
-        return self.unit.rows(x, derivative) / (math.sqrt(self.mass) * self.length**derivative)
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N), kg^(-1/2) m^(-j)."""
+        x = stations(s, self.length, *orders)
+        scale = [1.0 / (math.sqrt(self.mass) * self.length**order) for order in orders]
+        return self.unit.derivatives(x, orders, scale)
 
 
 def _frozen(values: Array) -> Array:

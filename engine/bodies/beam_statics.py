@@ -18,13 +18,16 @@ functional, r[w] = integral of phi_r w = 0, whose reaction is the inertia load p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from engine.bodies.modal import Array
+from engine.kernels.influence import Functionals, functionals, influence
 from results_schema.errors import BadInput
 
 HIGHEST_DERIVATIVE = 3
@@ -80,9 +83,9 @@ def rigid_body_modes(restraints: Sequence[Restraint]) -> Array:
     return line
 
 
-def stations(places: ArrayLike, length: float, derivative: int) -> Array:
+def stations(places: ArrayLike, length: float, *derivatives: int) -> Array:
     """Dimensionless places in [0, 1]; raises BadInput for one off the body or a derivative outside 0..3."""
-    if derivative not in range(HIGHEST_DERIVATIVE + 1):
+    for derivative in (one for one in derivatives if one not in range(HIGHEST_DERIVATIVE + 1)):
         raise BadInput(
             "derivative of a shape",
             where="derivative",
@@ -91,8 +94,8 @@ def stations(places: ArrayLike, length: float, derivative: int) -> Array:
             remedy="the bending moment needs the second, the shear force the third",
         )
     x = np.atleast_1d(np.asarray(places, dtype=np.float64)) / length
-    outside = ~((x >= -_ON_BODY) & (x <= 1.0 + _ON_BODY))  # in this form NaN is outside
-    if outside.any():
+    if x.size and not (x.min() >= -_ON_BODY and x.max() <= 1.0 + _ON_BODY):  # in this form NaN is outside
+        outside = ~((x >= -_ON_BODY) & (x <= 1.0 + _ON_BODY))
         raise BadInput(
             "place off the body",
             where="s",
@@ -100,50 +103,25 @@ def stations(places: ArrayLike, length: float, derivative: int) -> Array:
             received=f"{x[outside][0] * length:g} m",
             remedy="leave out the time when the load is off the body",
         )
-    inside: Array = np.clip(x, 0.0, 1.0)
-    return inside
+    return np.asarray(np.minimum(np.maximum(x, 0.0), 1.0))
 
 
-def _point_kernel(x: Array, s: Array | float, derivatives: int, sign: float) -> Array:
-    """d^n/dx^n of |x - s|^3/12 times `sign`; a jump is taken from the right, at x = 1 from the left."""
-    u = x - s
-    if derivatives == 0:
-        return sign * np.abs(u) * u * u / 12.0
-    if derivatives == 1:
-        return sign * u * np.abs(u) / 4.0
-    if derivatives == 2:
-        return sign * np.abs(u) / 2.0
-    if derivatives == 3:
-        return sign * np.where((u > 0.0) | ((u == 0.0) & (x < 1.0)), 0.5, -0.5)
-    return np.zeros_like(u)
+def _functionals(restraints: Sequence[Restraint], rigid: Array) -> Functionals:
+    at, order = ([getattr(one, name) for one in restraints] for name in ("at", "order"))
+    return Functionals(np.array(at, dtype=np.float64), np.array(order, dtype=np.int64), np.ascontiguousarray(rigid))
 
 
-def _spread_kernel(x: Array, derivative: int) -> tuple[Array, Array]:
-    """d^j/dx^j of the integrals over t in [0, 1] of |x - t|^3/12 and of t |x - t|^3/12: the loads 1 and t."""
-    y = 1.0 - x
-    xx, yy = x * x, y * y
-    if derivative == 0:
-        constant = (xx * xx + yy * yy) / 48.0
-        return constant, x * constant + (yy * yy * y - xx * xx * x) / 60.0
-    if derivative == 1:
-        constant = (xx * x - yy * y) / 12.0
-        return constant, x * constant - (xx * xx + yy * yy) / 16.0
-    if derivative == 2:
-        constant = (xx + yy) / 4.0
-        return constant, x * constant + (yy * y - xx * x) / 6.0
-    return (x - y) / 2.0, xx / 2.0 - 0.25
+def _at(of: Functionals, x: ArrayLike, derivative: int) -> Array:
+    """(S, n) d^j/dx^j of u at x (S,)."""
+    places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    found = np.empty((places.size, of.at.size + len(of.rigid) + 2))
+    functionals(of, places, derivative, found)
+    return found
 
 
-def _functional_rows(restraints: Sequence[Restraint], rigid: Array, x: Array, derivative: int) -> Iterator[Array]:
-    """d^j/dx^j of u(x), one entry (of the shape of `x`) after the other."""
-    for one in restraints:
-        yield _point_kernel(x, one.at, derivative + one.order, (-1.0) ** one.order)
-    if len(rigid):
-        constant, linear = _spread_kernel(x, derivative)
-        for a, b in rigid:
-            yield a * constant + b * linear
-    yield np.full_like(x, -1.0 if derivative == 0 else 0.0)
-    yield -x if derivative == 0 else np.full_like(x, -1.0 if derivative == 1 else 0.0)
+def _even_load(x: ArrayLike, derivative: int) -> Array:
+    """(S,) d^j/dx^j of the integral over t in [0, 1] of g(x, t)."""
+    return _at(Functionals(np.zeros(0), np.zeros(0, dtype=np.int64), np.array([[1.0, 0.0]])), x, derivative)[:, 0]
 
 
 def beam_statics(
@@ -158,29 +136,29 @@ def beam_statics(
     1.0
     """
     merged = merge(restraints)
-    rigid = rigid_body_modes(merged)
-    inverse = _equilibrated_inverse(_system(merged, rigid))
-    inverse.flags.writeable = False
-    return BeamStatics(length, bending_stiffness, mass_per_length, merged, rigid, inverse)
+    return BeamStatics(length, bending_stiffness, mass_per_length, merged, rigid_body_modes(merged), _inverse(merged))
 
 
-def _system(restraints: Sequence[Restraint], rigid: Array) -> Array:
-    """The matrix S: each functional applied to u, compliances on the diagonal."""
-    count = len(restraints)
+@lru_cache(maxsize=256)
+def _inverse(restraints: tuple[Restraint, ...]) -> Array:
+    """The inverse of the matrix S: each functional applied to u, compliances on the diagonal."""
+    rigid = rigid_body_modes(restraints)
+    count, of = len(restraints), _functionals(restraints, rigid)
     size = count + len(rigid) + 2
     system = np.zeros((size, size))
     for i, one in enumerate(restraints):
-        system[i] = list(_functional_rows(restraints, rigid, np.array(one.at), one.order))
-        system[:, i] = system[i]
+        system[i] = system[:, i] = _at(of, one.at, one.order)[0]
         system[i, i] += one.compliance
     if len(rigid):
         points, weights = np.polynomial.legendre.leggauss(4)  # exact up to degree 7; phi_r times u is of degree 6
         x = 0.5 + 0.5 * points
-        rows = np.array(list(_functional_rows((), rigid, x, 0)))
+        rows = _at(of, x, 0)[:, count:].T
         for i, (a, b) in enumerate(rigid, start=count):
             system[i, count:] = rows @ (0.5 * weights * (a + b * x))
             system[count:, i] = system[i, count:]
-    return system
+    inverse = _equilibrated_inverse(system)
+    inverse.flags.writeable = False
+    return inverse
 
 
 def _equilibrated_inverse(system: Array) -> Array:
@@ -210,12 +188,24 @@ class BeamStatics:
 
     def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
-        left, right = stations(x, self.length, derivative), stations(s, self.length, 0)
-        return self._influence(left[:, None], right[None, :], derivative)
+        return self.influence_at(np.atleast_1d(x)[:, None], np.atleast_1d(s)[None, :], derivative)
 
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """The same for pairs, `x` and `s` broadcast against each other."""
-        return self._influence(stations(x, self.length, derivative), stations(s, self.length, 0), derivative)
+        """The same for pairs, `x` and `s` broadcast against each other; summed in a fixed order, so that a value never
+        depends on its neighbours."""
+        left, right = stations(x, self.length, derivative), stations(s, self.length, 0)
+        shape = np.broadcast_shapes(left.shape, right.shape)
+        pairs = (
+            one if one.size == 1 or one.shape == shape else np.broadcast_to(one, shape).copy() for one in (left, right)
+        )
+        left, right = (one.reshape(-1) for one in pairs)
+        found = np.empty(math.prod(shape))
+        influence(self._functionals, self.inverse, left, right, derivative, found)
+        return found.reshape(shape) * (self.length ** (3 - derivative) / self.bending_stiffness)
+
+    @cached_property
+    def _functionals(self) -> Functionals:
+        return _functionals(self.restraints, self.rigid)
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under the beam's own weight per unit gravity, m^(1-j)/(m/s^2)."""
@@ -228,20 +218,9 @@ class BeamStatics:
                 remedy="pin it at two places, clamp it, or set it on two springs",
             )
         place = stations(x, self.length, derivative)
-        load = np.array([_spread_kernel(np.array(one.at), one.order)[0] for one in self.restraints] + [-1.0, -0.5])
-        reactions = self.inverse @ load
-        unit = _spread_kernel(place, derivative)[0]
-        rows = _functional_rows(self.restraints, self.rigid, place, derivative)
-        for row, reaction in zip(rows, reactions, strict=True):
+        of = self._functionals
+        load = [*(_even_load(one.at, one.order)[0] for one in self.restraints), -1.0, -0.5]
+        reactions, unit = self.inverse @ np.array(load), _even_load(place, derivative)
+        for row, reaction in zip(_at(of, place, derivative).T, reactions, strict=True):
             unit = unit - row * reaction
         return unit * self.mass_per_length * self.length ** (4 - derivative) / self.bending_stiffness
-
-    def _influence(self, x: Array, s: Array, derivative: int) -> Array:
-        """g - u(x)^T S^-1 u(s), summed in a fixed order so that a value never depends on its neighbours."""
-        right = list(_functional_rows(self.restraints, self.rigid, s, 0))
-        result = _point_kernel(x, s, derivative, 1.0)
-        left = _functional_rows(self.restraints, self.rigid, x, derivative)
-        for row, weights in zip(left, self.inverse, strict=True):
-            reaction = sum((w * r for w, r in zip(weights, right, strict=True)), start=np.zeros_like(s))
-            result = result - row * reaction
-        return result * (self.length ** (3 - derivative) / self.bending_stiffness)

@@ -265,6 +265,20 @@ class Frame(Body):
         (across,) = {0, 1, 2} - set(PLANES[self.plane])
         return (DIRECTIONS[across], *(f"r{DIRECTIONS[axis]}" for axis in PLANES[self.plane]))
 
+    @property
+    def modes_are_open(self) -> bool:
+        reduced = bool(self.interface or self.leave_out)
+        return self.modes == "auto" and not reduced and not isinstance(self.damping_ratio, tuple)
+
+    def with_more_modes(self, times: int) -> Frame:
+        """The same body with so many times its modes; of a reduced one, those within its fixed interface."""
+        if not self.interface:
+            return super().with_more_modes(times)
+        fixed = self.model_copy(
+            update={"fixed_interface_modes": min(times * self.fixed_interface_modes, MAX_FIXED_INTERFACE_MODES)}
+        )
+        return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
+
     def dampers(self) -> list[tuple[str, float | str, float]]:
         found: list[tuple[str, float | str, float]] = []
         for name, spring in self.spring.items():

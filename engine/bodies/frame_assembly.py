@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Counts = NDArray[np.int64]
 
 MASSES = {"consistent": consistent_mass, "lumped": lumped_mass}
-_ABOUT_MODES = frozenset({"modes", "leave_out", "rigid_body_modes", "interface", "fixed_interface_modes"})
+ABOUT_MODES = frozenset({"modes", "leave_out", "rigid_body_modes", "interface", "fixed_interface_modes"})
 _RANK = 1e-9  # of the largest: below it nothing resists a motion
 
 
@@ -103,7 +103,7 @@ class Content:
 
 def assemble(frame: Frame) -> Assembly:
     """Mesh, stiffness, mass, supports and the motions that nothing resists; the last few are remembered."""
-    return _assemble(Content.of(frame, without=_ABOUT_MODES))
+    return _assemble(Content.of(frame, without=ABOUT_MODES))
 
 
 @lru_cache(maxsize=8)

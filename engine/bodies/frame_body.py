@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
@@ -11,15 +12,16 @@ from engine.bodies.body import AUTO_MODES, MAX_MODES
 from engine.bodies.craig_bampton import reduce_model
 from engine.bodies.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
 from engine.bodies.frame import Frame
-from engine.bodies.frame_assembly import MASSES, Assembly, Content, Counts, assemble, rigid_motions
+from engine.bodies.frame_assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
 from engine.bodies.frame_geometry import unit
 from engine.bodies.frame_points import frame_points, point_loads
 from engine.bodies.frame_sections import TrackSections
 from engine.bodies.frame_shapes import mode_forces, track_shapes
-from engine.bodies.frame_statics import track_statics
-from engine.bodies.frame_track import track_of
+from engine.bodies.frame_statics import TrackStatics, track_statics
+from engine.bodies.frame_track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal import Array, ModalBody, Shapes
 from engine.document import shortened
+from engine.linear_algebra import one_thread
 from results_schema.errors import BadInput
 
 _UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
@@ -35,8 +37,10 @@ def frame_body(frame: Frame) -> ModalBody:
 
 @lru_cache(maxsize=8)
 def _frame_body(content: Content) -> ModalBody:
+    import scipy.linalg  # noqa: F401, its library is to be held too
+
     try:
-        with np.errstate(all="ignore"):  # what is not finite is refused below
+        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
             found = _reduced(content.frame)
             probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
     except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
@@ -52,21 +56,41 @@ def _unsolvable(reason: str) -> BadInput:
     return BadInput(what, where="section", expected="numbers of one scale", received=shortened(reason))
 
 
-def _reduced(frame: Frame) -> ModalBody:
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """What does not depend on how many modes a frame keeps: its matrices, its track and its statics."""
+
+    assembly: Assembly
+    flexibility: Flexibility
+    track: TrackBeams
+    ends: TrackPoints
+    statics: TrackStatics
+
+
+@lru_cache(maxsize=8)
+def _whole(content: Content) -> _Whole:
+    frame = content.frame
     assembly = assemble(frame)
     flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
-    track, points = track_of(frame, assembly.mesh)
+    track, ends = track_of(frame, assembly.mesh)
+    gravity = unit(frame.gravity)
+    spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
+    statics = track_statics(track, ends, assembly, flexibility, gravity, spread)
+    return _Whole(assembly, flexibility, track, ends, statics)
+
+
+def _reduced(frame: Frame) -> ModalBody:
+    whole = _whole(Content.of(frame, without=ABOUT_MODES))
+    assembly, flexibility, track, statics = whole.assembly, whole.flexibility, whole.track, whole.statics
     omega, shapes = frame_modes(frame, assembly, flexibility)
-    moved = points.of(assembly.whole(shapes))
+    moved = whole.ends.of(assembly.whole(shapes))
     masses = MASSES[frame.mass_matrix](track.beams)
     along = track_shapes(track, moved, mode_forces(track, moved, omega, masses))
-    turn = settled(omega, along, float(track.places[-1]), shapes)
+    turn = settled(omega, along, statics.length, shapes)
     moved, shapes = without_rounding(moved @ turn, (0, 1)), shapes @ turn
     kept = kept_modes(frame, omega)
     omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
     gravity = unit(frame.gravity)
-    spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
-    statics = track_statics(track, points, assembly, flexibility, gravity, spread)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
     loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
@@ -83,7 +107,7 @@ def _reduced(frame: Frame) -> ModalBody:
         statics=statics,
         gravity_share=float(track.direction @ gravity),
         sections=sections,
-        points=frame_points(loads, assembly, flexibility, sections, points, shapes, pull) if loads[0] else None,
+        points=frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None,
     )
 
 
@@ -126,7 +150,7 @@ def settled(omega: Array, along: Shapes, length: float, shapes: Array) -> Array:
     """
     count = len(omega)
     turn = np.eye(count)
-    fine = along.rows(np.linspace(0.0, length, 16 * count + 1), 0)
+    fine = along.derivatives(np.linspace(0.0, length, 16 * count + 1), (0,))[0]
     for first, end in pairwise([*groups(omega), count]):
         part = fine[:, first:end]
         if end - first > 1:

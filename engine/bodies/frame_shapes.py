@@ -9,7 +9,9 @@ A concentrated force at a node bends the line of twist, extension and shear ther
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +19,10 @@ from numpy.typing import ArrayLike
 from engine.bodies.frame_elements import stiffness
 from engine.bodies.frame_track import TrackBeams, track_places
 from engine.bodies.modal import Array
+from engine.kernels.shapes import combined_rows
 
 FORCES = 6  # N, Q_y, Q_z, T, M_y, M_z
+SOURCES = 6  # of a quintic: value, slope and curvature at both ends
 
 # Of value, slope and curvature at the left end, then at the right one: coefficients of x^0 to x^5 on [0, 1].
 _QUINTIC = np.array(
@@ -45,20 +49,25 @@ class TrackShapes:
     slopes: Array
     curvatures: Array
 
-    def rows(self, s: ArrayLike, derivative: int) -> Array:
-        """d^j phi_k/ds^j at the stations `s` (S,), as (S, N); at a joint from the right."""
-        place = track_places(s, float(self.places[-1]), derivative)
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N); at a joint from the right."""
+        place = track_places(s, float(self.places[-1]), *orders)
         element = np.clip(np.searchsorted(self.places, place, side="right") - 1, 0, len(self.places) - 2)
         length = np.diff(self.places)[element]
-        shapes = _quintic(np.clip((place - self.places[element]) / length, 0.0, 1.0), derivative)
-        found: Array = np.zeros((len(place), self.values.shape[1]))
-        for end in range(2):
-            node = element + end
-            curves = self.curvatures[element, end]
-            for power, source in enumerate((self.values[node], self.slopes[node], curves)):
-                weight = shapes[3 * end + power] * length ** (power - derivative)
-                found += weight[:, None] * source
+        x = np.clip((place - self.places[element]) / length, 0.0, 1.0)
+        weights = np.empty((len(orders), len(place), SOURCES))
+        for j, order in enumerate(orders):
+            weights[j] = (_quintic(x, order) * length ** (np.arange(SOURCES)[:, None] % 3 - order)).T
+        found = np.empty((len(orders), len(place), self.values.shape[1]))
+        combined_rows(SOURCES * element[:, None] + np.arange(SOURCES), weights, self._sources, found)
         return found
+
+    @cached_property
+    def _sources(self) -> Array:
+        """(6 E, N) value, slope and curvature at the left end of every element, then at its right one."""
+        left = (self.values[:-1], self.slopes[:-1], self.curvatures[:, 0])
+        right = (self.values[1:], self.slopes[1:], self.curvatures[:, 1])
+        return np.stack([*left, *right], axis=1).reshape(-1, self.values.shape[1])
 
 
 def _quintic(x: Array, derivative: int) -> Array:

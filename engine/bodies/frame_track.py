@@ -8,6 +8,7 @@ direction. What it does to the ends of its element, and what the deflection ther
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,13 +41,13 @@ class TrackBeams:
     direction: Array
     offset: Array
 
-    @property
+    @cached_property
     def parts(self) -> tuple[Array, Array, Array]:
         """(E,) the load's parts along each element's x, y, z."""
         along, across_y, across_z = (self.axes @ self.direction).T
         return along, across_y, across_z
 
-    @property
+    @cached_property
     def torque(self) -> Array:
         """(E,) twisting moment of the unit load, m."""
         return np.asarray(self.axes[:, 0] @ np.cross(self.offset, self.direction))
@@ -199,9 +200,9 @@ def track_of(frame: Frame, mesh: Mesh) -> tuple[TrackBeams, TrackPoints]:
     ), TrackPoints(np.append(pairs[:, 0], pairs[-1, 1]), np.concatenate([arms[:, 0], arms[-1:, 1]]))
 
 
-def track_places(places: ArrayLike, length: float, derivative: int = 0) -> Array:
+def track_places(places: ArrayLike, length: float, *derivatives: int) -> Array:
     """Stations (S,) of a track of this length, m. Raises BadInput off the body, and for a derivative not in 0..3."""
-    stations(places, length, derivative)
+    stations(places, length, *derivatives)
     return np.clip(np.atleast_1d(np.asarray(places, dtype=np.float64)), 0.0, length)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from engine.bodies.import_extras import extra, foreign
-from engine.bodies.import_model import Array, Counts, FileModel, checked, digest_of
+from engine.bodies.import_model import Array, Counts, FileModel, checked, hashes_of
 from engine.bodies.import_text import Line, file_bytes, read_lines, read_paths, real, whole, written
 from engine.bodies.import_turn import turned
 from results_schema.errors import BadInput
@@ -41,7 +41,7 @@ def read_ansys(files: Mapping[str, str], options: Mapping[str, Any]) -> FileMode
         what = "a degree of freedom other than displacements and rotations"
         raise BadInput(what, where=files["full"], received=f"number {int(direction.max())}")
     owner = np.array([known[int(number)] for number in owner_number], dtype=np.int64)
-    model = FileModel(stiffness, mass, numbers, places, owner, direction, held, digest_of(files["full"], *read))
+    model = FileModel(stiffness, mass, numbers, places, owner, direction, held, hashes_of(files["full"], *read))
     return checked(turned(model, turns, files["full"]), files["full"])
 
 

@@ -18,6 +18,7 @@ from results_schema.errors import BadInput
 
 SECONDS = 120
 MEMORY = 6 * 2**30
+State = tuple[int, int, int]  # of a file: when it was changed, its size, its number on the disk
 _TAIL = 400  # characters of a crash that are told
 
 
@@ -33,11 +34,16 @@ class Request:
 
 
 def read_files(request: Request) -> FileModel:
-    """The model of some files; the last few are remembered while the files stay as they are.
+    """The model of some files; the last few are remembered while the files, included ones too, stay as they are.
 
     Raises BadInput with file, line and card where they are known.
     """
-    return _read(request, tuple(_state(path) for _, path in request.files))
+    named = tuple(_state(path) for _, path in request.files)
+    found = _remembered(request, named)
+    if found.states == _states(found.model):
+        return found.model
+    _remembered.cache_clear()  # an included file has changed
+    return _remembered(request, named).model
 
 
 def role_of(fault: BadInput, files: Mapping[str, str]) -> str:
@@ -46,7 +52,26 @@ def role_of(fault: BadInput, files: Mapping[str, str]) -> str:
     return max(named, key=lambda role: len(files[role])) if named else next(iter(files))
 
 
-def _state(path: str) -> tuple[int, int, int]:
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """A model and the states of all its files."""
+
+    model: FileModel
+    states: tuple[State | None, ...]
+
+
+@lru_cache(maxsize=8)
+def _remembered(request: Request, named: tuple[State, ...]) -> _Read:
+    model = _read(request)
+    return _Read(model, _states(model))
+
+
+def _states(model: FileModel) -> tuple[State | None, ...]:
+    """Of every file that was read; None of one that has gone."""
+    return tuple(_state(path) if Path(path).exists() else None for path, _ in model.hashes)
+
+
+def _state(path: str) -> State:
     try:
         found = os.stat(path)
     except (OSError, ValueError):
@@ -54,8 +79,7 @@ def _state(path: str) -> tuple[int, int, int]:
     return found.st_mtime_ns, found.st_size, found.st_ino
 
 
-@lru_cache(maxsize=8)
-def _read(request: Request, states: tuple[tuple[int, int, int], ...]) -> FileModel:
+def _read(request: Request) -> FileModel:
     with tempfile.TemporaryDirectory(prefix="wanderlast-") as folder:
         answer, refusal = Path(folder) / "model.npz", Path(folder) / "refusal.json"
         order = {

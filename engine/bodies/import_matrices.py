@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from engine.bodies.import_market import from_market
-from engine.bodies.import_model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, digest_of
+from engine.bodies.import_model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
 from engine.bodies.import_text import Line, file_bytes, lines_of, real, whole
 from results_schema.errors import BadInput
 
@@ -33,7 +33,7 @@ def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileM
             raise BadInput(what, where=files[key], expected=expected, received=size)
     held = np.zeros(len(owner), dtype=np.bool_)
     recovery = read_matrix(files["recovery"], file_bytes(files["recovery"])) if "recovery" in files else None
-    model = FileModel(stiffness, mass, nodes, places, owner, direction, held, digest_of(*files.values()), recovery)
+    model = FileModel(stiffness, mass, nodes, places, owner, direction, held, hashes_of(*files.values()), recovery)
     return checked(model, files["stiffness"])
 
 

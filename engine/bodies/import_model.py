@@ -24,8 +24,8 @@ _RECOVERY = "recovery"
 
 @dataclass(frozen=True, eq=False)
 class FileModel:
-    """Stiffness and mass (n, n) sparse; nodes (P,): their numbers; places (P, 3); digest: of all files that were read;
-    recovery (R, n): rows that give stresses, None where there are none.
+    """Stiffness and mass (n, n) sparse; nodes (P,): their numbers; places (P, 3); hashes: path and SHA-256 of every
+    file that was read, included ones too; recovery (R, n): rows that give stresses, None where there are none.
 
     Of every row: owner (n,): place of its node in `nodes`, -1 for a modal or scalar coordinate; direction (n,): 0..5
     for x, y, z, rx, ry, rz, or the number of that coordinate; held (n,): the file holds it.
@@ -38,8 +38,13 @@ class FileModel:
     owner: Counts
     direction: Counts
     held: NDArray[np.bool_]
-    digest: str = ""
+    hashes: tuple[tuple[str, str], ...] = ()
     recovery: Any = None
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the contents of all files, one after another."""
+        return hashlib.sha256(b"".join(bytes.fromhex(found) for _, found in self.hashes)).hexdigest()
 
     @property
     def size(self) -> int:
@@ -60,12 +65,9 @@ class FileModel:
         return found
 
 
-def digest_of(*paths: str) -> str:
-    """SHA-256 of files, one after another."""
-    found = hashlib.sha256()
-    for path in paths:
-        found.update(hashlib.sha256(Path(path).read_bytes()).digest())
-    return found.hexdigest()
+def hashes_of(*paths: str) -> tuple[tuple[str, str], ...]:
+    """Path and SHA-256 of every file."""
+    return tuple((path, hashlib.sha256(Path(path).read_bytes()).hexdigest()) for path in paths)
 
 
 def save_model(path: Path, model: FileModel) -> None:
@@ -76,7 +78,7 @@ def save_model(path: Path, model: FileModel) -> None:
         arrays |= {f"{name}_row": matrix.row, f"{name}_column": matrix.col, f"{name}_value": matrix.data}
         arrays[f"{name}_shape"] = np.array(matrix.shape)
     rest = {key: getattr(model, key) for key in ("nodes", "places", "owner", "direction", "held")}
-    np.savez(path, **arrays, **rest, digest=np.array(model.digest))
+    np.savez(path, **arrays, **rest, hashes=np.array(model.hashes, dtype=np.str_).reshape(-1, 2))
 
 
 def load_model(path: Path) -> FileModel:
@@ -93,7 +95,8 @@ def load_model(path: Path) -> FileModel:
             if f"{name}_shape" in found
         }
         rest = {key: found[key] for key in ("nodes", "places", "owner", "direction", "held")}
-        return FileModel(**matrices, **rest, digest=str(found["digest"]))
+        hashes = tuple((str(path), str(digest)) for path, digest in found["hashes"])
+        return FileModel(**matrices, **rest, hashes=hashes)
 
 
 def checked(model: FileModel, where: str) -> FileModel:

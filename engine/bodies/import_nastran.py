@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.bodies.import_cards import Card, cards_of, check_matrices, check_nodes, included, rows_of, scalars
 from engine.bodies.import_extras import extra, foreign
-from engine.bodies.import_model import Array, FileModel, checked, digest_of
+from engine.bodies.import_model import Array, FileModel, checked, hashes_of
 from engine.bodies.import_text import file_bytes, read_lines, read_paths, written
 from engine.bodies.import_turn import turned
 from results_schema.errors import BadInput
@@ -51,7 +51,7 @@ def read_nastran(files: Mapping[str, str], options: Mapping[str, Any]) -> FileMo
         owner=np.array([at[node] if direction else -1 for node, direction in rows], dtype=np.int64),
         direction=np.array([direction - 1 if direction else node for node, direction in rows], dtype=np.int64),
         held=np.zeros(len(rows), dtype=np.bool_),
-        digest=digest_of(*read, *table.read),
+        hashes=hashes_of(*read, *table.read),
         recovery=recovery,
     )
     turns = np.array([table.turns[node] for node in nodes]).reshape(-1, 3, 3)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, Strict, ValidationInfo, model_validator
 
 from engine.bodies.body import Body
 from engine.bodies.frame import DIRECTIONS, Place, Support, Vector
@@ -76,6 +76,7 @@ class Imported(Body):
     """
 
     derived: ClassVar[tuple[str, ...]] = ("length",)
+    names_files: ClassVar[bool] = True
     roles: ClassVar[tuple[str, ...]] = ()
     lacking: ClassVar[Literal["refused", "whole nodes held", "held"]] = "refused"  # what a node has no row for
 
@@ -100,6 +101,7 @@ class Imported(Body):
     @cached_property
     def model(self) -> FileModel:
         """The files' matrices and nodes, in the files' units. Raises BadInput."""
+        assert self.recorded is None, "what an archive holds is told without the files of its models"
         return read_files(self.request)
 
     @cached_property
@@ -114,7 +116,7 @@ class Imported(Body):
     @property
     def length(self) -> float:
         """Of the track, m."""
-        return self.line.length
+        return self.line.length if self.recorded is None else self.recorded.length
 
     @property
     def direction(self) -> tuple[float, float, float]:
@@ -130,8 +132,14 @@ class Imported(Body):
         """SHA-256 of the files, with those that they include."""
         return self.model.digest
 
+    @property
+    def hashes(self) -> tuple[tuple[str, str], ...]:
+        return self.model.hashes
+
     @model_validator(mode="after")
-    def _consistent(self) -> Imported:
+    def _consistent(self, info: ValidationInfo) -> Imported:
+        if self.take(info.context):
+            return self
         for role, path in self.files.items():
             if "\0" in path or not Path(path).name:
                 refuse((role,), "not a path of a file", received=shortened(path))
@@ -221,7 +229,7 @@ class Recovering(Imported):
         if (self.recovery is None) != (self.stress_rows is None):
             key = "recovery" if self.recovery is None else "stress_rows"
             refuse((key,), "this key is missing", expected="recovery and stress_rows, or none of them")
-        if self.stress_rows is None:
+        if self.stress_rows is None or self.recorded is not None:
             return self
         count, most = len(self.line.nodes), int(self.model.recovery.shape[0])
         if len(self.stress_rows) != count:

@@ -19,6 +19,7 @@ from engine.bodies.imported_model import HeldModel, held_model
 from engine.bodies.imported_rows import node_rows, track_rows
 from engine.bodies.modal import Array, ModalBody
 from engine.document import shortened
+from engine.linear_algebra import one_thread
 from results_schema.errors import BadInput
 
 MOST_SAMPLES = 4001  # places where the wave numbers of shapes are read
@@ -48,8 +49,10 @@ def imported_body(body: Imported) -> ModalBody:
 
 @lru_cache(maxsize=8)
 def _imported_body(content: _Content) -> ModalBody:
+    import scipy.linalg  # noqa: F401, its library is to be held too
+
     try:
-        with np.errstate(all="ignore"):  # what is not finite is refused below
+        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
             found = _modal_body(content.body)
     except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
         raise _unsolvable(str(error)) from error
@@ -144,7 +147,7 @@ def _wave_number(along: LineShapes, size: Array) -> Array:
     size (N,): each mode's largest displacement anywhere.
     """
     stations = np.linspace(0.0, along.places[-1], min(MOST_SAMPLES, 16 * len(along.places) + 1))
-    deflection, bent = (np.sqrt(np.mean(along.rows(stations, order) ** 2, axis=0)) for order in (0, 2))
+    deflection, bent = (np.sqrt(np.mean(along.derivatives(stations, (order,))[0] ** 2, axis=0)) for order in (0, 2))
     felt = deflection > _UNFELT * size
     most = np.pi / np.diff(along.places).min()
     return np.asarray(np.minimum(np.sqrt(np.divide(bent, deflection, out=np.zeros_like(bent), where=felt)), most))

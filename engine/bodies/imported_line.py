@@ -9,7 +9,7 @@ solve with this interpolation gives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from engine.bodies.frame_track import track_places
 from engine.bodies.modal import Array
+from engine.kernels.shapes import combined_rows
 from results_schema.errors import BadInput
 
 # Of value and slope at the left end, then at the right one: coefficients of x^0 to x^3 on [0, 1].
@@ -49,12 +50,11 @@ class LineShapes:
     places: Array
     ends: Array
 
-    def rows(self, s: ArrayLike, derivative: int) -> Array:
-        """d^j phi_k/ds^j at the stations `s` (S,), as (S, N); at a node from the right."""
-        numbers, weights = cubics(self.places, s, derivative)
-        found: Array = np.zeros((len(numbers), self.ends.shape[1]))
-        for end in range(_ENDS):
-            found += weights[:, end, None] * self.ends[numbers[:, end]]
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N); at a node from the right."""
+        parts = [cubics(self.places, s, order) for order in orders]
+        found = np.empty((len(orders), len(parts[0][0]), self.ends.shape[1]))
+        combined_rows(parts[0][0], np.stack([weights for _, weights in parts]), self.ends, found)
         return found
 
 

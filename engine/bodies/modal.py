@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -11,12 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+# an end whose modes all move by less than this part of the largest at some places along the track does not move
+HELD, PROBED = 1e-9, 9
+
 
 class Shapes(Protocol):
     """Mode shapes along the track of a body."""
 
-    def rows(self, s: ArrayLike, derivative: int) -> Array:
-        """d^j phi_k / ds^j at the stations `s` (S,), as (S, N); unit modal mass."""
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi_k / ds^j at the stations `s` (S,) for several j, as (orders, S, N); unit modal mass."""
 
 
 class Statics(Protocol):
@@ -101,6 +105,7 @@ class ModalBody:
     sections: Sections | None = None
     points: Points | None = None
     checks: tuple[tuple[str, str], ...] = ()
+    _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def rigid_modes(self) -> int:
@@ -114,7 +119,11 @@ class ModalBody:
         A row does not depend, bit for bit, on which other stations are asked for.
         Raises BadInput for a station off the body or another derivative.
         """
-        return self.shapes.rows(s, derivative)
+        return np.asarray(self.shapes.derivatives(s, (derivative,))[0])
+
+    def shape_derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """Several derivatives j of `shape` in one pass, which takes hardly longer than one, as (orders, S, N)."""
+        return self.shapes.derivatives(s, orders)
 
     def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the static deflection at `x` (X,) per unit force at `s` (S,); (X, S), m^(1-j)/N.
@@ -129,10 +138,24 @@ class ModalBody:
         """`influence` for pairs of places, broadcast against each other (sensors under a carriage: x = s)."""
         return self.statics.influence_at(x, s, derivative)
 
-    @property
+    @cached_property
     def modal_flexibility(self) -> Array:
         """(N,) 1/omega^2, the static answer to a modal force, kg-normalised; 0 for rigid-body modes."""
         return np.divide(1.0, self.omega**2, out=np.zeros_like(self.omega), where=self.omega > 0.0)
+
+    def shape_at(self, place: float, derivative: int = 0) -> Array:
+        """(1, N) `shape` at one place, evaluated once: sensors and dampers ask for theirs again and again."""
+        found = self._fixed.get((place, derivative))
+        if found is None:
+            found = self._fixed[place, derivative] = self.shape([place], derivative)
+        return found
+
+    @cached_property
+    def held_ends(self) -> tuple[bool, bool]:
+        """Whether the ends of the track, at 0 and at the length, are held along the load."""
+        sizes = np.abs(self.shape(np.linspace(0.0, self.length, PROBED))).max(axis=1)
+        left, right = sizes[[0, -1]] <= HELD * sizes.max()
+        return bool(left), bool(right)
 
     def flexibility_between(self, one: Array | str, other: Array | str) -> Array:
         """Deflection at one place per unit force at another one, m/N: places (S,) of the track, broadcast against each

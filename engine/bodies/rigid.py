@@ -33,6 +33,10 @@ class Rigid(Body):
         """m along its track."""
         return 0.5 * self.length if self.centre is None else self.centre
 
+    def with_modes(self, count: int) -> Rigid:
+        """Itself: it has no modes that bend."""
+        return self
+
     def checks(self, here: str) -> list[Check]:
         if self.centre is None:
             return []

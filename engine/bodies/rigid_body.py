@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,12 +21,13 @@ class RigidShapes:
     inertia: float
     centre: float
 
-    def rows(self, s: ArrayLike, derivative: int) -> Array:
-        """d^j phi / ds^j at the stations `s` (S,), as (S, 2)."""
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi / ds^j at the stations `s` (S,) for several j, as (orders, S, 2)."""
         arm = np.asarray(s, dtype=np.float64) - self.centre
         none = np.zeros_like(arm)
-        heave, pitch = {0: (none + 1.0, arm), 1: (none, none + 1.0)}.get(derivative, (none, none))
-        return np.stack([heave / np.sqrt(self.mass), pitch / np.sqrt(self.inertia)], axis=1)
+        shapes = {0: (none + 1.0, arm), 1: (none, none + 1.0)}
+        sizes = np.sqrt([self.mass, self.inertia])
+        return np.stack([np.stack(shapes.get(order, (none, none)), axis=1) / sizes for order in orders])
 
 
 class RigidStatics:

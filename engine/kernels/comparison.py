@@ -19,20 +19,21 @@ from engine.kernels.comparison_steps import (
     step_wilson,
 )
 from engine.kernels.jit import chosen_for, kernel, piece
-from engine.kernels.layout import LANES, Alpha, FloatArray, Newmark
+from engine.kernels.layout import LANES, MARKS, Alpha, FloatArray, Newmark
 from engine.kernels.record import (
     A_NOW,
     GRAVITY,
+    KEPT,
     Q_NOW,
     RATE_0,
     RATE_1,
     RATE_2,
     TIE,
     V_NOW,
-    VALUE,
-    copy_marks,
+    close_marks,
     keep,
     observe,
+    open_marks,
 )
 
 
@@ -136,7 +137,7 @@ def store_modes(now, b, carried, block):
 @kernel
 def note(marks, scratch, watch, record, block, n, count):
     """Observe and keep station n; a function of its own, so that it is compiled once and not for every rule."""
-    observe(marks, scratch.now, scratch.b, watch, n, 0)
+    observe(marks, scratch.now, scratch.b, watch, n, KEPT)
     keep(marks, record.history[block], watch, record.sample[n], n, float(count + n))
 
 
@@ -151,13 +152,13 @@ def march_by_rule(rule, track, lanes, carried, watch, record, count):
     now = np.zeros((4 * ((modes + 3) // 4), MEMORY + 1, LANES))
     sums = np.zeros((SUMS, LANES))
     b = np.zeros((TIE + 1, LANES))
-    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
+    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
     scratch = Scratch(now, work, sums, b)
     for block in range(lanes.step.shape[0]):
         load_modes(now, b, lanes, carried, block)
-        copy_marks(marks, record.marks[block])
+        open_marks(marks, record.marks[block])
         for n in range(track.rows.shape[1]):
             take_step(rule, scratch, track, lanes, carried.kept, block, n)
             note(marks, scratch, watch, record, block, n + 1, count)
         store_modes(now, b, carried, block)
-        copy_marks(record.marks[block], marks)
+        close_marks(record.marks[block], marks, watch, lanes.step[block], track.rows.shape[1])

@@ -91,7 +91,8 @@ class Watch(NamedTuple):
     order (channels): the power of 1/h that makes it SI;  static (stations, signals, ties): deflection per unit
     force that the kept modes miss;  offset (stations, signals): per unit gravity, in step units of offset_order
     (signals), the power of 1/h that makes it SI;
-    counted (stations, signals): whether the station enters extremes and sums.
+    counted (stations, signals): whether the station enters extremes.
+    summed (signals): whether squares are summed over time, which wants a signal that counts all along the segment.
     """
 
     on_q: FloatArray
@@ -103,6 +104,7 @@ class Watch(NamedTuple):
     offset: FloatArray
     offset_order: IntArray
     counted: BoolArray
+    summed: BoolArray
 
 
 class Record(NamedTuple):
@@ -120,9 +122,10 @@ class Record(NamedTuple):
 
 
 # columns of Record.marks: extremes and the counts of the stations where they occur, the first count with a negative
-# value, the sum of squares, the magnitude beyond which a variant has diverged, the first count where it had
-LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, BELOW_AT, SQUARES, BOUND, DIVERGED_AT = 0, 1, 2, 3, 4, 5, 6, 7
-MARKS = 8
+# value, the integral of the square over time and how long it took (s), the magnitude beyond which a variant has
+# diverged, the first count where it had, the value at the station observed last
+LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, BELOW_AT, SQUARES, SECONDS, BOUND, DIVERGED_AT, VALUE = range(10)
+MARKS = 10
 
 
 class Blow(NamedTuple):

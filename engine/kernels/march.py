@@ -19,33 +19,31 @@ n + 1 and gathers the sums of its tie equation.
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
+from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE
 from engine.kernels.record import (
-    A_NOW,
     CD,
     FACTOR,
     GAIN,
     GRAVITY,
     KD,
-    LEAD,
     LOAD,
     PUSH,
-    Q_NOW,
     RATE_0,
     RATE_1,
     RATE_2,
-    SECOND,
     SUM,
     TIE,
-    V_NOW,
-    VALUE,
     C,
     D,
     U,
     V,
-    copy_marks,
+    close_marks,
     keep,
+    leading,
     observe,
+    open_marks,
+    put_leads,
+    put_modes,
 )
 from engine.kernels.stepping import advance, corrected, fields_of, first_predictors, remember
 from engine.kernels.ties import (
@@ -106,6 +104,38 @@ def store_mode(work, b, state, scheme, block, k):
         state.memory[block, k, j] = memory
 
 
+@piece
+def load_tie(b, work, lanes, rows, block):
+    """What the one tie of a block has to itself, and the sums of its equation at station 1."""
+    put_lanes(b, (GAIN,), lanes_at(lanes.gain, (block, 0)))
+    put_lanes(b, (LOAD,), lanes_at(lanes.load, (block, 0)))
+    motion, moved, factor = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    for k in range(work.shape[0]):
+        p, w, rate, curve = tie_row(rows, 1, k)
+        motion = motion + w * lanes_at(work, (k, C))
+        moved = moved + rate * lanes_at(work, (k, V)) + curve * lanes_at(work, (k, U))
+        factor = factor + (w * p) * lanes_at(work, (k, D))
+    put_lanes(b, (SUM,), motion - moved)
+    put_lanes(b, (FACTOR,), factor)
+
+
+@piece
+def tie_row(rows, n, k):
+    """p, w, A and B of mode k in the one tie at station n."""
+    return rows[n, k, 0, FORCE], rows[n, k, 0, CLOSED], rows[n, k, 0, RATE], rows[n, k, 0, CURVE]
+
+
+@piece
+def solve_tie(b, drive):
+    """The one tie's force, which stays in b[TIE] too; drive: that of the station."""
+    driven = lanes_at(b, (SUM,)) - drive * lanes_at(b, (GRAVITY,))
+    # what the tie yields does not hang on the state: so divided, the force does not wait for the division
+    yielding = 1.0 / (1.0 + lanes_at(b, (GAIN,)) * lanes_at(b, (FACTOR,)))
+    force = (lanes_at(b, (LOAD,)) + lanes_at(b, (GAIN,)) * driven) * yielding
+    put_lanes(b, (TIE,), force)
+    return force
+
+
 @kernel
 def march_one(ties, lanes, state, watch, record, scheme, count):
     """March one segment with a single tie.
@@ -115,70 +145,48 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
     """
     rows = ties.rows
     stations, modes = rows.shape[0], rows.shape[1]
-    # one or two sums over displacements are gathered in the pass itself, others from the corrected modes kept for them
-    channels = watch.signal.shape[0]
-    leads = channels if channels <= 2 and watch.on_q.shape[1] == channels else 0
-    lead_moves = 0 if watch.on_q.shape[0] == 1 else 1
+    leads, lead_moves = leading(watch), 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
-    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
+    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
-        copy_marks(marks, record.marks[block])
+        open_marks(marks, record.marks[block])
         history = record.history[block]
-        for j in range(LANES):
-            b[GAIN, j] = lanes.gain[block, 0, j]
-            b[LOAD, j] = lanes.load[block, 0, j]
-            b[SUM, j] = 0.0
-            b[FACTOR, j] = 0.0
-        for k in range(modes):
-            p, w, rate, curve = rows[1, k, 0, FORCE], rows[1, k, 0, CLOSED], rows[1, k, 0, RATE], rows[1, k, 0, CURVE]
-            for j in range(LANES):
-                b[SUM, j] += w * work[k, C, j] - (rate * work[k, V, j] + curve * work[k, U, j])
-                b[FACTOR, j] += w * p * work[k, D, j]
+        load_tie(b, work, lanes, rows, block)
         for n in range(1, stations):
-            driven = lanes_at(b, (SUM,)) - ties.drive[n, 0] * lanes_at(b, (GRAVITY,))
-            force = (lanes_at(b, (LOAD,)) + lanes_at(b, (GAIN,)) * driven) / (
-                1.0 + lanes_at(b, (GAIN,)) * lanes_at(b, (FACTOR,))
-            )
-            put_lanes(b, (TIE,), force)
+            force = solve_tie(b, ties.drive[n, 0])
             if n == stations - 1:
                 for k in range(modes):
                     put_lanes(b, (PUSH,), rows[n, k, 0, FORCE] * force)
                     store_mode(work, b, state, scheme, block, k)
             m = min(n + 1, stations - 1)
             at = lead_moves * n
-            motion, factor, first, second = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+            motion, moved, factor = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+            first, second = all_lanes(0.0), all_lanes(0.0)
             for k in range(modes):
-                p, w, rate, curve = (
-                    rows[m, k, 0, FORCE],
-                    rows[m, k, 0, CLOSED],
-                    rows[m, k, 0, RATE],
-                    rows[m, k, 0, CURVE],
-                )
+                p, w, rate, curve = tie_row(rows, m, k)
                 d = lanes_at(work, (k, D))
                 a = rows[n, k, 0, FORCE] * (d * force) - lanes_at(work, (k, C))
                 q, v, u_next, v_next, c = advance(scheme, work, k, a)
-                motion = motion + (w * c - (rate * v_next + curve * u_next))
+                motion = motion + w * c
+                moved = moved + rate * v_next + curve * u_next
                 factor = factor + (w * p) * d
                 if leads == 2:
                     first = first + watch.on_q[at, 0, k] * q
                     second = second + watch.on_q[at, 1, k] * q
                 elif leads == 1:
                     first = first + watch.on_q[at, 0, k] * q
-                else:
-                    put_lanes(now, (k, Q_NOW), q)
-                    put_lanes(now, (k, V_NOW), v)
-                    put_lanes(now, (k, A_NOW), a)
-            put_lanes(b, (SUM,), motion)
+                elif leads < 0:
+                    put_modes(now, k, q, v, a)
+            put_lanes(b, (SUM,), motion - moved)
             put_lanes(b, (FACTOR,), factor)
-            put_lanes(b, (LEAD,), first)
-            put_lanes(b, (SECOND,), second)
+            put_leads(b, leads, first, second)
             observe(marks, now, b, watch, n, leads)
             keep(marks, history, watch, record.sample[n], n, float(count + n))
-        copy_marks(record.marks[block], marks)
+        close_marks(record.marks[block], marks, watch, lanes.step[block], stations - 1)
 
 
 @kernel
@@ -187,12 +195,12 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
     rows, reacting, given, reaches = ties.rows, ties.reacting, ties.given, ties.reaches
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
     half = (reacting.shape[0] + 1) // 2
-    still = watch.on_q.shape[1] == watch.signal.shape[0]  # only displacements are observed
+    leads, lead_moves = leading(watch), 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
+    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
     own = np.zeros((many, 4, LANES))
     matrix = np.zeros((2 * half, 2 * half, LANES))
     # filled before they are put together: the compiler drops what is written into a local tuple's arrays where it is
@@ -207,7 +215,7 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
         load_own(own, b, ties, lanes, block)
-        copy_marks(marks, record.marks[block])
+        open_marks(marks, record.marks[block])
         history = record.history[block]
         for n in range(1, stations):
             load_dead(work, b, rows, given, reaches, n)
@@ -222,13 +230,19 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
                 for k in range(modes):
                     put_lanes(b, (PUSH,), pushed(b, rows, twos, n, k))
                     store_mode(work, b, state, scheme, block, k)
+            at = lead_moves * n
+            first, second = all_lanes(0.0), all_lanes(0.0)
             for k in range(modes):
                 a = lanes_at(work, (k, D)) * pushed(b, rows, twos, n, k) - lanes_at(work, (k, C))
                 q, v, _, _, _ = advance(scheme, work, k, a)
-                put_lanes(now, (k, Q_NOW), q)
-                if not still:
-                    put_lanes(now, (k, V_NOW), v)
-                    put_lanes(now, (k, A_NOW), a)
-            observe(marks, now, b, watch, n, 0)
+                if leads == 2:
+                    first = first + watch.on_q[at, 0, k] * q
+                    second = second + watch.on_q[at, 1, k] * q
+                elif leads == 1:
+                    first = first + watch.on_q[at, 0, k] * q
+                elif leads < 0:
+                    put_modes(now, k, q, v, a)
+            put_leads(b, leads, first, second)
+            observe(marks, now, b, watch, n, leads)
             keep(marks, history, watch, record.sample[n], n, float(count + n))
-        copy_marks(record.marks[block], marks)
+        close_marks(record.marks[block], marks, watch, lanes.step[block], stations - 1)

@@ -15,6 +15,7 @@ from engine.kernels.layout import (
     LANES,
     LARGEST,
     LARGEST_AT,
+    SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
@@ -87,27 +88,24 @@ def survey(history, counted, marks, carry, joined, count):
     carry (blocks, signals, 3, LANES): the two values before, and how many of them are of equal step and no event
     away (0 to 2);  joined: whether this segment goes on from the one before at an equal step;  count: of the scene's
     stations at station 0. A station higher or lower than both its neighbours is replaced by the vertex of the parabola
-    through the three; squares are summed by Simpson's rule.
+    through the three.
     """
     stations = history.shape[1]
-    before, last, squares = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    before, last = np.empty(LANES), np.empty(LANES)
     highest, lowest = np.empty(LANES), np.empty(LANES)
     for block in range(history.shape[0]):
         one = marks[block]
         for i in range(history.shape[2]):
             run = carry[block, i, RUN, 0] if joined else 0.0
             for j in range(LANES):
-                squares[j], highest[j], lowest[j] = one[i, SQUARES, j], one[i, LARGEST, j], one[i, SMALLEST, j]
+                highest[j], lowest[j] = one[i, LARGEST, j], one[i, SMALLEST, j]
                 before[j], last[j] = carry[block, i, BEFORE, j], carry[block, i, LAST, j]
             for n in range(stations):
                 now = float(count + n)
-                weight = (4.0 if n % 2 == 1 else 2.0 if 0 < n < stations - 1 else 1.0) / 3.0
                 if not counted[n, i]:
                     run = 0.0
                     continue
                 news = 0
-                for j in range(LANES):
-                    squares[j] += weight * history[block, n, i, j] * history[block, n, i, j]
                 for j in range(LANES):
                     x, b, a = history[block, n, i, j], last[j], before[j]
                     reach = 0.125 * abs(x - a) if (x - b) * (b - a) < 0.0 else 0.0  # a vertex is no farther from b
@@ -135,4 +133,25 @@ def survey(history, counted, marks, carry, joined, count):
             for j in range(LANES):
                 carry[block, i, BEFORE, j], carry[block, i, LAST, j] = before[j], last[j]
                 carry[block, i, RUN, j] = run
-                one[i, SQUARES, j] = squares[j]
+
+
+@kernel
+def integrate(history, summed, marks, step):
+    """Integrate squares over a segment's history by Simpson's rule, on top of what was summed before.
+
+    history, marks: as in `survey`, an odd number of stations;  summed (signals): which;  step (blocks, LANES): s.
+    """
+    steps = history.shape[1] - 1
+    squares = np.empty(LANES)
+    for block in range(history.shape[0]):
+        for i in range(history.shape[2]):
+            if not summed[i]:
+                continue
+            squares[:] = 0.0
+            for n in range(steps + 1):
+                weight = (4.0 if n % 2 == 1 else 2.0 if 0 < n < steps else 1.0) / 3.0
+                for j in range(LANES):
+                    squares[j] += weight * history[block, n, i, j] * history[block, n, i, j]
+            for j in range(LANES):
+                marks[block, i, SQUARES, j] += step[block, j] * squares[j]
+                marks[block, i, SECONDS, j] += step[block, j] * steps

@@ -14,31 +14,60 @@ from engine.kernels.layout import (
     LARGEST,
     LARGEST_AT,
     MARKS,
+    SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
+    VALUE,
 )
-from engine.kernels.vector import all_lanes, lanes_at, put_lanes
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes
 
 # rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
 SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, PUSH, TIE = range(12)
 # fields of the per-mode work array; Newmark's family has the first six
 U, V, C, D, CD, KD, E = range(7)
 FIELDS = 6
-# column of a block's own marks, beyond those of Record: the signal's value at the station
-VALUE = MARKS
 # fields of the array of corrected modes, which is filled where more than one channel is observed
 Q_NOW, V_NOW, A_NOW = range(3)
+# in place of a number of leading channels, where all are summed over the corrected modes
+KEPT = -1
+
+
+@piece
+def leading(watch):
+    """How many channels the pass over the modes sums itself: up to two of displacements, or KEPT."""
+    channels = watch.signal.shape[0]
+    return channels if channels <= 2 and watch.on_q.shape[1] == channels else KEPT
+
+
+@piece
+def put_leads(b, leads, first, second):
+    """Keep the sums of the leading channels."""
+    if leads > 0:
+        put_lanes(b, (LEAD,), first)
+        put_lanes(b, (SECOND,), second)
+
+
+@piece
+def put_modes(now, k, q, v, a):
+    """Keep the corrected mode k for the channels to come."""
+    put_lanes(now, (k, Q_NOW), q)
+    put_lanes(now, (k, V_NOW), v)
+    put_lanes(now, (k, A_NOW), a)
 
 
 @piece
 def add_modes(marks, i, now, b, row, field, order):
-    """Signal i += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours."""
+    """Signal i += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours.
+
+    Mode after mode, as the pass sums the leading channels: the same sensor in other company has the same bits.
+    """
     total = all_lanes(0.0)
     for k in range(0, now.shape[0], 4):
-        first = row[k] * lanes_at(now, (k, field)) + row[k + 1] * lanes_at(now, (k + 1, field))
-        second = row[k + 2] * lanes_at(now, (k + 2, field)) + row[k + 3] * lanes_at(now, (k + 3, field))
-        total = total + (first + second)
+        total = total + row[k] * lanes_at(now, (k, field))
+        total = total + row[k + 1] * lanes_at(now, (k + 1, field))
+        total = total + row[k + 2] * lanes_at(now, (k + 2, field))
+        total = total + row[k + 3] * lanes_at(now, (k + 3, field))
     put_lanes(marks, (i, VALUE), lanes_at(marks, (i, VALUE)) + lanes_at(b, (RATE_0 + order,)) * total)
 
 
@@ -46,23 +75,24 @@ def add_modes(marks, i, now, b, row, field, order):
 def observe(marks, now, b, watch, n, leads):
     """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force.
 
-    leads: how many sums stand in b[LEAD] and after it already: all of them, or none.
+    leads: how many sums stand in b[LEAD] and after it already, all of them, or KEPT.
     """
     for i in range(marks.shape[0]):
-        offset, order = watch.offset[n, i], watch.offset_order[i]
-        for j in range(LANES):
-            marks[i, VALUE, j] = offset * b[GRAVITY, j] * b[RATE_0 + order, j]
+        value, offset = all_lanes(0.0), watch.offset[n, i]
+        if offset != 0.0:
+            value = offset * lanes_at(b, (GRAVITY,)) * lanes_at(b, (RATE_0 + watch.offset_order[i],))
         for r in range(watch.static.shape[2]):
             missed = watch.static[n, i, r]
             if missed != 0.0:
-                for j in range(LANES):
-                    marks[i, VALUE, j] += missed * (b[TIE + r, j] * b[RATE_2, j])
+                value = value + missed * (lanes_at(b, (TIE + r,)) * lanes_at(b, (RATE_2,)))
+        put_lanes(marks, (i, VALUE), value)
     of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
     for c in range(leads):
         i = watch.signal[c]
-        for j in range(LANES):
-            marks[i, VALUE, j] += b[LEAD + c, j]
-    for c in range(leads, of_q):
+        put_lanes(marks, (i, VALUE), lanes_at(marks, (i, VALUE)) + lanes_at(b, (LEAD + c,)))
+    if leads != KEPT:
+        return
+    for c in range(of_q):
         row = watch.on_q[n if watch.on_q.shape[0] > 1 else 0, c]
         add_modes(marks, watch.signal[c], now, b, row, Q_NOW, watch.order[c])
     for c in range(of_v):
@@ -83,26 +113,57 @@ def copy_marks(to, of):
 
 
 @piece
+def open_marks(marks, of):
+    """Take the marks of one block along a segment, over which squares are summed anew: its first station, which was the
+    last one observed, counts half."""
+    copy_marks(marks, of)
+    for i in range(marks.shape[0]):
+        for j in range(LANES):
+            marks[i, SQUARES, j] = 0.5 * marks[i, VALUE, j] * marks[i, VALUE, j]
+
+
+@piece
+def close_marks(to, marks, watch, step, steps):
+    """Put the marks of one block back at the end of a segment: the sums of squares, whose last station counts half, as
+    an integral over time on top of what was there (the trapezoidal rule). step (LANES): s."""
+    for i in range(marks.shape[0]):
+        for j in range(LANES):
+            squares, seconds = to[i, SQUARES, j], to[i, SECONDS, j]
+            if watch.summed[i]:
+                squares += step[j] * (marks[i, SQUARES, j] - 0.5 * marks[i, VALUE, j] * marks[i, VALUE, j])
+                seconds += step[j] * steps
+            marks[i, SQUARES, j], marks[i, SECONDS, j] = squares, seconds
+    copy_marks(to, marks)
+
+
+@piece
+def judge(marks, i, now):
+    """Update the extremes of signal i with its value, and what is known where its value is an extreme for the first
+    time: that it is negative, and that it has left every meaning."""
+    value = lanes_at(marks, (i, VALUE))
+    high, low = lanes_at(marks, (i, LARGEST)), lanes_at(marks, (i, SMALLEST))
+    below, above = value <= high, value >= low
+    if not everywhere(below & above):
+        put_lanes(marks, (i, LARGEST), choose(below, high, value))
+        put_lanes(marks, (i, LARGEST_AT), choose(below, lanes_at(marks, (i, LARGEST_AT)), now))
+        put_lanes(marks, (i, SMALLEST), choose(above, low, value))
+        put_lanes(marks, (i, SMALLEST_AT), choose(above, lanes_at(marks, (i, SMALLEST_AT)), now))
+        before = lanes_at(marks, (i, BELOW_AT))
+        put_lanes(marks, (i, BELOW_AT), choose((value < 0.0) & (before < 0.0), now, before))
+        bound, bad = lanes_at(marks, (i, BOUND)), lanes_at(marks, (i, DIVERGED_AT))
+        sound = (value <= bound) & (value >= 0.0 - bound)
+        put_lanes(marks, (i, DIVERGED_AT), choose(sound | (bad >= 0.0), bad, now))
+
+
+@piece
 def keep(marks, history, watch, sample, n, now):
     """Update extremes, sums and samples of every signal with station n; ``now`` counts stations of the scene."""
     for i in range(marks.shape[0]):
         if watch.counted[n, i]:
-            news = 0
-            for j in range(LANES):
-                x = marks[i, VALUE, j]
-                news |= 0 if (x <= marks[i, LARGEST, j]) & (x >= marks[i, SMALLEST, j]) else 1
-                marks[i, SQUARES, j] += x * x
-            if news != 0:
-                for j in range(LANES):
-                    x, high, low = marks[i, VALUE, j], marks[i, LARGEST, j], marks[i, SMALLEST, j]
-                    high_at, low_at, below_at = marks[i, LARGEST_AT, j], marks[i, SMALLEST_AT, j], marks[i, BELOW_AT, j]
-                    bad_at, bound = marks[i, DIVERGED_AT, j], marks[i, BOUND, j]
-                    marks[i, LARGEST, j] = high if x <= high else x
-                    marks[i, LARGEST_AT, j] = high_at if x <= high else now
-                    marks[i, SMALLEST, j] = low if x >= low else x
-                    marks[i, SMALLEST_AT, j] = low_at if x >= low else now
-                    marks[i, BELOW_AT, j] = now if (x < 0.0) & (below_at < 0.0) else below_at
-                    marks[i, DIVERGED_AT, j] = bad_at if (abs(x) <= bound) | (bad_at >= 0.0) else now
-        if sample >= 0 and i < history.shape[1]:
-            for j in range(LANES):
-                history[sample, i, j] = marks[i, VALUE, j] if watch.counted[n, i] else np.nan
+            judge(marks, i, now)
+        if watch.summed[i]:
+            value = lanes_at(marks, (i, VALUE))
+            put_lanes(marks, (i, SQUARES), lanes_at(marks, (i, SQUARES)) + value * value)
+    if sample >= 0:
+        for i in range(min(marks.shape[0], history.shape[1])):
+            put_lanes(history, (sample, i), lanes_at(marks, (i, VALUE)) if watch.counted[n, i] else all_lanes(np.nan))

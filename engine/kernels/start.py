@@ -6,17 +6,17 @@ These run once per segment, so they are written lane by lane for reading, not fo
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CURVE, FORCE, LANES, RATE, SQUARES
+from engine.kernels.layout import CURVE, FORCE, LANES, MARKS, RATE, SQUARES
 from engine.kernels.record import (
     A_NOW,
     GRAVITY,
+    KEPT,
     Q_NOW,
     RATE_0,
     RATE_1,
     RATE_2,
     TIE,
     V_NOW,
-    VALUE,
     copy_marks,
     keep,
     observe,
@@ -154,7 +154,7 @@ def watch_start(ties, lanes, state, watch, record, count):
     force, matrix, unknown = np.empty(many), np.empty((reacting, reacting)), np.empty(reacting)
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    marks = np.zeros((watch.offset.shape[1], VALUE + 1, LANES))
+    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
     for block in range(lanes.step.shape[0]):
         copy_marks(marks, record.marks[block])
         for j in range(LANES):
@@ -170,7 +170,7 @@ def watch_start(ties, lanes, state, watch, record, count):
             forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for r in range(many):
                 b[TIE + r, j] = force[r]
-        observe(marks, now, b, watch, 0, 0)
+        observe(marks, now, b, watch, 0, KEPT)
         keep(marks, record.history[block], watch, record.sample[0], 0, float(count))
         for i in range(marks.shape[0]):
             for j in range(LANES):

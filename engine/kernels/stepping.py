@@ -53,15 +53,15 @@ def _first_alpha(scheme, q, v, a, memory):
 
 
 def _advance_newmark(scheme, work, k, x):
-    q = lanes_at(work, (k, U)) + scheme.beta * x
-    v = lanes_at(work, (k, V)) + scheme.gamma * x
-    v_next = v + (1.0 - scheme.gamma) * x
-    q_next = q + v + (0.5 - scheme.beta) * x
+    # correction and prediction in one: x comes with gamma + (1 - gamma) and with beta + gamma + (1/2 - beta)
+    u, v = lanes_at(work, (k, U)), lanes_at(work, (k, V))
+    v_next = v + x
+    q_next = u + v + (0.5 + scheme.gamma) * x
     c = lanes_at(work, (k, CD)) * v_next + lanes_at(work, (k, KD)) * q_next
     put_lanes(work, (k, U), q_next)
     put_lanes(work, (k, V), v_next)
     put_lanes(work, (k, C), c)
-    return q, v, q_next, v_next, c
+    return u + scheme.beta * x, v + scheme.gamma * x, q_next, v_next, c
 
 
 def _advance_alpha(scheme, work, k, x):

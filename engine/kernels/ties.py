@@ -105,12 +105,15 @@ def push_ties(b, work, rows, own, twos, n, beta):
     for one in range(twos.shares.shape[0]):
         i, j = two(twos, one)
         motion_i, motion_j, gap_i, gap_j = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+        moved_i, moved_j = all_lanes(0.0), all_lanes(0.0)
         if twos.moves[one]:
             for m in range(twos.shares[one, one]):
                 k = np.uint64(twos.shared[one, one, m])
                 c, v, u = lanes_at(work, (k, C)), lanes_at(work, (k, V)), lanes_at(work, (k, U))
-                motion_i = motion_i + (rows[n, k, i, CLOSED] * c - (rows[n, k, i, RATE] * v + rows[n, k, i, CURVE] * u))
-                motion_j = motion_j + (rows[n, k, j, CLOSED] * c - (rows[n, k, j, RATE] * v + rows[n, k, j, CURVE] * u))
+                motion_i, motion_j = motion_i + rows[n, k, i, CLOSED] * c, motion_j + rows[n, k, j, CLOSED] * c
+                moved_i = moved_i + rows[n, k, i, RATE] * v + rows[n, k, i, CURVE] * u
+                moved_j = moved_j + rows[n, k, j, RATE] * v + rows[n, k, j, CURVE] * u
+            motion_i, motion_j = motion_i - moved_i, motion_j - moved_j
         if twos.springs[one]:
             for m in range(twos.shares[one, one]):
                 k = np.uint64(twos.shared[one, one, m])

@@ -3,6 +3,9 @@
 ``lanes_at`` takes the value out of an array whose last axis holds the lanes, ``put_lanes`` puts it back; between them
 it is added, subtracted, multiplied and divided, by other rows and by numbers. Without the compiler it is an array of
 numpy. Products and sums may be contracted, as everywhere in the kernels.
+
+Comparisons make a truth for every lane, false where a NaN is compared; ``and`` and ``or`` of them are & and |.
+``everywhere`` asks for all lanes, ``choose`` takes each lane from one of two rows.
 """
 
 import operator
@@ -18,7 +21,9 @@ from engine.kernels.layout import LANES
 
 _DOUBLE = ir.DoubleType()
 _ROW = ir.VectorType(_DOUBLE, LANES)
+_TRUTHS = ir.VectorType(ir.IntType(1), LANES)
 _BYTES = 8  # rows of arrays begin at any number
+_LEAST, _BIAS, _MANTISSA = -1022, 1023, 52  # of float64: least exponent, what is added to it, bits of the mantissa
 
 
 def lanes_at(array, index):
@@ -36,6 +41,21 @@ def all_lanes(number):
     return np.full(LANES, number)
 
 
+def two_to(row):
+    """Two to the power of whole numbers; those below ``_LEAST`` count as that."""
+    return np.ldexp(1.0, np.maximum(row, _LEAST).astype(np.int64))
+
+
+def everywhere(truths):
+    """Whether all lanes are true."""
+    return bool(np.all(truths))
+
+
+def choose(truths, one, other):
+    """The lanes of one row where they are true, of the other elsewhere; numbers stand for rows."""
+    return np.where(truths, one, other)
+
+
 class Row(types.Type):
     """Numba's type of a row of lanes."""
 
@@ -50,6 +70,22 @@ ROW = Row()
 class _RowModel(models.PrimitiveModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, _ROW)
+
+
+class Truths(types.Type):
+    """Numba's type of a truth for every lane."""
+
+    def __init__(self):
+        super().__init__(name=f"Truths({LANES})")
+
+
+TRUTHS = Truths()
+
+
+@register_model(Truths)
+class _TruthsModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _TRUTHS)
 
 
 def _holds_rows(array, index):
@@ -115,22 +151,75 @@ def _lower_all_lanes(context, builder, called, values):
     return _spread(builder, values[0])
 
 
-def _arithmetic(operation, instruction):
+@type_callable(two_to)
+def _type_two_to(context):
+    return lambda row: ROW if row == ROW else None
+
+
+@lower_builtin(two_to, Row)
+def _lower_two_to(context, builder, called, values):
+    """A sum with 1.5 2^52 holds a whole number in its lowest bits: they become the exponent."""
+    least, shift = (_spread(builder, _DOUBLE(number)) for number in (_LEAST, 1.5 * 2.0**_MANTISSA + _BIAS))
+    power = builder.select(builder.fcmp_ordered("<", values[0], least), least, values[0])
+    whole = ir.VectorType(ir.IntType(64), LANES)
+    bits = builder.bitcast(builder.fadd(power, shift), whole)
+    return builder.bitcast(builder.shl(bits, ir.Constant(whole, [_MANTISSA] * LANES)), _ROW)
+
+
+@type_callable(everywhere)
+def _type_everywhere(context):
+    return lambda truths: types.boolean if truths == TRUTHS else None
+
+
+@lower_builtin(everywhere, Truths)
+def _lower_everywhere(context, builder, called, values):
+    bits = ir.IntType(LANES)
+    return builder.icmp_unsigned("==", builder.bitcast(values[0], bits), ir.Constant(bits, -1))
+
+
+@type_callable(choose)
+def _type_choose(context):
+    kinds = (ROW, types.float64)
+    return lambda truths, one, other: ROW if truths == TRUTHS and one in kinds and other in kinds else None
+
+
+@lower_builtin(choose, Truths, types.Any, types.Any)
+def _lower_choose(context, builder, called, values):
+    return builder.select(values[0], *_rows(builder, called.args[1:], values[1:]))
+
+
+def _rows(builder, kinds, values):
+    """Values as rows, numbers spread."""
+    return [value if kind == ROW else _spread(builder, value) for kind, value in zip(kinds, values, strict=True)]
+
+
+def _between_rows(operation, result, build):
     """Make an operation known between rows, and between a row and a number."""
 
     class Template(ConcreteTemplate):
-        cases: ClassVar = [signature(ROW, *kinds) for kinds in ((ROW, ROW), (types.float64, ROW), (ROW, types.float64))]
+        cases: ClassVar = [
+            signature(result, *kinds) for kinds in ((ROW, ROW), (types.float64, ROW), (ROW, types.float64))
+        ]
 
     infer_global(operation)(Template)
 
     def lower(context, builder, called, values):
-        one, other = (
-            value if kind == ROW else _spread(builder, value) for kind, value in zip(called.args, values, strict=True)
-        )
-        return getattr(builder, instruction)(one, other, flags=("contract",))
+        return build(builder, *_rows(builder, called.args, values))
 
     for kinds in ((Row, Row), (types.Float, Row), (Row, types.Float)):
         lower_builtin(operation, *kinds)(lower)
+
+
+def _between_truths(operation, instruction):
+    """Make an operation known between truths."""
+
+    class Template(ConcreteTemplate):
+        cases: ClassVar = [signature(TRUTHS, TRUTHS, TRUTHS)]
+
+    infer_global(operation)(Template)
+    lower_builtin(operation, Truths, Truths)(
+        lambda context, builder, called, values: getattr(builder, instruction)(*values)
+    )
 
 
 for _operation, _instruction in (
@@ -139,4 +228,10 @@ for _operation, _instruction in (
     (operator.mul, "fmul"),
     (operator.truediv, "fdiv"),
 ):
-    _arithmetic(_operation, _instruction)
+    _between_rows(
+        _operation, ROW, lambda builder, *rows, of=_instruction: getattr(builder, of)(*rows, flags=("contract",))
+    )
+for _operation, _sign in ((operator.le, "<="), (operator.lt, "<"), (operator.ge, ">="), (operator.gt, ">")):
+    _between_rows(_operation, TRUTHS, lambda builder, *rows, of=_sign: builder.fcmp_ordered(of, *rows))
+for _operation, _instruction in ((operator.and_, "and_"), (operator.or_, "or_")):
+    _between_truths(_operation, _instruction)

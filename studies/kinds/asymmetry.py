@@ -78,6 +78,7 @@ class AsymmetryReduction:
     """lag, loop_area, odd_rms, even_excess of every sensor from the last cycle."""
 
     stations: int = 1600
+    compared: tuple[str, ...] = ("lag", "loop_area", "odd_rms", "even_excess")
     least_fidelity: Fidelity = Fidelity.FORCE  # statics lag nowhere
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
@@ -103,7 +104,8 @@ class AsymmetryReduction:
         start, end, turn = (compared.values.of(f"{motion}.{key}") for key in ("start", "end", "turn"))
         cruise = np.abs(end - start) * (1.0 - 2.0 * turn)
         lag = compared.gap("lag") / cruise[:, None]
-        return {"lag": lag, "odd_rms": compared.gap("odd_rms"), "even_excess": compared.gap("even_excess")}
+        rest = {name: compared.gap(name) for name in ("loop_area", "odd_rms", "even_excess")}
+        return {"lag": lag} | rest
 
 
 class Asymmetry:

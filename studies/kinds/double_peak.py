@@ -98,6 +98,7 @@ class DoublePeakReduction:
     """Peaks and harmonics of every sensor from the last cycle."""
 
     stations: int = STATIONS
+    compared: tuple[str, ...] = ("peak_value", "harmonic")
     least_fidelity: Fidelity = Fidelity.STATIC
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +18,7 @@ from results_schema.variables import declare
 from studies.measuring import Piece, Work, described, question_of, usual
 from studies.precision_checks import slug_of
 from studies.precision_variables import (
+    AUTOMATIC,
     COMPARISON_ONLY,
     COORDINATES,
     ERROR,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
     from engine.scene import Study
     from studies.figures import Figure
+    from studies.ladders import Ladder
 
 STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
 SCHEMES = (
@@ -52,6 +54,8 @@ SCHEMES = (
 LADDER = (50, 100, 200, 400, 800, 1600, 3200, 6400, 12800, 25600)
 MODES = (2, 3, 5, 8, 12, 20, 32, 48)
 WANTED = (1e-3, 1e-4, 1e-6)
+TOLERANCES = (1e-4, 1e-3, 1e-2)
+AUTOMATIC_EXPECTED = 4.0  # s of one choice, half of them for the reference
 FLOOR = 30.0  # times the reference's own error: less is no error of a scheme
 
 
@@ -84,7 +88,8 @@ class Question(Spec):
 
     scenes: name -> other values of the study's scene by dotted key. schemes, step_counts: what is compared, at the
     study's own number of modes. mode_counts: what the schemes of the march are compared at too, against
-    reference_modes. wanted: errors for which the report names the cheapest choice.
+    reference_modes. wanted: errors for which the report names the cheapest choice. tolerances: for which the program's
+    own choice is measured beside them.
     """
 
     scenes: dict[str, dict[str, Any]] = Field(default={"the scene": {}}, min_length=1)
@@ -93,6 +98,9 @@ class Question(Spec):
     mode_counts: Annotated[tuple[_Modes, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = MODES
     reference_modes: int = Field(default=64, ge=4, le=64)
     wanted: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1)] = WANTED
+    tolerances: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = (
+        TOLERANCES
+    )
 
 
 declare("work-precision", *RESULTS, *COORDINATES)
@@ -133,13 +141,14 @@ class WorkPrecision:
                 ) from None
 
     def pieces(self, study: Study) -> Sequence[Piece]:
-        """Per scene the steps, SciPy's solvers, and the modes."""
+        """Per scene the steps, SciPy's solvers, the modes, and the program's own choices."""
         asked = question_of(study, Question)
         found = []
         for name, overrides in asked.scenes.items():
             for part, (words, seconds) in _parts().items():
                 job = partial(_compute, part, study, asked, overrides)
                 found.append(Piece(f"{part}-{slug_of(name)}", f"{words}: {name}", job, seconds))
+            found.extend(_automatic_pieces(study, asked, name))
         return found
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
@@ -171,11 +180,34 @@ def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, A
     """One piece."""
     from studies import ladders
 
-    ladder = ladders.Ladder(asked.schemes, asked.step_counts, asked.mode_counts, asked.reference_modes)
+    ladder = _ladder(asked)
     if part == "solvers":
         return ladders.solvers(study, overrides, work)
     measured = {"steps": ladders.steps, "modes": ladders.modes, "jax": ladders.by_jax}
     return measured[part](study, overrides, ladder, work)
+
+
+def _ladder(asked: Question) -> Ladder:
+    from studies.ladders import Ladder
+
+    return Ladder(asked.schemes, asked.step_counts, asked.mode_counts, asked.reference_modes)
+
+
+def _automatic_pieces(study: Study, asked: Question, scene: str) -> Iterator[Piece]:
+    """The program's own choice for a scene at each tolerance, where it has one."""
+    from studies.ladders import automatic, leaves_modes_open
+
+    overrides = asked.scenes[scene]
+    if not leaves_modes_open(study.with_values(overrides)):
+        return
+    for tolerance in asked.tolerances:
+        job = partial(automatic, study, overrides, _ladder(asked), tolerance)
+        words = f"the automatic choice at {tolerance:g}: {scene}"
+        yield Piece(_automatic_name(scene, tolerance), words, job, AUTOMATIC_EXPECTED)
+
+
+def _automatic_name(scene: str, tolerance: float) -> str:
+    return f"automatic-{slug_of(str(tolerance))}-{slug_of(scene)}"
 
 
 #: The parts of a scene's work, each a function of `studies.ladders`: words, expected seconds.
@@ -236,12 +268,26 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{slug_of(scene)}") in pieces]
     for variable, name in ((JAX_ERROR, "error"), (JAX_SECONDS, "seconds")) if by_jax else ():
         found[variable.name] = described(variable, variable.dims, np.stack([piece[name].values for piece in by_jax]))
+    found |= _automatic(pieces, asked)
     threads = sorted({int(piece["threads"]) for piece in steps})
     told = {
         "jax": "measured" if by_jax else "not installed, so there are no points of jax.vmap",
         "threads": " to ".join(str(count) for count in dict.fromkeys((threads[0], threads[-1]))),
     }
     return xr.Dataset(shared | found, coords=_coordinates(asked, QUANTITIES), attrs=told)
+
+
+def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, Any]:
+    """The program's own choices over scene and tolerance, where there are any."""
+    names = [[_automatic_name(scene, tolerance) for tolerance in asked.tolerances] for scene in asked.scenes]
+    if not any(name in pieces for row in names for name in row):
+        return {}
+    found = {}
+    for name, variable in AUTOMATIC.items():
+        missing = np.nan if variable.nan_allowed else 0
+        values = [[float(pieces[piece][name]) if piece in pieces else missing for piece in row] for row in names]
+        found[variable.name] = described(variable, variable.dims, values)
+    return found
 
 
 def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
@@ -257,6 +303,7 @@ def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
         "correction": np.array([0, 1], dtype=np.int8),
         "quantity": list(quantities),
         "solver": named,
+        "asked_tolerance": np.array(asked.tolerances),
     }
     known = axes() | {variable.name: variable for variable in COORDINATES}
     return {name: (name, value, known[name].attributes()) for name, value in values.items()}

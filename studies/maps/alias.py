@@ -70,7 +70,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def rule_steps(scene: MapScene, speed: Array) -> Array:
     """(n,) steps per passage of the rule for speeds (n,) over omega_1 L/pi."""
-    from engine.fidelity import alias_steps
+    from engine.step_rules import alias_steps
 
     return alias_steps(scene.model, scene.model.leading_body.modal.length / (speed * scene.speed_unit))
 

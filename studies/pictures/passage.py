@@ -10,11 +10,11 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from engine.bodies.build import build_body
 from engine.carriages import BodyCarriage
 from studies.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.traces import over_position, picked
 from studies.results import Index, Results, chosen, extreme
+from studies.theory import body_mass
 from studies.views import DAMPING, MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
 from studies.words import scale_for
 
@@ -131,7 +131,7 @@ def _relative_force(seen: View, carriage: str) -> Any:
     spec = seen.results.study.carriage[carriage]
     mass = sum(seen.results.parameter(f"carriage.{carriage}.{key}") for key in spec.masses)
     if isinstance(spec, BodyCarriage):
-        mass = build_body(seen.results.study.body[spec.body]).modal.mass
+        mass = body_mass(seen.results, spec.body)
     return seen.results.dataset[f"{carriage}_contact_force_min"] / (mass * seen.results.parameter("gravity"))
 
 

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from studies.advice import QUANTITY_WORDS, scheme_words, short_time
-from studies.figures import DISTINCT, HAIR, INK, MUTED, Figure, draw, legend_beside, logarithmic, shades
-from studies.trade import choices
+from studies.figures import DISTINCT, HAIR, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic, shades
+from studies.trade import automatic_choices, choices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +22,13 @@ if TYPE_CHECKING:
 COLUMNS = 2
 LARGEST_SHOWN = 1.0
 TIME = "time per variant"
+DIAMOND: dict[str, Any] = {
+    "color": VERMILION,
+    "marker": "D",
+    "markersize": 5.0,
+    "markeredgecolor": "white",
+    "linewidth": 0.0,
+}
 DASHES = ((4, 2), (1, 1.5), (6, 1.5, 1, 1.5), (2, 2), (8, 2), (3, 1, 1, 1))
 
 
@@ -41,8 +48,13 @@ def pictures(dataset: xr.Dataset) -> list[Figure]:
     both = (
         "Every point is a scheme, a number of steps and a number of modes; hollow ones are without static correction. "
         "The line is the best there is: whoever wants an error takes the first point of the line below it. Points that "
-        "are good by luck, as finer steps are worse, count as these. Below the grey band the reference cannot tell."
+        "are good by luck, as finer steps are worse, count as these. In the grey band the reference cannot tell."
     )
+    if "automatic_error" in dataset:
+        both += (
+            " A diamond is what the program chooses by itself in a sweep around the scene, the bar above it the error "
+            "asked: where the bar is at the line, the choice costs as little as can be."
+        )
     found = [
         _panels(dataset, ("trade", "Accuracy of histories against time, steps and modes"), both, height, _draw_trade),
         _panels(dataset, ("cost", "Error of histories against time, equal modes"), cost, height, _draw_cost),
@@ -200,8 +212,21 @@ def _draw_trade(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
     best = np.minimum.accumulate([point.error for point in points]) if points else np.zeros(0)
     times = [point.seconds for point in points]
     (handles["best there is"],) = axes.plot(times, best, color=INK, linewidth=1.2, drawstyle="steps-post", zorder=4)
+    handles |= _draw_automatic(axes, own.expand_dims(scene=[scene]))
     axes.axhspan(1e-16, float(own["total_reference_error"].sel(quantity="history")), color=HAIR, alpha=0.5, zorder=0)
     if len(best):
         axes.set_ylim(0.5 * min(best.min(), float(own["total_reference_error"].sel(quantity="history"))), None)
     axes.set(xscale="log", yscale="log", xlabel=TIME)
     return handles
+
+
+def _draw_automatic(axes: Axes, own: xr.Dataset) -> dict[str, Any]:
+    """The program's own choices of one scene, each below the error asked."""
+    if "automatic_error" not in own:
+        return {}
+    found = [point for asked in own["asked_tolerance"].values for point in automatic_choices(own, float(asked))]
+    for point in found:
+        axes.plot([point.seconds] * 2, [point.error, point.asked], color=VERMILION, linewidth=1.0, zorder=5)
+        axes.plot(point.seconds, point.asked, marker="_", markersize=9.0, color=VERMILION, zorder=5)
+        axes.plot(point.seconds, point.error, zorder=6, **DIAMOND)
+    return {"automatic choice,\nbar: error asked": Line2D([], [], **DIAMOND)} if found else {}

@@ -78,6 +78,26 @@ class Files:
         return {"kind": "matrices", **files, "track": {"from": first, "to": last}, **more}
 
 
+def write_cards(files: Files) -> None:
+    """The same model as DMIG cards (matrices.pch) and GRID cards (nodes.bdf, which includes grids.bdf)."""
+    lines = []
+    rows = [(row // 6 + 1, row % 6 + 1) for row in files.assembly.free.tolist()]
+    for name, matrix in (("KAAX", files.assembly.stiffness), ("MAAX", files.assembly.mass)):
+        lines.append(f"{'DMIG':8}{name:8}{0:8d}{6:8d}{2:8d}{0:8d}")
+        dense = matrix.toarray()
+        for column, (node, way) in enumerate(rows):
+            lines.append(f"{'DMIG*':8}{name:16}{node:16d}{way:16d}")
+            for row in range(column, len(rows)):
+                if dense[row, column]:
+                    value = f"{dense[row, column]:.9E}".replace("E", "D")
+                    lines.append(f"{'*':8}{rows[row][0]:16d}{rows[row][1]:16d}{value:>16}")
+    (files.folder / "matrices.pch").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    points = files.assembly.mesh.points.tolist()
+    grids = "".join(f"GRID,{number},,{x!r},{y!r},{z!r}\n" for number, (x, y, z) in enumerate(points, start=1))
+    (files.folder / "grids.bdf").write_text(grids, encoding="utf-8")
+    (files.folder / "nodes.bdf").write_text("BEGIN BULK\nINCLUDE 'grids.bdf'\nENDDATA\n", encoding="utf-8")
+
+
 def study(table: dict[str, Any], **more: Any) -> Study:
     carriage = {"on": "bed", "kind": "mass", "mass": 100.0, "motion": CRUISE}
     sensor = {"middle": {"body": "bed", "at": 7.5}}

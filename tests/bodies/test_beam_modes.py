@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
+import engine.bodies.unit_modes
 from engine.bodies.beam_modes import MOST_MODES, BeamProperties, Spring, uniform_beam
 from engine.bodies.beam_statics import Restraint
 from engine.bodies.modal import Array, ModalBody
@@ -20,6 +21,7 @@ from tests.bodies.waves import Support, WaveBeam, hermite_model
 from tests.reference.closed_forms import CLAMPED, FREE, PINNED, characteristic_values
 
 MODES = 64
+PINNED_ENDS = (Restraint(0.0, 0, 0.0), Restraint(1.0, 0, 0.0))
 KINDS = {"pinned": PINNED, "clamped": CLAMPED, "free": FREE}
 ALL_ENDS = [(left, right) for left in KINDS for right in KINDS]
 SUPPORTS: dict[str, tuple[Support, ...]] = {
@@ -274,3 +276,26 @@ def test_few_modes_are_the_lowest_of_many() -> None:
     for derivative in range(4):
         size = np.abs(own.rows(x, derivative)).max(axis=0)
         np.testing.assert_allclose(few.rows(x, derivative) / size, own.rows(x, derivative) / size, atol=1e-9)
+
+
+@pytest.mark.parametrize("derivative", range(4))
+def test_closed_forms_of_pinned_ends_are_what_the_decomposition_finds(derivative: int) -> None:
+    closed, found = unit_modes(PINNED_ENDS, 20), _decomposed(PINNED_ENDS, 20)
+    np.testing.assert_allclose(closed.omega, found.omega, rtol=1e-13)
+    np.testing.assert_allclose(closed.integral, found.integral, atol=1e-13)
+    x = np.linspace(0.0, 1.0, 77)
+    size = closed.omega ** (0.5 * derivative)
+    np.testing.assert_allclose(closed.rows(x, derivative) / size, found.rows(x, derivative) / size, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_waves_are_the_polynomials_that_they_stand_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    restraints = BeamProperties(
+        1.0, 1.0, 1.0, 1.0, 1.0, supports=tuple(Spring(*support) for support in SUPPORTS[name])
+    ).restraints
+    x = np.random.default_rng(6).random(200)
+    waves = engine.bodies.unit_modes._solved(restraints, 40).derivatives(x, range(4))
+    monkeypatch.setattr(engine.bodies.unit_modes, "BENT", math.inf)
+    series = engine.bodies.unit_modes._solved(restraints, 40).derivatives(x, range(4))
+    size = np.abs(series).max(axis=1, keepdims=True)
+    assert np.all(np.abs(waves - series) <= 1e-12 * size)

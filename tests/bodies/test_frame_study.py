@@ -337,7 +337,7 @@ def test_dampers_at_nodes_are_those_of_the_beam() -> None:
         data = passage(table, 600.0, 8.0).data
         sweep = {"damping": {"of": f"body.bed.{key}", "values": [0.0, 500.0, 4000.0]}}
         study = Study(**(data | {"sweep": sweep, "solver": data["solver"] | {"steps": 4000}}))
-        assert len(engine.plan.make_plan(study).buckets) == 1
+        assert len(engine.plan.make_plan(study).groups) == 1
         found.append(engine.run(study))
     for name in ("midspan_max", "midspan_min", "below_max", "below_min"):
         one, other = (dataset[name].values for dataset in found)

@@ -20,7 +20,7 @@ from engine.scene import load
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, PINNED, straight
 from tests.bodies.models import CRUISE, Files, in_process, refusal, study
-from tests.scene.mutations import Mutation, mutations, survives
+from tests.scene.mutations import Mutation, distinct, survives
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +189,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return found
 
 
-@pytest.mark.parametrize("mutation", mutations(EVERY_KEY), ids=str)
+@pytest.mark.parametrize("mutation", distinct(EVERY_KEY), ids=str)
 def test_every_key(small: Files, mutation: Mutation) -> None:
     survives(mutation, lambda text: load(text.replace("FOLDER", str(small.folder))))
 

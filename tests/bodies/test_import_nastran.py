@@ -14,7 +14,7 @@ from engine.bodies.build import build_body
 from engine.bodies.imported import Nastran
 from engine.bodies.modal import ModalBody
 from tests.bodies.frames import CLAMPED_FREE, body, straight
-from tests.bodies.models import Files, in_process, optional
+from tests.bodies.models import Files, in_process, optional, write_cards
 
 pyyeti = optional("pyyeti")
 
@@ -86,24 +86,9 @@ def test_a_superelement_of_op2_and_op4() -> None:
 
 @pytest.fixture(scope="module")
 def punched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Files]:
-    """A frame of ours as DMIG cards and GRID cards, the cards written here."""
+    """A frame of ours as DMIG cards and GRID cards."""
     files = Files(tmp_path_factory.mktemp("punched"), straight(CLAMPED_FREE, elements=6))
-    lines = []
-    rows = [(row // 6 + 1, row % 6 + 1) for row in files.assembly.free.tolist()]
-    for name, matrix in (("KAAX", files.assembly.stiffness), ("MAAX", files.assembly.mass)):
-        lines.append(f"{'DMIG':8}{name:8}{0:8d}{6:8d}{2:8d}{0:8d}")
-        dense = matrix.toarray()
-        for column, (node, way) in enumerate(rows):
-            lines.append(f"{'DMIG*':8}{name:16}{node:16d}{way:16d}")
-            for row in range(column, len(rows)):
-                if dense[row, column]:
-                    value = f"{dense[row, column]:.9E}".replace("E", "D")
-                    lines.append(f"{'*':8}{rows[row][0]:16d}{rows[row][1]:16d}{value:>16}")
-    (files.folder / "matrices.pch").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    points = files.assembly.mesh.points.tolist()
-    grids = "".join(f"GRID,{number},,{x!r},{y!r},{z!r}\n" for number, (x, y, z) in enumerate(points, start=1))
-    (files.folder / "grids.bdf").write_text(grids, encoding="utf-8")
-    (files.folder / "nodes.bdf").write_text("BEGIN BULK\nINCLUDE 'grids.bdf'\nENDDATA\n", encoding="utf-8")
+    write_cards(files)
     return files.folder, files
 
 

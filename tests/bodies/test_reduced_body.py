@@ -15,6 +15,7 @@ from engine.document import write_document
 from engine.scene import load
 from results_schema import bodies
 from results_schema.errors import ArchiveError, BadInput
+from studies.identity import run_key
 from tests.bodies.frames import LENGTH, beam, body, straight
 from tests.bodies.test_frame_reduction import portal
 from tests.bodies.test_frame_study import STUDY
@@ -130,7 +131,7 @@ def test_parts_belong_to_the_content_of_the_file(tmp_path: Path) -> None:
         reduced = {"bridge": {"kind": "reduced", "file": str(path)}}
         sensors, gravity = {"middle": {"body": "bridge", "at": 1.0}}, 0.0
         text = write_document(base | {"body": reduced, "sensor": sensors, "gravity": gravity})
-        keys.append(engine.make_plan(load(text)).key)
+        keys.append(run_key(load(text)))
     assert keys[0] != keys[1]
 
 

@@ -22,6 +22,7 @@ class Kept:
     stations: int
     cycles: list[Cycle] = field(default_factory=list)
     least_fidelity: Fidelity = Fidelity.STATIC
+    compared: tuple[str, ...] = ()
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {"largest": ("sensor",)}

@@ -53,22 +53,31 @@ class Reading:
         return (history.v if self.sensor.quantity == "velocity" else history.a)[:, number]
 
     @property
-    def values_before(self) -> list[float]:
-        """What it reads just before events, where the history has the values just after them."""
-        found = []
+    def values_before(self) -> Array:
+        """What it reads just before each event, where the history has the values just after it; NaN where nothing."""
+        found, events = [], self.twin.history.before
         if self.sensor.carriage is not None:  # its displacement does not jump
             load = self.twin.scene.loads[self.twin.riders.index(self.sensor.carriage)]
-            left = [event.step for event in self.twin.history.before if load.active(event.t, "left")]
-            return [float(self._aboard[step]) for step in left]
-        for event in self.twin.history.before:
+            left = np.array([load.active(event.t, "left") for event in events], dtype=np.bool_)
+            return np.where(left, self._aboard[[event.step for event in events]], math.nan)
+        for event in events:
             phases = [load.phase(event.t, "left") for load in self.twin.scene.loads]
             position = np.array([math.nan if phase is None else phase.s(event.t) for phase in phases])
             under = self.sensor.under
             x = self.sensor.at if under is None else float(position[self.twin.riders.index(under)])
-            if not math.isnan(x):
-                q = self.twin.history.q[event.step]
-                found.append(self._state(x, position, q, event.v, event.contact_force))
-        return found
+            here = self.twin.history.q[event.step], event.v, event.contact_force
+            found.append(math.nan if math.isnan(x) else self._state(x, position, *here))
+        return np.array(found)
+
+    @property
+    def mean_square(self) -> float:
+        """Time average of its square over the time in which it reads anything, by the trapezoidal rule."""
+        ends = self.values
+        for event, value in zip(self.twin.history.before, self.values_before, strict=True):
+            ends[event.step] = value
+        squares, steps = 0.5 * (self.values[:-1] ** 2 + ends[1:] ** 2), np.diff(self.twin.history.t)
+        reads = np.isfinite(squares)
+        return float(np.sum((squares * steps)[reads]) / np.sum(steps[reads]))
 
     def _state(self, x: float, position: Array, q: Array, v: Array, contact_force: Array) -> float:
         bed, order = self.twin.bed, DERIVATIVE[self.sensor.quantity]

@@ -7,7 +7,6 @@ import pytest
 
 from engine.execution import run
 from engine.plan import make_plan
-from engine.route import routes
 from engine.tables import SceneTables
 from engine.timeline import Rider
 from tests.engine.build import beam, cruise, fixed, force, shuttle, study
@@ -29,7 +28,7 @@ def test_the_times_at_which_a_way_passes_a_place() -> None:
 def test_chosen_steps_do_not_jump_over_a_kink() -> None:
     """A slow force: the largest moment is P a b/L within what vibration adds, with 200 steps or so."""
     plan = make_plan(study(beam(modes=4, damping_ratio=0.1), SLOW, sensor=MOMENT, solver={"fidelity": "full"}))
-    tables = plan.buckets[0].tables
+    tables = plan.groups[0].tables
     places = tables.timeline.positions(0, np.arange(tables.timeline.steps + 1.0))
     assert np.abs(places - AT).min() < 1e-9
     jumped = SceneTables(plan.base, tables.steps, "whole", refinement=2)
@@ -40,13 +39,3 @@ def test_chosen_steps_do_not_jump_over_a_kink() -> None:
 def test_static_readings_know_the_kink() -> None:
     found = run(study(beam(modes=4), SLOW, sensor=MOMENT, solver={"fidelity": "static"}))
     assert float(found.moment_max) == pytest.approx(AT * (1.0 - AT), rel=1e-12)
-
-
-def test_steps_of_a_cycle_are_close_enough_for_a_kink() -> None:
-    """The moment P a b/L falls to 0 over a or b: half a unit of tau changes it by top speed/(2 min(a, b))."""
-    way = shuttle(0.1, 0.9, 1.0, 0.0, 3)
-    (route,) = routes(make_plan(study(beam(), force(1.0, way), sensor=MOMENT)).base) or ()
-    top = route.model.riders[0].motion.max_speed
-    assert route.steepest == pytest.approx(0.5 * top / AT, rel=0.01)
-    (without,) = routes(make_plan(study(beam(), force(1.0, way))).base) or ()
-    assert without.steepest == 0.0

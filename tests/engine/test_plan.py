@@ -1,35 +1,22 @@
-"""How many steps, which scenes and buckets: rules with numbers, refusals with their texts, sweeps of anything."""
+"""How many steps, which scenes and groups: rules with numbers, refusals with their texts, sweeps of anything."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from engine.bucketing import steps_of as steps_by_rules
 from engine.execution import run
-from engine.fidelity import MOST_STEPS, alias_steps, allow_any_steps, round_up
-from engine.lanes import LaneValues
-from engine.plan import Plan, make_plan
+from engine.plan import make_plan
 from engine.scene import Study
+from engine.step_rules import MOST_STEPS, alias_steps
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study
 
-OMEGA_1 = math.pi**2
 MODES = 6
-
-
-def steps_of(plan: Plan) -> NDArray[np.int64]:
-    """(V,) steps of every variant."""
-    found = np.zeros(plan.size, dtype=np.int64)
-    for bucket in plan.buckets:
-        found[bucket.variants] = bucket.steps
-    return found
 
 
 def swept(path: str, values: list[float], carriage: Any, bed: Any = None, **changes: Any) -> Study:
@@ -58,41 +45,6 @@ def test_alias_steps_are_the_root(speed: float, modes: int) -> None:
 SPEEDS = [0.02, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0]
 
 
-def test_auto_steps_of_a_force() -> None:
-    """200 per first period and 200 per passage, rounded up to the stair; nothing about aliases."""
-    steps, reason = ruled(swept("carriage.car.motion.speed", SPEEDS, force(1.0, cruise(0.0, 1.0, 1.0))))
-    wanted = np.array([max(200.0, 200.0 * OMEGA_1 / (2.0 * math.pi) / speed) for speed in SPEEDS])
-    assert steps.tolist() == round_up(wanted).tolist()
-    assert np.all(steps >= wanted)
-    assert np.all(steps <= 2.0 * wanted)
-    assert reason(np.array([0])) == "200 per first period"
-    assert reason(np.array([6])) == "200 per passage or cycle"
-
-
-def ruled(given: Study) -> tuple[NDArray[np.int64], Callable[[NDArray[np.int64]], str]]:
-    """Steps of all variants by the rules that hold where nothing is known of their accuracy, and their reasons."""
-    plan = make_plan(given)
-    values = LaneValues(given, plan.cases.columns_of(np.arange(plan.size)), plan.size)
-    return steps_by_rules(plan.base, values, allow_any_steps)
-
-
-def test_auto_steps_of_a_mass() -> None:
-    """1.5 times the alias rule where that is most."""
-    modes = 30
-    given = swept("carriage.car.motion.speed", SPEEDS, mass(0.1, cruise(0.0, 1.0, 1.0)), beam(modes=modes))
-    steps, reason = ruled(given)
-    rules = {
-        "200 per first period": [200.0 * OMEGA_1 / (2.0 * math.pi) / speed for speed in SPEEDS],
-        "200 per passage or cycle": [200.0] * len(SPEEDS),
-        "the alias rule of the highest mode": [1.5 * least_alias_steps(speed, modes) for speed in SPEEDS],
-    }
-    wanted = np.max(list(rules.values()), axis=0)
-    assert steps.tolist() == round_up(wanted).tolist()
-    reasons = [reason(np.array([v])) for v in range(len(SPEEDS))]
-    assert "the alias rule of the highest mode" in reasons
-    assert [rules[name][v] for v, name in enumerate(reasons)] == wanted.tolist()
-
-
 @pytest.mark.parametrize(
     ("scheme", "limit"), [("linear-acceleration", 12**0.5), ("fox-goodwin", 6**0.5), ("central-difference", 2.0)]
 )
@@ -109,23 +61,11 @@ def test_auto_steps_stay_inside_the_stability_limit(scheme: str, limit: float) -
             "fidelity": "full",
         },  # what undamped modes leave is not the question
     )
-    plan = make_plan(given)
     highest = (modes * math.pi) ** 2
-    assert np.all(highest / (np.array(SPEEDS) * steps_of(plan)) <= limit / 1.05 * (1 + 1e-12))
     ds = run(given)
+    assert np.all(highest / (np.array(SPEEDS) * ds.steps_used.values) <= limit / 1.05 * (1 + 1e-12))
     assert set(ds.status.values.tolist()) <= {0, 1}
     assert np.isfinite(ds.midspan_max.values).all()
-
-
-def test_stair_of_step_counts() -> None:
-    wanted = np.concatenate([np.linspace(1.0, 5000.0, 3001), np.geomspace(5e3, 9e7, 500)])
-    found = round_up(wanted)
-    assert np.all(found >= np.maximum(wanted, 200) - 1e-6)
-    assert np.all(found <= 2 * np.maximum(wanted, 200))
-    assert np.all(np.diff(found) >= 0)
-    assert np.all(found % 200 == 0)
-    assert len(set(found.tolist())) < 100
-    assert round_up(found.astype(float)).tolist() == found.tolist()
 
 
 def test_a_step_beyond_the_limit_is_refused() -> None:
@@ -173,34 +113,34 @@ def test_too_many_steps_are_refused() -> None:
         make_plan(study(beam(), mass(0.1, cruise(0.0, 1.0, 1e-300))))
 
 
-def test_buckets_are_functions_of_a_variant() -> None:
-    """The plan of a subset is the subset of the plan."""
-    speeds = np.geomspace(0.05, 20.0, 40).tolist()
+def test_a_variant_of_few_is_computed_as_by_itself() -> None:
+    """What a part of a sweep is computed with is the part of what the whole is."""
+    speeds = np.geomspace(0.05, 20.0, 12).tolist()
     masses = [0.1, 0.5, 2.0]
     carriage = mass(0.5, cruise(0.0, 1.0, 1.0))
     sweep = {"speed": {"of": "carriage.car.motion.speed", "values": speeds}}
     sweep["mass"] = {"of": "carriage.car.mass", "values": masses}
-    whole = steps_of(make_plan(study(beam(modes=MODES), carriage, sweep=sweep))).reshape(40, 3)
-    chosen = [3, 17, 22, 39]
+    whole = run(study(beam(modes=MODES), carriage, sweep=sweep)).steps_used.values
+    chosen = [1, 5, 8, 11]
     sweep["speed"] = {"of": "carriage.car.motion.speed", "values": [speeds[i] for i in chosen]}
     sweep["mass"] = {"of": "carriage.car.mass", "values": masses[1:2]}
-    part = steps_of(make_plan(study(beam(modes=MODES), carriage, sweep=sweep))).reshape(4, 1)
+    part = run(study(beam(modes=MODES), carriage, sweep=sweep)).steps_used.values
     np.testing.assert_array_equal(part, whole[chosen, 1:2])
     for i in chosen:
         alone = study(beam(modes=MODES), mass(masses[2], cruise(0.0, 1.0, speeds[i])))
-        assert steps_of(make_plan(alone))[0] == whole[i, 2]
-    assert len(np.unique(whole)) > 5
+        assert int(run(alone).steps_used) == whole[i, 2]
+    assert len(np.unique(whole)) > 3
 
 
-def test_every_variant_is_in_one_bucket() -> None:
+def test_every_variant_is_in_one_group() -> None:
     sweep = {
         "speed": {"of": "carriage.car.motion.speed", "from": 0.1, "to": 5.0, "count": 9},
         "length": {"of": "body.bed.length", "values": [1.0, 1.5]},
         "steps": {"of": "solver.steps", "values": [100, 300]},
     }
     plan = make_plan(study(beam(), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep))
-    assert sorted(v for bucket in plan.buckets for v in bucket.variants.tolist()) == list(range(36))
-    assert {bucket.steps for bucket in plan.buckets} == {100, 300}
+    assert sorted(v for group in plan.groups for v in group.variants.tolist()) == list(range(36))
+    assert {group.steps for group in plan.groups} == {100, 300}
 
 
 SPRINGS = [{"at": 0.0, "stiffness": 300.0}, {"at": 1.0, "stiffness": 300.0, "damping": 0.5}]
@@ -294,7 +234,7 @@ def test_headway_keeps_one_scene_and_delay_does_not() -> None:
     plans = [
         make_plan(study(beam(), riding, sweep=speed, solver={"steps": 100})) for riding in (with_headway, with_delay)
     ]
-    assert [len(plan.buckets) for plan in plans] == [1, 3]
+    assert [len(plan.groups) for plan in plans] == [1, 3]
 
 
 def test_fixed_steps_are_over_one_passage_or_cycle() -> None:
@@ -314,11 +254,3 @@ def test_a_study_without_sensors_or_sweep() -> None:
 def test_nothing_moves() -> None:
     with pytest.raises(BadInput, match="nothing moves"):
         make_plan(study(beam(), {}))
-
-
-def test_the_full_model_may_want_more_steps_than_are_marched() -> None:
-    """What costs are compared with refuses nothing where no step is open."""
-    slow = study(beam(modes="auto", damping_ratio=0.02), force(1.0, cruise(0.0, 1.0, 1e-7)))
-    for solver in ({"fidelity": "static"}, {"steps": 2000, "fidelity": "force"}):
-        (bucket,) = make_plan(slow.with_values({f"solver.{key}": value for key, value in solver.items()})).buckets
-        assert bucket.full_cost.item() > 1e9

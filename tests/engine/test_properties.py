@@ -76,8 +76,8 @@ def test_mirror_image() -> None:
 def ready(given: Study) -> March:
     """The march of a study's first 16 variants."""
     plan = make_plan(given)
-    [bucket] = plan.buckets
-    return prepare(bucket.tables, plan.values(bucket, bucket.variants[:16]), np.zeros(0, dtype=np.int64))
+    [group] = plan.groups
+    return prepare(group.tables, plan.values(group, group.variants[:16]), np.zeros(0, dtype=np.int64))
 
 
 def closure(solver: dict[str, Any]) -> float:

@@ -89,7 +89,7 @@ def test_a_million_variants_cost_nothing() -> None:
     swept = {"mass": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 1000}}
     speeds = {"speed": {"of": "carriage.car.motion.speed", "from": 0.1, "to": 1.0, "count": 1000}}
     plan = make_plan(study(beam(), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=swept | speeds, **STATIC))
-    assert plan.size == 1_000_000 and len(plan.buckets) == 1 and plan.seconds < 10.0
+    assert plan.size == 1_000_000 and len(plan.groups) == 1 and plan.seconds < 10.0
 
 
 def test_rates_are_refused() -> None:

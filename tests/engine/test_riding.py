@@ -13,8 +13,8 @@ import studies
 from engine.lanes import LaneValues, padded
 from engine.march import march
 from engine.plan import make_plan
-from engine.resonance import contact_omega, spring_steps
 from engine.scene import Study
+from engine.step_rules import contact_omega
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
 from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.riding import Twin
@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, Array], NDArray[np.bool_]]:
     """The engine's sensors by name at all stations, the twin and its march, and which stations lie within segments."""
     plan = make_plan(case)
-    (bucket,) = plan.buckets
-    tables, values = bucket.tables, plan.values(bucket, padded(bucket.variants))
+    (group,) = plan.groups
+    tables, values = group.tables, plan.values(group, padded(group.variants))
     segments = [segment for segment in tables.timeline.segments if not segment.free]
     counts = np.arange(segments[-1].first + segments[-1].steps + 1)
     found = march(tables, values, counts, 1).history[:, :, 0]
@@ -98,7 +98,7 @@ def test_lanes_agree_with_single_variants() -> None:
         "stiffness": {"of": "carriage.car.contacts.front.stiffness", "values": [300.0, 900.0]},
     }
     case = riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), sweep=swept)
-    assert len(make_plan(case).buckets) == 2
+    assert len(make_plan(case).groups) == 2
     found = engine.run(case).sel(speed=0.3, damping=0.6, stiffness=900.0)
     values = {"carriage.car.motion.speed": 0.3, "carriage.car.contacts.rear.damping": 0.6}
     alone = engine.run(case.without_sweep().with_values(values | {"carriage.car.contacts.front.stiffness": 900.0}))
@@ -106,15 +106,15 @@ def test_lanes_agree_with_single_variants() -> None:
         assert float(found[name]) == pytest.approx(float(alone[name]), rel=1e-12)
 
 
-def test_steps_resolve_every_contact_on_its_spring() -> None:
-    """20 per period of k (v.v + largest phi.phi), summed over the contacts: of a rigid body v.v = 1/m + arm^2/J."""
-    (bucket,) = make_plan(riding(cruise(0.3, 0.7, 0.8), solver={"steps": "auto"})).buckets
+def test_frequencies_of_contacts_on_their_springs() -> None:
+    """k (v.v + largest phi.phi), summed over the contacts: of a rigid body v.v = 1/m + arm^2/J."""
+    (group,) = make_plan(riding(cruise(0.3, 0.7, 0.8))).groups
     places = np.linspace(0.0, 1.0, 257)
     mobility = np.max(sum(2.0 * np.sin(n * np.pi * places) ** 2 for n in range(1, 6)))
     own = 1.0 / 0.5 + 0.15**2 / 0.01
     square = (400.0 + 500.0) * (own + mobility)
-    (rule,) = spring_steps(bucket.scene, LaneValues(bucket.scene.study, {}, 1)).values()
-    assert float(rule[0]) == pytest.approx(20.0 * 0.5 * np.sqrt(square) / (2.0 * np.pi), rel=1e-9)
+    found = contact_omega(group.scene, LaneValues(group.scene.study, {}, 1))
+    assert float(found[0]) == pytest.approx(np.sqrt(square), rel=1e-9)
     rigid = {"rear": {"at": 0.05, "stiffness": "rigid"}, "front": TWO["front"]}
     model = make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid)).base
     assert float(contact_omega(model, LaneValues(model.study, {}, 1))[0] ** 2) == pytest.approx(500.0 * square / 900.0)

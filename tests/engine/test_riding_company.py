@@ -80,16 +80,16 @@ SCENES: dict[str, Callable[[], Study]] = {
 @pytest.mark.parametrize("name", SCENES)
 def test_the_engine_agrees_with_the_differential_equations(name: str) -> None:
     case = SCENES[name]()
-    (bucket,) = make_plan(case).buckets
-    tables = bucket.tables
-    values = make_plan(case).values(bucket, padded(bucket.variants))
+    (group,) = make_plan(case).groups
+    tables = group.tables
+    values = make_plan(case).values(group, padded(group.variants))
     scale = float(values.time_scale(next(iter(case.carriage)))[0])
     events = sorted({segment.start * scale for segment in tables.timeline.segments if segment.fresh})
     events.append(tables.timeline.segments[-1].end * scale)
     counts = np.linspace(0, tables.timeline.steps, 31).astype(np.int64)
     times = tables.timeline.moments(counts.astype(np.float64))[1] * scale
     apart = np.array([min(abs(time - event) for event in events) > 1e-9 for time in times])
-    marched, _ = march_chosen(tables, values, counts, 1)
+    marched = march_chosen(tables, values, counts, 1)
     twin = Company(case)
     states, touching = twin.march(times[apart], events)
     for j, sensor in enumerate(tables.sensors):
@@ -104,8 +104,8 @@ def test_the_engine_agrees_with_the_differential_equations(name: str) -> None:
 
 def test_a_contact_at_the_very_end_touches() -> None:
     """0.15 + (0.05 - 0.2) is not 0, but that is where the rear contact stands; it never leaves the bed."""
-    (bucket,) = make_plan(SCENES["from one end of the bed to the other"]()).buckets
-    assert all(all(segment.active) for segment in bucket.tables.timeline.segments)
+    (group,) = make_plan(SCENES["from one end of the bed to the other"]()).groups
+    assert all(all(segment.active) for segment in group.tables.timeline.segments)
 
 
 def test_bodies_that_ride_on_each_other_are_refused() -> None:

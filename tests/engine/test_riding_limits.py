@@ -99,9 +99,9 @@ def test_orders(scheme: Table, order: float) -> None:
     def largest(steps: int, solver: Table) -> Array:
         case = riding(shuttle(0.3, 0.7, 0.8, 0.3, 1), THREE, FLEXIBLE, solver={"steps": steps} | solver)
         plan = make_plan(case)
-        (bucket,) = plan.buckets
-        counts = np.linspace(0, bucket.tables.timeline.steps, 41).astype(np.int64)
-        marched, _ = march_chosen(bucket.tables, plan.values(bucket, padded(bucket.variants)), counts, 1)
+        (group,) = plan.groups
+        counts = np.linspace(0, group.tables.timeline.steps, 41).astype(np.int64)
+        marched = march_chosen(group.tables, plan.values(group, padded(group.variants)), counts, 1)
         return marched.history[:, :, 0]
 
     exact = largest(25600, {"scheme": "richardson"})

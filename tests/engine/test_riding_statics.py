@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import engine
-from engine.fidelity import allow_any_steps
 from engine.influence import static_values
 from engine.lanes import LaneValues, padded
 from engine.march import march
 from engine.plan import make_plan
+from engine.step_rules import allow_any_steps
 from engine.ways import frozen
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, shuttle
@@ -27,8 +27,8 @@ def test_statics_are_what_a_slow_march_tends_to(name: str) -> None:
     }
     case = quiet(**cases[name])
     plan = make_plan(case, check_steps=allow_any_steps)
-    (bucket,) = plan.buckets
-    tables, values = bucket.tables, plan.values(bucket, padded(bucket.variants))
+    (group,) = plan.groups
+    tables, values = group.tables, plan.values(group, padded(group.variants))
     counts = np.arange(0, 201, 20)
     found = march(tables, values, counts, 1).history[:, :, 0]
     unit, twin = tables.static_at(counts), Twin(case)
@@ -59,9 +59,9 @@ def test_static_correction_is_felt_in_the_contacts() -> None:
 
     def middle(modes: int, correction: bool) -> float:
         bed, solver = beam(modes=modes), {"steps": 400, "static_correction": correction}
-        (bucket,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).buckets
-        names = [sensor.name for sensor in bucket.tables.sensors]
-        return float(bucket.tables.static_at(np.array([0, 77])).force[1, names.index("b"), 0])
+        (group,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).groups
+        names = [sensor.name for sensor in group.tables.sensors]
+        return float(group.tables.static_at(np.array([0, 77])).force[1, names.index("b"), 0])
 
     whole = middle(20, True)
     assert abs(middle(2, True) / whole - 1.0) < 1e-9 < 1e-3 < abs(middle(2, False) / whole - 1.0)
@@ -76,8 +76,8 @@ def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -
     case = riding(
         cruise(-0.4, 1.4, 0.8), THREE, FLEXIBLE, beam(modes=3, supports=springs, own_weight=heavy), solver=solver
     )
-    (bucket,) = make_plan(case).buckets
-    twin, model = Twin(case), bucket.scene
+    (group,) = make_plan(case).groups
+    twin, model = Twin(case), group.scene
     places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
     found = static_values(model, LaneValues(case, {}, 1), frozen(model, places)).contacts[0]
     right = np.array([twin.static(float(place))[1] for place in places])
@@ -89,10 +89,10 @@ def test_static_slopes_move_all_contacts() -> None:
     way = shuttle(0.3, 0.7, 0.8, 0.1, 1)
     for fidelity in ("auto", "force"):
         case = riding(way, table=UNEVEN, sensor={"place": fixed(0.61)}, solver={"steps": 200, "fidelity": fidelity})
-        (bucket,) = make_plan(case).buckets
-        tables, counts = bucket.tables, np.array([40])
+        (group,) = make_plan(case).groups
+        tables, counts = group.tables, np.array([40])
         (place,) = tables.timeline.positions(0, counts)
-        apart = frozen(bucket.scene, place + np.array([-1e-4, 1e-4]))
-        left, right = static_values(bucket.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
+        apart = frozen(group.scene, place + np.array([-1e-4, 1e-4]))
+        left, right = static_values(group.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
         assert abs(right - left) > 1e-7
         assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

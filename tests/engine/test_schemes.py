@@ -155,12 +155,12 @@ def least_steps(scheme: Scheme, modes: int = 12, speed: float = 0.3) -> float:
 def test_too_few_steps_for_the_alias_rule_are_refused(name: str) -> None:
     stride = SCHEMES[name]({}).stride
     least = least_steps(SCHEMES[name]({})) * 1.1  # of the pair's coarser march
-    assert make_plan(passing(stride * math.ceil(1.002 * least), name)).buckets
+    assert make_plan(passing(stride * math.ceil(1.002 * least), name)).groups
     with pytest.raises(BadInput) as caught:
         make_plan(passing(stride * math.floor(0.998 * least), name))
     assert "solver.steps" in str(caught.value) and "steps = " in caught.value.remedy
     suggested = int(caught.value.remedy.split()[2])
-    assert make_plan(passing(suggested, name)).buckets
+    assert make_plan(passing(suggested, name)).groups
     assert suggested < 1.2 * stride * least
 
 
@@ -168,9 +168,9 @@ def test_the_alias_rule_is_for_masses_and_schemes_without_damping() -> None:
     with pytest.raises(BadInput, match="alias rule"):
         make_plan(passing(math.floor(least_steps(SCHEMES["average-acceleration"]({}))), "hht-alpha", alpha=-0.001))
     few = math.floor(0.5 * least_steps(SCHEMES["average-acceleration"]({})))
-    assert make_plan(passing(few, "hht-alpha", alpha=-0.05)).buckets
-    assert make_plan(passing(few, "generalized-alpha", rho_inf=0.8)).buckets
-    assert make_plan(passing(few, "average-acceleration", force(1.0, cruise(0.0, 1.0, 0.3)))).buckets
+    assert make_plan(passing(few, "hht-alpha", alpha=-0.05)).groups
+    assert make_plan(passing(few, "generalized-alpha", rho_inf=0.8)).groups
+    assert make_plan(passing(few, "average-acceleration", force(1.0, cruise(0.0, 1.0, 0.3)))).groups
 
 
 def test_a_pair_wants_an_even_number_of_steps() -> None:

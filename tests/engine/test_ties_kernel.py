@@ -165,6 +165,7 @@ def marched(one: System, scheme: Newmark) -> tuple[Array, Array]:
         offset=np.zeros((STATIONS, signals)),
         offset_order=np.zeros(signals, dtype=np.int64),
         counted=np.ones((STATIONS, signals), dtype=np.bool_),
+        summed=np.ones(signals, dtype=np.bool_),
     )
     history = np.full((BLOCKS, STATIONS, signals, LANES), np.nan)
     record = Record(np.zeros((BLOCKS, signals, MARKS, LANES)), np.arange(STATIONS), history)

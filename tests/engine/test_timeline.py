@@ -191,6 +191,7 @@ class Nothing:
 
     stations = 100
     least_fidelity = Fidelity.STATIC
+    compared = ()
 
     def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
         return {}

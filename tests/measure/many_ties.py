@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.fidelity import allow_any_steps
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Lanes
 from engine.kernels.start import settle
 from engine.march import prepare
 from engine.plan import make_plan
+from engine.step_rules import allow_any_steps
 from studies.bench import MIDSPAN, Scene
 
 Array = NDArray[np.float64]
@@ -57,10 +57,10 @@ def eights(values: Array) -> Array:
 def twin_march(scene: Scene, folder: Path) -> tuple[float, Array]:
     """Seconds of the best of several runs, and every variant's largest midspan deflection."""
     plan = make_plan(scene.study(), check_steps=allow_any_steps)
-    (bucket,) = plan.buckets
-    (segment,) = bucket.tables.timeline.segments
-    table = bucket.tables.table(segment)
-    march = prepare(bucket.tables, plan.values(bucket, bucket.variants), np.zeros(0, dtype=np.int64))
+    (group,) = plan.groups
+    (segment,) = group.tables.timeline.segments
+    table = group.tables.table(segment)
+    march = prepare(group.tables, plan.values(group, group.variants), np.zeros(0, dtype=np.int64))
     lanes: Lanes = march.lanes.steps_of(march.lanes.time_scale * segment.step)
     rows = np.ascontiguousarray(table.ties.rows[..., [FORCE, CLOSED, RATE, CURVE]].transpose(0, 2, 1, 3))
     observed = np.ascontiguousarray(table.watch.on_q[0, 0, : scene.modes])
@@ -78,22 +78,22 @@ def twin_march(scene: Scene, folder: Path) -> tuple[float, Array]:
             )
         best = min(best, time.thread_time() - begun)
     found = np.empty(scene.variants)
-    found[bucket.variants] = peaks.reshape(-1)[: scene.variants]
+    found[group.variants] = peaks.reshape(-1)[: scene.variants]
     return best, found
 
 
 def engine_march(scene: Scene) -> tuple[float, Array]:
     """The same by the march that `run` uses."""
     plan = make_plan(scene.study(), check_steps=allow_any_steps)
-    (bucket,) = plan.buckets
+    (group,) = plan.groups
     best, found = np.inf, np.empty(scene.variants)
     for _ in range(BEST_OF):
-        march = prepare(bucket.tables, plan.values(bucket, bucket.variants), np.zeros(0, dtype=np.int64))
+        march = prepare(group.tables, plan.values(group, group.variants), np.zeros(0, dtype=np.int64))
         begun = time.thread_time()
         march.go()
         best = min(best, time.thread_time() - begun)
-    marks = march.result(scene.variants).marks[[s.name for s in bucket.tables.sensors].index(MIDSPAN)]
-    found[bucket.variants] = np.maximum(marks[0], -marks[2])
+    marks = march.result(scene.variants).marks[[s.name for s in group.tables.sensors].index(MIDSPAN)]
+    found[group.variants] = np.maximum(marks[0], -marks[2])
     return best, found
 
 

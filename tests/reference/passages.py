@@ -22,13 +22,17 @@ Motion = Callable[[float], tuple[float, float, float]]
 
 
 class Variants(NamedTuple):
-    """Arrays (C,): mass, damping ratio, and 1 or 0 for with or without convective terms; the number of modes."""
+    """Arrays (C,): mass, damping ratio, and 1 or 0 for with or without convective terms; wave numbers (N,)."""
 
     mass: Array
     zeta: Array
     convective: Array
-    modes: int
+    k: Array
     weight: float = 48.0
+
+    @property
+    def modes(self) -> int:
+        return len(self.k)
 
 
 class Passage(NamedTuple):
@@ -46,24 +50,33 @@ class Passage(NamedTuple):
 def variants(modes: int, rows: list[tuple[float, float, float]]) -> Variants:
     """Variants from rows (mass, zeta, convective)."""
     table = np.array(rows, dtype=np.float64)
-    return Variants(table[:, 0], table[:, 1], table[:, 2], modes)
+    return Variants(table[:, 0], table[:, 1], table[:, 2], math.pi * np.arange(1, modes + 1))
 
 
-def _force(case: Variants, motion: tuple[float, float, float], q: Array, v: Array) -> tuple[Array, Array, Array]:
-    """phi (N,), elastic and damping forces (C, N), contact force (C,)."""
-    s, ds, dds = motion
-    k = math.pi * np.arange(1, case.modes + 1)
-    phi, slope = math.sqrt(2.0) * np.sin(k * s), math.sqrt(2.0) * k * np.cos(k * s)
-    inner = 2.0 * case.zeta[:, None] * k**2 * v + k**4 * q
-    convective = 2.0 * ds * (v @ slope) + q @ (dds * slope - ds**2 * k**2 * phi)
-    numerator = case.weight - case.mass * (case.convective * convective - inner @ phi)
-    return phi, inner, numerator / (1.0 + case.mass * (phi @ phi))
+Force = Callable[[tuple[float, float, float], Array, Array], tuple[Array, Array, Array]]
+
+
+def _force(case: Variants) -> Force:
+    """Of a motion's s, s' and s'', q and q' (C, N): phi (N,), elastic and damping forces (C, N), contact force (C,)."""
+    k, root = case.k, math.sqrt(2.0) * np.ones(case.modes)
+    root_k, k2, k4, damping = root * k, k**2, k**4, 2.0 * case.zeta[:, None] * k**2
+    convective_mass = case.mass * case.convective
+
+    def force(motion: tuple[float, float, float], q: Array, v: Array) -> tuple[Array, Array, Array]:
+        s, ds, dds = motion
+        ks = k * s
+        phi, slope = root * np.sin(ks), root_k * np.cos(ks)
+        inner = damping * v + k4 * q
+        convective = v @ (2.0 * ds * slope) + q @ (dds * slope - ds**2 * k2 * phi)
+        numerator = case.weight + case.mass * (inner @ phi) - convective_mass * convective
+        return phi, inner, numerator / (1.0 + case.mass * (phi @ phi))
+
+    return force
 
 
 def equilibrium(case: Variants, s: float) -> Array:
     """Static coordinates (C, N) with the weight at s."""
-    k = math.pi * np.arange(1, case.modes + 1)
-    row = case.weight * math.sqrt(2.0) * np.sin(k * s) / k**4
+    row = case.weight * math.sqrt(2.0) * np.sin(case.k * s) / case.k**4
     return np.repeat(row[None, :], len(case.mass), axis=0)
 
 
@@ -71,11 +84,14 @@ def integrate(case: Variants, motion: Motion, times: Array, start: Array, rtol: 
     """Histories at `times` from coordinates `start` (C, N) at rest; dense output of order 7 between steps."""
     shape = (len(case.mass), case.modes)
     half = shape[0] * shape[1]
+    force_of = _force(case)
 
     def slope(t: float, y: Array) -> Array:
-        q, v = y[:half].reshape(shape), y[half:].reshape(shape)
-        phi, inner, force = _force(case, motion(t), q, v)
-        return np.concatenate([y[half:], (force[:, None] * phi - inner).ravel()])
+        phi, inner, force = force_of(motion(t), y[:half].reshape(shape), y[half:].reshape(shape))
+        found = np.empty_like(y)
+        found[:half] = y[half:]
+        np.subtract(force[:, None] * phi, inner, out=found[half:].reshape(shape))
+        return found
 
     y0 = np.concatenate([start.ravel(), np.zeros(half)])
     solution = solve_ivp(slope, (times[0], times[-1]), y0, "DOP853", t_eval=times, rtol=rtol, atol=1e-3 * rtol)
@@ -89,9 +105,10 @@ def _observed(case: Variants, motion: Motion, times: Array, y: Array) -> Passage
     row = math.sqrt(2.0) * np.sin(0.5 * math.pi * np.arange(1, case.modes + 1))
     under, force, s = np.empty((len(times), shape[0])), np.empty((len(times), shape[0])), np.empty(len(times))
     q, v = y[:, : y.shape[1] // 2].reshape(-1, *shape), y[:, y.shape[1] // 2 :].reshape(-1, *shape)
+    force_of = _force(case)
     for n, t in enumerate(times):
         now = motion(t)
-        phi, _, force[n] = _force(case, now, q[n], v[n])
+        phi, _, force[n] = force_of(now, q[n], v[n])
         under[n], s[n] = q[n] @ phi, now[0]
     return Passage(times, s, q @ row, under, force, q[-1], v[-1])
 

@@ -1,6 +1,6 @@
 """Every key of a study, dropped, misspelt, retyped and made NaN: each is refused, or still means something.
 
-Use: `@pytest.mark.parametrize("mutation", mutations(text), ids=str)` and `survives(mutation, read)`.
+Use: `@pytest.mark.parametrize("mutation", distinct(text), ids=str)` and `survives(mutation, read)`.
 """
 
 from __future__ import annotations
@@ -49,6 +49,17 @@ def mutations(text: str) -> list[Mutation]:
     ]
 
 
+def distinct(*texts: str) -> list[Mutation]:
+    """One mutation for each key that means something else: what the user calls a thing, where an item stands in a list,
+    and, for what belongs to a body, in which kind of study do not matter."""
+    found: dict[tuple[object, ...], Mutation] = {}
+    for text in texts:
+        data = tomllib.loads(text)
+        for mutation in mutations(text):
+            found.setdefault((mutation.how, *_meaning(data, mutation.path)), mutation)
+    return list(found.values())
+
+
 def survives(mutation: Mutation, read: Callable[[str], object]) -> bool:
     """Read a mutation; True if it was accepted, False if it was refused with a message that names the place.
 
@@ -63,6 +74,16 @@ def survives(mutation: Mutation, read: Callable[[str], object]) -> bool:
         return False
     assert not mutation.must_fail, f"{mutation} was accepted"
     return True
+
+
+def _meaning(data: dict[str, Any], path: tuple[str, ...]) -> Iterator[object]:
+    """The key without the user's own names, and the kinds of the tables on the way to it."""
+    for n, name in enumerate(path):
+        here = _at(data, path[:n])
+        if isinstance(here, dict):
+            yield here.get("kind") if n > 0 or path[0] != "body" else ""
+        own = n == 3 and path[2] in (*OWN_NAMES_OF_FRAMES, "contacts", "supports")
+        yield "*" if own or isinstance(here, list) or path[:n] in OWN_NAMES else name
 
 
 def _paths(value: Any, here: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

@@ -16,11 +16,12 @@ from results_schema.variables import axes, expand
 
 SENSORS = {"midspan": "m", "support": "N m"}
 CARRIAGES = ("table",)
+RESULTS = ("midspan_max", "lag of é")
 ATTRIBUTES = {
     "Conventions": "CF-1.11",
     "title": "A bed, <script>, {{7*7}}, $ and \nümlauts",
     "history": "2026-11-21 wanderlast run",
-    "schema_version": 1,
+    "schema_version": 2,
     "study_kind": "march",
     "study": "schema_version = 1\ntitle = 'Brücke'\n",
     "study_sha256": "ab" * 32,
@@ -37,8 +38,11 @@ def march(shape: tuple[int, ...] = (4, 3)) -> xr.Dataset:
     for index, (name, variable) in enumerate(expand("march", SENSORS, CARRIAGES).items()):
         if variable.lead == "grid":
             data = np.asarray(numbers / (index + 3), variable.dtype)
-            variables[name] = (dims, np.zeros_like(data) if variable.flags else data, variable.attributes())
-    dataset = xr.Dataset(variables, attrs=ATTRIBUTES)
+            data = np.zeros_like(data) if variable.flags else data
+            data = np.stack([data, 2 * data], axis=-1) if variable.dims == ("result",) else data
+            variables[name] = ((*dims, *variable.dims), data, variable.attributes())
+    result = ("result", list(RESULTS), axes()["result"].attributes())
+    dataset = xr.Dataset(variables, coords={"result": result}, attrs=ATTRIBUTES)
     for name, size in zip(dims, shape, strict=True):
         dataset = dataset.assign_coords({name: (name, np.arange(1.0, size + 1), {"units": "kg", "long_name": name})})
     if shape:
@@ -59,12 +63,11 @@ def with_histories(dataset: xr.Dataset, chosen: tuple[int, ...] = (0, 5)) -> xr.
 
 
 _AUDITED = {
-    ("float64", True): np.array([1e-4, 2e-4, np.nan]),
-    ("float64", False): np.array([1e-3, 1e-3, 1e-2]),
-    ("int32", False): np.array([8, 12, 24], dtype=np.int32),
-    ("str", False): np.array(["midspan_max", "lag of é", ""]),
-    ("int64", False): np.array(2),
-    ("int8", False): np.array([0, 1, 3], dtype=np.int8),
+    ("float64", ("sample", "result")): np.array([[1e-4, 1e-5], [2e-4, 1e-2], [np.nan, np.nan]]),
+    ("float64", ("result",)): np.array([1e-3, np.nan]),
+    ("float64", ("sample",)): np.array([1e-3, 1e-3, 1e-2]),
+    ("int64", ()): np.array(2),
+    ("int8", ("sample",)): np.array([0, 1, 3], dtype=np.int8),
 }
 
 
@@ -72,15 +75,22 @@ def groups() -> dict[str, xr.Dataset]:
     """The groups `/audit` and `/model/bed`."""
     audit = xr.Dataset(  # NaN where it is allowed
         {
-            name: (variable.dims, _AUDITED[variable.dtype, variable.nan_allowed], variable.attributes())
+            name: (variable.dims, _AUDITED[variable.dtype, variable.dims], variable.attributes())
             for name, variable in expand("/audit", {}, []).items()
         },
         coords={
             "sample": ("sample", np.arange(3), axes()["sample"].attributes()),
+            "result": ("result", list(RESULTS), axes()["result"].attributes()),
             "scheme": ("sample", np.array(["fox-goodwin", "é", ""]), axes()["scheme"].attributes()),
         },
     )
-    model = xr.Dataset({"frequency": ("mode", np.array([1.5, 6.0]), {"units": "Hz", "long_name": "frequency"})})
+    model = xr.Dataset(
+        {
+            "frequency": ("mode", np.array([1.5, 6.0]), {"units": "Hz", "long_name": "frequency"}),
+            "length": ((), 15.0, {"units": "m", "long_name": "length"}),
+            "mass": ((), 1200.0, {"units": "kg", "long_name": "mass"}),
+        }
+    )
     return {"/audit": audit, "/model/bed": model.assign_coords(mode=("mode", [1, 2], axes()["mode"].attributes()))}
 
 

@@ -78,7 +78,7 @@ def test_filters_flags_and_attributes_on_disk(path):
         assert raw["status"].flag_values.dtype == np.int8
         assert raw["status"].flag_meanings.split()[1] == "separated"
         assert raw["midspan_max"].coordinates == "speed_ratio"
-        assert raw.Conventions == "CF-1.11" and raw.schema_version == 1
+        assert raw.Conventions == "CF-1.11" and raw.schema_version == 2
         assert raw.study == ATTRIBUTES["study"]
         assert raw.title == ATTRIBUTES["title"]
         assert not raw.cmptypes and not raw.vltypes and not raw.enumtypes
@@ -126,7 +126,7 @@ def test_datasets_that_an_archive_cannot_hold_are_refused(path):
         (march().drop_attrs(), "study_kind"),
         (march().isel(speed=slice(0)), "speed: expected at least one"),
         (march().assign(wrong=("speed", [True] * 4)), "wrong: expected text or numbers"),
-        (march().assign_attrs(schema_version=2), "schema_version"),
+        (march().assign_attrs(schema_version=3), "schema_version"),
         (march().assign_attrs(wrong=[]), "attribute"),
     ):
         with pytest.raises(ValueError, match=text):
@@ -168,7 +168,7 @@ def test_describe_tells_what_is_inside(path):
     write_archive(path, root, groups())
     summary = describe(path)
     assert summary.whole and summary.damage == ""
-    assert summary.dimensions == {"speed": 4, "mass": 3}
+    assert summary.dimensions == {"speed": 4, "mass": 3, "result": 2}
     assert summary.status_counts == {"ok": 10, "separated": 2}
     assert summary.attributes["study_sha256"] == ATTRIBUTES["study_sha256"]
     assert "contents" not in summary.attributes

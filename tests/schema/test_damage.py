@@ -59,8 +59,13 @@ def change(path, action):
 
 
 def test_a_newer_schema_is_refused(path):
-    change(path, lambda dataset: dataset.setncattr("schema_version", 2))
-    refused(path, "newer version; expected schema_version up to 1, received 2")
+    change(path, lambda dataset: dataset.setncattr("schema_version", 3))
+    refused(path, "newer version; expected schema_version up to 2, received 3")
+
+
+def test_the_schema_of_before_estimated_errors_is_refused(path):
+    change(path, lambda dataset: dataset.setncattr("schema_version", 1))
+    refused(path, "before archives held estimated_error.*expected schema_version 2, received 1.*run the study again")
 
 
 def test_missing_and_added_variables_are_found(path):

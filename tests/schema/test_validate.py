@@ -52,7 +52,7 @@ def test_nan_needs_a_status_that_explains_it():
     assert found(dataset) == "midspan_rms: expected numbers where the status keeps them, received NaN at (1, 2)"
     dataset.midspan_max_position[0, 0] = np.nan  # off the body: allowed
     for name, variable in dataset.data_vars.items():
-        if variable.dtype == float:
+        if variable.dtype.kind == "f":
             dataset[name][1, 2] = np.nan
     dataset.status[1, 2] = 3
     assert "(1, 2)" in found(dataset)

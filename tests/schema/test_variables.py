@@ -82,7 +82,8 @@ def test_all_fixed_names_of_the_ground_floor_are_reserved():
 
 
 def test_groups_do_not_inherit_the_outputs_of_every_kind():
-    assert [v.name for v in declarations("/model/bed")] == ["frequency", "damping_ratio", "mode_shape"]
+    names = ["frequency", "damping_ratio", "mode_shape", "length", "mass", "first_frequency"]
+    assert [v.name for v in declarations("/model/bed")] == names
     assert "status" in [v.name for v in declarations("march")]
 
 

@@ -47,6 +47,7 @@ schemes = [{", ".join(f'"{scheme}"' for scheme in SCHEMES)}]
 step_counts = [8, 40, 80, 160, 320, 640]
 mode_counts = [1, 2]
 reference_modes = 6
+tolerances = [1e-2, 1e-1]
 
 [question.scenes.light]
 

@@ -23,7 +23,7 @@ youngs_modulus = 1e9
 density = 1000.0
 supports = "pinned-pinned"
 damping_ratio = 0.02
-modes = 3
+modes = 4
 
 [carriage.trolley]
 on = "beam"
@@ -46,8 +46,15 @@ steps = "auto"
 # The heavy ones lift off near the exit.
 SEPARATED = SMALL.replace("values = [0.1, 1.0]", "values = [0.1, 10.0]").replace('title = "small"', 'title = "heavy"')
 
-# Minutes of marching in many chunks.
-LONG = SMALL.replace("count = 8", "count = 4000").replace('steps = "auto"', "steps = 200000")
+# As many variants, of eight scenes, each of which is a chunk of its own.
+SCENES = SMALL.replace(
+    'speed = { of = "carriage.trolley.motion.speed", from = 0.5, to = 10.0, count = 8, spacing = "log" }',
+    'density = { of = "body.beam.density", from = 1000.0, to = 1070.0, count = 8 }',
+)
+
+# Minutes of marching in many chunks: so many scenes that all their variants converge.
+LONG = SMALL.replace("[sweep]", '[sweep]\ndensity = { of = "body.beam.density", from = 1000, to = 1300, count = 300 }')
+LONG = LONG.replace('steps = "auto"', "steps = 40000")
 
 
 def write(folder: Path, text: str = SMALL, name: str = "small.toml") -> Path:

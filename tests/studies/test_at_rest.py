@@ -23,7 +23,7 @@ from studies.cli import main
 from studies.resting import frequency_errors, reading_errors
 from studies.results import Results
 from studies.study import kind_of
-from tests.scene.mutations import Mutation, mutations, survives
+from tests.scene.mutations import Mutation, distinct, survives
 from tests.studies import at_rest as small
 from tests.studies.at_rest import KINDS, MASS, TABLE
 
@@ -248,7 +248,7 @@ def read(text: str) -> object:
     return expand(loaded)
 
 
-SPOILT = [mutation for kind in KINDS for mutation in mutations(small.text_of(kind, COMPARED, MASS))]
+SPOILT = distinct(*(small.text_of(kind, COMPARED, MASS) for kind in KINDS))
 
 
 @pytest.mark.parametrize("mutation", SPOILT, ids=str)

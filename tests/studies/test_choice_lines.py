@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
+from numpy.typing import NDArray
 
 from engine.execution import run
 from engine.lanes import LaneValues
-from engine.plan import make_plan
 from engine.reduction import Compared, Reduction
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction
 from tests.engine.build import Table, beam, mass, shuttle, study, swing
-from tests.engine.test_choice import Array, bracketed
 
+Array = NDArray[np.float64]
+
+MOST_CHANGES = 8  # of what is chosen along a line, that are looked at
 BED = beam(modes="auto", damping_ratio=0.05)
 OUT_AND_BACK = mass(0.3, shuttle(0.1, 0.9, 0.3, 0.1, 4))
 SWUNG = mass(0.3, swing(0.5, 0.4, 0.15, 4))
@@ -25,26 +28,32 @@ LINES: dict[str, tuple[str, Table, Reduction, str, float, float]] = {
 }
 
 
-def sides(kind: str, carriage: Table, reduction: Reduction, path: str, values: tuple[Array, Array]) -> Compared:
-    """The results next to both sides of every change."""
-    given = study(BED, carriage, kind=kind)
-    found = [
-        run(given.with_values({"sweep": {"line": {"of": path, "values": side.tolist()}}}), reduction=reduction)
-        for side in values
-    ]
-    one, two = ({name: side[name].values for name in reduction.outputs(given)} for side in found)
-    scale = np.stack([found[0][f"{sensor}_static"].values for sensor in given.sensor], axis=1)
-    return Compared(one, two, scale, LaneValues(given, {path: values[0]}, values[0].size))
+def changes(found: xr.Dataset) -> Array:
+    """Places along the line next to which model, modes, scheme or steps change, on both sides."""
+    used = np.stack([found[f"{name}_used"].values for name in ("fidelity", "modes", "scheme", "steps")])
+    places = np.flatnonzero((np.diff(used, axis=1) != 0).any(axis=0))
+    places = places[np.unique(np.linspace(0, places.size - 1, MOST_CHANGES).astype(np.int64))]
+    return np.union1d(places, places + 1)
 
 
 @pytest.mark.parametrize("name", LINES)
 def test_no_jumps_where_the_choice_changes(name: str) -> None:
+    """What is chosen on both sides of a change is marched again until it converges."""
     kind, carriage, reduction, path, low, high = LINES[name]
     given = study(BED, carriage, kind=kind)
-    values = bracketed(given, path, low, high, lambda one: make_plan(one, reduction=reduction))
-    assert values[0].size >= 2
-    for jump in reduction.differences(sides(kind, carriage, reduction, path, values)).values():
-        assert np.all(jump <= 2.0 * given.solver.tolerance)
+    line = np.geomspace(low, high, 300)
+    chosen = run(given.with_values({"sweep": {"line": {"of": path, "values": line.tolist()}}}), reduction=reduction)
+    places = changes(chosen)
+    assert places.size >= 2
+    sweep = {"line": {"of": path, "values": line[places].tolist()}}
+    converged = run(given.with_values({"sweep": sweep}), reduction=reduction)
+    one, two = (
+        {key: side[key].values for key in reduction.outputs(given)} for side in (chosen[dict(line=places)], converged)
+    )
+    scale = np.stack([converged[f"{sensor}_static"].values for sensor in given.sensor], axis=1)
+    compared = Compared(one, two, scale, LaneValues(given, {path: line[places]}, places.size))
+    for jump in reduction.differences(compared).values():
+        assert np.all(jump <= given.solver.tolerance)
 
 
 def test_peaks_where_the_cycle_is_closed() -> None:

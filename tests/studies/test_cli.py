@@ -59,7 +59,7 @@ def test_run_writes_an_archive_and_a_summary(here: Path, capsys: Captured) -> No
     assert archive.root.sizes["speed"] == 8 and archive.root.sizes["mass"] == 2
     assert "/model/beam" in archive.groups
     attributes = archive.root.attrs
-    assert attributes["study"] == SMALL and attributes["schema_version"] == 1 and attributes["study_kind"] == "passage"
+    assert attributes["study"] == SMALL and attributes["schema_version"] == 2 and attributes["study_kind"] == "passage"
     assert attributes["Conventions"].startswith("CF-") and attributes["run_seconds"] > 0
     assert any(text.startswith("numpy ") for text in attributes["packages"])
     assert sorted(path.name for path in here.iterdir()) == ["small.nc", "small.toml"]
@@ -170,7 +170,8 @@ def test_help_and_version(capsys: Captured) -> None:
     assert "wanderlast 0." in capsys.readouterr().out
 
 
-def test_check_explains_and_writes_nothing(here: Path, capsys: Captured) -> None:
+def test_check_explains_and_writes_nothing(here: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.forecast.SECONDS", 1e9)
     write(here)
     assert main(["check", "small.toml"]) == 0
     output = capsys.readouterr().out
@@ -180,7 +181,7 @@ def test_check_explains_and_writes_nothing(here: Path, capsys: Captured) -> None
         "16 = 8 speed x 2 mass",
         "0.0159 to 0.318",
         "0.01 to 0.1",
-        "The choice per variant",
+        "What 8 variants converged with",
     ):
         assert words in output, output
     assert [path.name for path in here.iterdir()] == ["small.toml"]

@@ -42,7 +42,7 @@ def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def spy(plan: Plan, threads: int | None, repeats: int) -> float:
         assert repeats >= 1
-        marched.append((plan.size, {bucket.steps for bucket in plan.buckets}, plan.base.omega.size, threads))
+        marched.append((plan.size, {group.steps for group in plan.groups}, plan.base.omega.size, threads))
         return march_seconds(plan, threads, repeats)
 
     monkeypatch.setattr("studies.bench.march_seconds", spy)

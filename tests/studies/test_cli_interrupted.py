@@ -22,7 +22,7 @@ from studies.options import RunOptions
 from studies.provenance import OF_TIME_AND_MACHINE
 from studies.runner import run_to_archive
 from studies.stopping import GRACE_SECONDS, Stop, stop_on_signals
-from tests.studies.small import LONG, SMALL, start, write
+from tests.studies.small import LONG, SCENES, start, write
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +30,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder, and a part for every chunk."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
-    write(tmp_path)
+    write(tmp_path, SCENES)
     return tmp_path
 
 
@@ -104,7 +104,7 @@ def test_parts_of_another_study_need_overwrite(
     with monkeypatch.context() as patch:
         after_parts(patch, 1, signal.SIGINT)
         assert main(["run", "small.toml"]) == 130
-    write(here, SMALL.replace("damping_ratio = 0.02", "damping_ratio = 0.03"))
+    write(here, SCENES.replace("damping_ratio = 0.02", "damping_ratio = 0.03"))
     capsys.readouterr()
     assert main(["run", "small.toml"]) == 2
     assert "--overwrite" in capsys.readouterr().err
@@ -142,6 +142,7 @@ def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code
 
 
 def test_stop_carries_the_code_of_its_signal() -> None:
+    before = signal.getsignal(signal.SIGINT)
     with stop_on_signals() as stop:
         stop.check()
         os.kill(os.getpid(), signal.SIGTERM)
@@ -149,7 +150,7 @@ def test_stop_carries_the_code_of_its_signal() -> None:
         with pytest.raises(Interrupted, match="finished work is kept") as caught:
             stop.check()
     assert caught.value.exit_code == stop.exit_code == 143
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
     assert Stop().exit_code == 130
 
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.cycles import counts_sampled
+from engine.accuracy.groups import MarchGroup
 from engine.execution import run
+from engine.histories import counts_reduced
 from engine.lanes import LaneValues
-from engine.plan import MOST_HISTORY_BYTES, make_plan
+from engine.plan import CHUNK_BYTES, make_plan
 from engine.reduction import Compared
 from studies.indices import harmonics
-from studies.kinds.double_peak import KIND, SAME_PEAK, DoublePeakReduction
+from studies.kinds.double_peak import KIND, SAME_PEAK, STATIONS, DoublePeakReduction
 from studies.peaks import PEAKS, peaks
 from tests.engine.build import beam, mass, study, swing
 
@@ -121,7 +122,8 @@ def test_histories_of_a_chunk_fit_their_memory_whatever_the_steps() -> None:
             beam(modes=1), mass(0.1, swing(0.5, 0.4, 0.2, 1)), kind="double-peak", sweep=sweep, solver={"steps": steps}
         )
         plan = make_plan(given, reduction=KIND.reduction(given))
-        bucket = plan.buckets[0]
-        stations = counts_sampled(plan, bucket.tables).size
+        (group,) = plan.groups
+        assert isinstance(group, MarchGroup)
+        stations = counts_reduced(group.tables.timeline, STATIONS).size
         assert stations == steps + 1 if steps <= 8192 else 8192 < stations <= 16384
-        assert 8 * stations * plan.lanes_per_chunk(bucket) <= 1.01 * MOST_HISTORY_BYTES
+        assert 8 * stations * plan.lanes_per_chunk(group) <= 1.01 * CHUNK_BYTES

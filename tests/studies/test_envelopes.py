@@ -23,7 +23,7 @@ from studies.runner import run_to_archive
 from studies.study import kind_of
 from tests.scene.mutations import mutations, survives
 from tests.studies import scenes
-from tests.studies.small import SMALL, write
+from tests.studies.small import SCENES, write
 from tests.studies.test_cli_interrupted import after_parts, assert_same_results
 from tests.studies.test_report import archive, check_standing_alone
 
@@ -43,7 +43,7 @@ MASSES = 'mass = { of = "carriage.table.mass", values = [1, 20, 50] }'
 
 
 @pytest.mark.parametrize("kind", ["passage", "asymmetry", "double-peak", "trajectory"])
-def test_every_kind_that_marches(kind: str, tmp_path: Path) -> None:
+def test_every_kind_that_marches(kind: str) -> None:
     dataset = scenes.run(kind, MASSES, extra=EXTRA)
     assert dataset.shape_envelope_max.dims == ("mass", "shape_place")
     assert dataset.moments_envelope_min.attrs["units"] == "N m"
@@ -51,12 +51,18 @@ def test_every_kind_that_marches(kind: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(dataset.moments_place.values, np.linspace(1.0, 9.0, 7), rtol=1e-14, atol=0)
     middle = dataset.isel(shape_place=5)  # over the same instants as the sensor there
     np.testing.assert_allclose(middle.shape_envelope_max, dataset.midspan_max, rtol=1e-10, atol=0, equal_nan=False)
+    names = [figure.name for figure in answers.figures(dataset)]
+    told = {figure.name for part in (choice, estimates) for figure in part.pictures(Results.of(dataset))}
+    assert [name for name in names if name not in told][-1] == "envelopes"
+    assert any("the largest bending moment along bed is" in text for text in answers.findings(dataset))
+
+
+def test_the_report_has_them(tmp_path: Path) -> None:
+    dataset = scenes.run("passage", MASSES, extra=EXTRA)
     page = write_report(archive(tmp_path, dataset), tmp_path / "out").read_text(encoding="utf-8")
     reader = check_standing_alone(page)
-    drawn = {figure.name: figure for figure in answers.figures(dataset)}
-    told = {figure.name for part in (choice, estimates) for figure in part.pictures(Results.of(dataset))}
-    assert [name for name in drawn if name not in told][-1] == "envelopes"
-    assert drawn["envelopes"].caption in reader.text
+    (drawn,) = envelopes.pictures(Results.of(dataset))
+    assert drawn.caption in reader.text
     assert "moments_envelope_max" in reader.text and "the largest bending moment along bed is" in reader.text
     assert "envelope moments" in reader.text
 
@@ -110,7 +116,8 @@ def test_what_is_not_as_declared_is_found() -> None:
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
-    text = SMALL.replace("[sweep]", '[envelope.shape]\nbody = "beam"\n\n[sweep]')
+    text = SCENES.replace('steps = "auto"', "steps = 800\naudit = 0\ntolerance = 1e-2")
+    text = text.replace("[sweep]", '[envelope.shape]\nbody = "beam"\n\n[sweep]')
     write(tmp_path, text)
     assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
     with monkeypatch.context() as patch:

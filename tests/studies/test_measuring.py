@@ -24,6 +24,7 @@ from studies import summary
 from studies.cli import main
 from studies.measuring import MeasuringKind, Piece, Work, measure, question_of, usual
 from studies.options import RunOptions
+from studies.results import Results
 from studies.runner import run_to_archive
 from studies.stopping import Stop
 from tests.schema.samples import FailNth
@@ -287,7 +288,7 @@ def test_a_full_disk_keeps_the_finished_pieces(here: Path, monkeypatch: pytest.M
 
 def test_every_result_has_its_range_and_place() -> None:
     dataset = precision.small()
-    found = {one.name: one for one in summary.ranges(dataset)}
+    found = {one.name: one for one in summary.ranges(Results.of(dataset))}
     assert {"error", "seconds_per_variant", "fitted_order", "total_error"} <= set(found)
     largest = found["error"].largest
     at = {name: value for name, (value, _) in largest.variant.items()}

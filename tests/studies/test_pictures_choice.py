@@ -1,4 +1,4 @@
-"""What every variant took, cost and left out: pictures and sentences, from numbers that are put into datasets here."""
+"""What every variant was computed with and its errors: pictures and sentences, from numbers that are put in here."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
-from matplotlib.legend import Legend
 
 from results_schema.archive import SCHEMA_VERSION, write_archive
 from results_schema.status import Fidelity
+from results_schema.variables import axes as coordinates
+from results_schema.variables import declarations
 from studies import figures
-from studies.choices import ERROR, NAMES, PARTS, told_choices
+from studies.choices import NAMES, told_choices
 from studies.console import show_outcome
-from studies.figures import BLUE, Figure
+from studies.figures import BLUE, MUTED, Figure
 from studies.pictures import choice, estimates
 from studies.report import write_report
 from studies.results import Results
@@ -33,47 +34,40 @@ DAMPING = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
 MODELS = [[0, 1], [3, 3], [0, 3]]  # over speeds 6, 2, 4 and masses 10, 20
 MODES = [[0, 4], [8, 8], [0, 10]]
 STEPS = [[0, 400], [800, 800], [0, 1600]]
-COST = [[0.0, 0.05], [0.1, 0.3], [0.0, 0.15]]
-STEP_PARTS = [[0.0, 1e-4], [3e-4, np.nan], [0.0, 4e-4]]
-MODE_PARTS = [[0.0, 2e-4], [1e-4, 1e-4], [0.0, 1e-4]]
-MODEL_PARTS = [[6e-4, 5e-4], [0.0, 0.0], [2e-4, 0.0]]
-KNOWN = {
-    "fidelity_used": MODELS,
-    "modes_used": MODES,
-    "steps_used": STEPS,
-    "relative_cost": COST,
-    "error_steps": STEP_PARTS,
-    "error_modes": MODE_PARTS,
-    "error_fidelity": MODEL_PARTS,
-    "error_estimate": (np.array(STEP_PARTS) + MODE_PARTS + MODEL_PARTS).tolist(),
-}
+WORK = [[0.0, 1600.0], [6400.0, 6400.0], [0.0, 16000.0]]
+ERRORS = [[6e-4, 8e-4], [4e-4, np.nan], [2e-4, 5e-4]]
+KNOWN = {"fidelity_used": MODELS, "modes_used": MODES, "steps_used": STEPS, "work": WORK, "error_estimate": ERRORS}
 
 
 def put(dataset: xr.Dataset, **known: Any) -> xr.Dataset:
-    """The dataset with these numbers of every variant, others of their kind taken out."""
+    """The dataset with these numbers of every variant, others of their kind taken out, and no errors of results."""
     status = dataset["status"]
-    known = {name: np.asarray(values) for name, values in known.items()}
     bare = dataset.drop_vars([name for name in KNOWN if name in dataset and name not in ("modes_used", "steps_used")])
-    return bare.assign({"fidelity_used": status.copy(data=np.full(status.shape, 3))}).assign(
-        {name: status.copy(data=values) for name, values in known.items()}
-    )
+    mass = dataset["fidelity_used"].copy(data=np.full(status.shape, 3, dtype=np.int8))
+    bare = bare.assign(fidelity_used=mass).drop_dims("result")
+    whole = {name: np.asarray(values).astype(dataset[name].dtype) for name, values in known.items()}
+    return bare.assign({name: dataset[name].copy(data=values) for name, values in whole.items()})
+
+
+def put_errors(dataset: xr.Dataset, tolerances: dict[str, float], errors: Any) -> xr.Dataset:
+    """The dataset with errors (..., R) of results, and their tolerances."""
+    declared = {variable.name: variable.attributes() for variable in declarations("march")}
+    result = "result", list(tolerances), coordinates()["result"].attributes()
+    own = xr.Dataset(coords={"result": result})
+    dims, values = (*dataset["status"].dims, "result"), np.asarray(errors, dtype=np.float32)
+    own["estimated_error"] = dims, values, declared["estimated_error"]
+    own["tolerance"] = "result", list(tolerances.values()), declared["tolerance"]
+    return dataset.drop_dims("result", errors="ignore").assign(own)
 
 
 def random(dataset: xr.Dataset, seed: int = 4) -> xr.Dataset:
     """The same with random numbers, some of them unknown."""
     draw, shape = np.random.default_rng(seed), dataset["status"].shape
     models = draw.choice([0, 2, 3], shape)
-    parts = {name: np.where(draw.random(shape) < 0.1, np.nan, 1e-3 * draw.random(shape)) for name in PARTS}
-    marched = models > 0
-    return put(
-        dataset,
-        fidelity_used=models,
-        modes_used=marched * draw.integers(1, 20, shape),
-        steps_used=marched * draw.choice([200, 400, 800], shape),
-        relative_cost=marched * draw.random(shape),
-        error_estimate=sum(parts.values()),
-        **parts,
-    )
+    modes, steps = (models > 0) * draw.integers(1, 20, shape), (models > 0) * draw.choice([200, 400, 800], shape)
+    errors = np.where(draw.random((*shape, 3)) < 0.1, np.nan, 1e-3 * draw.random((*shape, 3)))
+    found = put(dataset, fidelity_used=models, modes_used=modes, steps_used=steps, work=modes * steps)
+    return put_errors(found, {"a": 1e-3, "b": 5e-4, "c": np.nan}, errors)
 
 
 @pytest.fixture(scope="module")
@@ -108,30 +102,29 @@ def legend_of(axes: Any) -> dict[str, Any]:
 
 
 def test_sentences_count_models_with_what_they_took(plane: xr.Dataset) -> None:
-    assert told_choices(Results.of(put(plane, **KNOWN))) == [
+    dataset = put_errors(put(plane, **KNOWN), {"midspan_max": 1e-3}, np.zeros((3, 2, 1)))
+    assert told_choices(Results.of(dataset)) == [
         "2 of 6 variants: statics, estimated error at most 6e-4; 1: moving force, 4 modes, 400 steps, estimated error "
         "at most 8e-4; 3: moving mass, 8 to 10 modes, 800 to 1,600 steps, estimated error at most 5e-4, 1 without an "
         "estimate.",
-        "On average a variant took 10 % of the full model's modes × steps, checks included; half of them took 7.5 % "
-        "or less.",
+        "On average a variant took 5,067 modes × steps over a passage or cycle; half of them 4,000 or fewer.",
     ]
-    cheap = put(plane, relative_cost=[[0, 0], [0, 0], [0.3, 0.3]])
+    told_only = put_errors(dataset, {"table_contact_force_max": np.nan}, np.zeros((3, 2, 1)))
+    assert "without" not in told_choices(Results.of(told_only))[0]
+    cheap = put(plane, work=[[0, 0], [0, 0], [3000, 3000]])
     assert told_choices(Results.of(cheap))[1].endswith("; half of them marched nothing.")
 
 
-def test_sentences_of_older_archives_and_single_scenes(plane: xr.Dataset) -> None:
-    older = put(plane, modes_used=np.full((3, 2), 12), steps_used=[[400, 800]] * 3)
-    assert told_choices(Results.of(older)) == ["All 6 variants: moving mass, 12 modes, 400 to 800 steps."]
-    failed = scenes.with_failures(older, 2)
+def test_sentences_of_failures_and_single_scenes(plane: xr.Dataset) -> None:
+    bare = put(plane, modes_used=np.full((3, 2), 12), steps_used=[[400, 800]] * 3)
+    assert told_choices(Results.of(bare)) == ["All 6 variants: moving mass, 12 modes, 400 to 800 steps."]
+    failed = scenes.with_failures(bare, 2)
     assert told_choices(Results.of(failed)) == ["All 3 variants with values: moving mass, 12 modes, 800 steps."]
-    assert told_choices(Results.of(scenes.with_failures(older, 1))) == []
+    assert told_choices(Results.of(scenes.with_failures(bare, 1))) == []
     some = told_choices(Results.of(scenes.with_failures(put(plane, **KNOWN), 2)))[0]
     assert some.startswith("1 of 3 variants with values: moving force, 4 modes, 400 steps, ")
-    one = put(scenes.run("passage"), fidelity_used=0, relative_cost=0.02, error_estimate=4e-4)
-    assert told_choices(Results.of(one)) == [
-        "Computed as statics, estimated error at most 4e-4.",
-        "It took 2 % of the full model's modes × steps, checks included.",
-    ]
+    one = put(scenes.run("passage"), fidelity_used=0, error_estimate=4e-4)
+    assert told_choices(Results.of(one)) == ["Computed as statics, estimated error at most 4e-4."]
     assert drawn(one) == {}
 
 
@@ -156,7 +149,7 @@ def test_any_sweep_can_be_drawn(kind: str, shape: str) -> None:
         warnings.simplefilter("error")
         found = drawn(dataset)
         texts = [figures.svg(figure) for figure in found.values() if shape in ("sampled", "mixed")]
-    assert list(found) == ([] if shape in ("none", "one value") else ["choice", "saved", "estimates"])
+    assert list(found) == ([] if shape in ("none", "one value") else ["choice", "estimates"])
     for text in texts:
         assert "nan" not in ElementTree.tostring(ElementTree.fromstring(text), "unicode")
 
@@ -178,13 +171,13 @@ def test_models_are_cells_in_their_colours(plane: xr.Dataset) -> None:
     (legend,) = figure.drawing.legends
     assert [text.get_text() for text in legend.get_texts()] == ["statics", "moving force", "moving mass"]
     bars = {axes.get_xlabel(): [t.get_text() for t in axes.get_xticklabels()] for axes in figure.drawing.axes[3:]}
-    assert bars == {"modes": ["4", "8", "10"], "steps": ["400", "800", "1600"]}
+    assert bars == {"modes": ["4", "8", "10"], "steps": ["400", "800", "1,600"]}
 
 
 def test_what_is_the_same_everywhere_is_told_and_not_drawn(plane: xr.Dataset) -> None:
     figure = drawn(put(plane, modes_used=np.full((3, 2), 12), steps_used=STEPS))["choice"]
     assert figure.caption == "Steps of every variant shown. All: moving mass and 12 modes."
-    alike = put(plane, modes_used=np.full((3, 2), 12), steps_used=np.full((3, 2), 400), relative_cost=np.ones((3, 2)))
+    alike = put(plane, modes_used=np.full((3, 2), 12), steps_used=np.full((3, 2), 400), work=np.full((3, 2), 4800))
     assert drawn(alike) == {}
 
 
@@ -210,7 +203,7 @@ def test_one_axis_is_drawn_as_steps_in_order() -> None:
         fidelity_used=[3, 0, 1],
         modes_used=[8, 0, 4],
         steps_used=[800, 0, 800],
-        relative_cost=[0.4, 0.0, 0.1],
+        work=[6400, 0, 3200],
     )
     found = drawn(dataset)
     model, modes, steps = found["choice"].drawing.axes
@@ -219,128 +212,115 @@ def test_one_axis_is_drawn_as_steps_in_order() -> None:
         (line,) = axes.get_lines()
         np.testing.assert_array_equal(line.get_xdata(), [2, 4, 6])
         np.testing.assert_array_equal(line.get_ydata(), expected)
-    (line,) = found["saved"].drawing.axes[0].get_lines()
-    np.testing.assert_array_equal(line.get_ydata(), [np.nan, 0.1, 0.4])
+    assert found["choice"].title == "Half of the variants took 3,200 modes × steps or fewer, none more than 6,400"
 
 
-def test_costs_are_sorted_beside_the_full_model(plane: xr.Dataset) -> None:
-    figure = drawn(put(plane, **KNOWN))["saved"]
-    right = figure.drawing.axes[1]
-    curve, *_ = right.get_lines()
-    np.testing.assert_array_equal(curve.get_ydata(), [np.nan, np.nan, 0.05, 0.1, 0.15, 0.3])
-    np.testing.assert_allclose(curve.get_xdata(), 100.0 * np.array([1, 3, 5, 7, 9, 11]) / 12.0)
-    lines = legend_of(right)
-    np.testing.assert_allclose(lines["full model"].get_ydata(), 1.0)
-    np.testing.assert_allclose(lines["average"].get_ydata(), 0.1)
-    np.testing.assert_allclose(lines["median"].get_ydata(), 0.075)
-    assert "on average 10 %, median 7.5 %. 2 variants marched nothing" in figure.caption
-    assert cells(figure.drawing.axes[0])[to_hex(choice.NOTHING)] == [(4.0, 10.0), (6.0, 10.0)]
+def rows_of(figure: Figure) -> dict[str, tuple[str, list[float], float]]:
+    """Colour, smallest, median and largest error, and tolerance of every result of the picture of errors."""
+    (axes,) = figure.drawing.axes
+    lines = iter(axes.get_lines())
+    found = {}
+    for label in axes.get_yticklabels():
+        span, middle, tolerance = next(lines), next(lines), next(lines)
+        sizes = [span.get_xdata()[0], middle.get_xdata()[0], span.get_xdata()[1]]
+        found[label.get_text()] = span.get_color(), [float(size) for size in sizes], float(tolerance.get_xdata()[0])
+    return found
 
 
-def test_estimates_are_the_largest_over_other_axes(plane: xr.Dataset) -> None:
-    figure = drawn(put(plane, **KNOWN))["estimates"]
-    lines = legend_of(figure.drawing.axes[0])
-    expected = {
-        "estimated error": [4e-4, 5e-4, 8e-4],
-        "part of the steps": [3e-4, 4e-4, 1e-4],
-        "part of the modes": [1e-4, 1e-4, 2e-4],
-        "part of the model": [np.nan, 2e-4, 6e-4],
-        "tolerance": [1e-3] * 3,
+def test_errors_stand_beside_their_tolerances_the_nearest_first(plane: xr.Dataset) -> None:
+    errors = np.array([[1e-4, 3e-3, np.nan, 0.5], [2e-4, 4e-3, np.nan, 0.2], [9e-4, 1e-3, np.nan, 0.1]])
+    tolerances = {"a": 1e-3, "b": 1e-2, "unknown": 1e-3, "told": np.nan}
+    dataset = put_errors(plane, tolerances, np.stack([errors, errors], axis=1))
+    figure = drawn(dataset)["estimates"]
+    assert figure.title == "All errors told are within their tolerances; a comes nearest, at 90 %"
+    found = rows_of(figure)
+    assert list(found) == ["a", "b", "told"]
+    np.testing.assert_allclose(found["a"][1], [1e-4, 2e-4, 9e-4], rtol=1e-6)
+    np.testing.assert_allclose(found["told"][1], [0.1, 0.2, 0.5], rtol=1e-6)
+    assert [row[0] for row in found.values()] == [BLUE, BLUE, MUTED]
+    assert [found["a"][2], found["b"][2]] == [1e-3, 1e-2] and np.isnan(found["told"][2])
+    assert figure.caption.endswith("3 of 4 results. Without an estimate of some: 6 variants.")
+
+
+def test_the_title_says_what_may_be_missed(plane: xr.Dataset) -> None:
+    errors = np.full((3, 2, 1), 5e-4)
+    errors[0, 0] = 2.5e-3
+    title = drawn(put_errors(plane, {"a": 1e-3}, errors))["estimates"].title
+    assert title == "a may miss its tolerance in 17 % of the variants, 2.5 times at most"
+    told = drawn(put_errors(plane, {"a": np.nan}, errors))["estimates"]
+    assert told.title == "No result is held to a tolerance"
+    assert "estimates" not in drawn(put_errors(plane, {"a": 1e-3}, np.full((3, 2, 1), np.nan)))
+
+
+def test_variants_without_values_have_no_errors_and_many_results_are_cut(plane: xr.Dataset) -> None:
+    tolerances = {f"r{place}": 1e-3 for place in range(30)}
+    errors = np.full((3, 2, 30), 1e-4)
+    errors[0, 0] = 1.0
+    dataset = scenes.with_failures(put_errors(plane, tolerances, errors), 2)
+    figure = drawn(dataset)["estimates"]
+    assert len(rows_of(figure)) == estimates.MOST_RESULTS
+    assert all(largest == pytest.approx(1e-4) for _, (*_, largest), _ in rows_of(figure).values())
+
+
+def group(told: Any, observed: Any, tolerances: dict[str, float]) -> xr.Dataset:
+    """An audit of some variants; told, observed (variants, results)."""
+    count = len(told)
+    values = {
+        "estimated_error": np.array(told),
+        "observed_error": np.array(observed),
+        "tolerance": np.array(list(tolerances.values())),
+        "tolerance_asked": np.ones(count),
+        "left_out": np.array(0),
+        "variant_status": np.zeros(count, dtype=np.int8),
     }
-    assert set(lines) == set(expected)
-    for name, values in expected.items():
-        np.testing.assert_array_equal(lines[name].get_xdata(), [2, 4, 6])
-        np.testing.assert_allclose(lines[name].get_ydata(), values, rtol=1e-12)
-    assert "largest over mass." in figure.caption and "What is zero, " in figure.caption
-    assert figure.caption.endswith("Without an estimate: 1 variant of 6.")
-
-
-def test_estimates_without_parts_and_swept_tolerances() -> None:
-    asked = 'asked = { of = "solver.tolerance", values = [1e-2, 1e-3] }'
-    dataset = scenes.run("passage", f"{SPEEDS}\n{asked}")
-    (axes,) = drawn(put(dataset, error_estimate=np.full((3, 2), 5e-4)))["estimates"].drawing.axes
-    assert set(legend_of(axes)) == {"estimated error", "tolerance"}
-    dashed = [line.get_ydata() for line in axes.get_lines() if line.get_linestyle() == "--"]
-    np.testing.assert_allclose(dashed, [[1e-3] * 3, [1e-2] * 3])
-    assert "estimates" not in drawn(put(dataset, error_estimate=np.full((3, 2), np.nan)))
-    assert "estimates" not in drawn(put(dataset, error_steps=np.full((3, 2), 1e-4)))
-
-
-def test_sampled_variants_are_points_in_the_colour_of_their_largest_part() -> None:
-    dataset = random(scenes.run("passage", sweeps("passage")["sampled"]))
-    lines = legend_of(drawn(dataset)["estimates"].drawing.axes[0])
-    parts = {name: dataset[name].values for name in PARTS}
-    known = [place for place, error in enumerate(dataset[ERROR].values) if np.isfinite(error)]
-    assert known
-    for name, words in PARTS.items():
-        own = [place for place in known if parts[name][place] == max(values[place] for values in parts.values())]
-        points = lines.get(f"mostly of the {words}")
-        np.testing.assert_array_equal([] if points is None else points.get_ydata(), dataset[ERROR].values[own])
-
-
-def group(estimated: list[float], observed: list[float], worst: list[str] | None = None) -> xr.Dataset:
-    """An audit of so many variants."""
+    declared = {variable.name: variable for variable in declarations("/audit")}
+    names = {"sample": np.arange(count), "result": list(tolerances)}
     return xr.Dataset(
-        {
-            "estimated_error": ("sample", np.array(estimated)),
-            "observed_error": ("sample", np.array(observed)),
-            "tolerance_asked": ("sample", np.full(len(observed), 1e-3)),
-            "worst_result": ("sample", np.array(worst or ["midspan_max"] * len(observed))),
-            "left_out": ((), 0),
-            "variant_status": ("sample", np.zeros(len(observed), dtype=np.int8)),
-            "modes_used": ("sample", np.full(len(observed), 8)),
-            "steps_used": ("sample", np.full(len(observed), 800)),
-        },
-        coords={"sample": np.arange(len(observed))},
+        {name: (declared[name].dims, data, declared[name].attributes()) for name, data in values.items()},
+        coords={name: (name, data, coordinates()[name].attributes()) for name, data in names.items()},
     )
 
 
-def test_estimated_against_observed_is_honest_about_what_has_no_place() -> None:
+def test_told_against_observed_is_honest_about_what_has_no_place() -> None:
     nan = np.nan
-    found = group([4e-4, 2e-4, 0.0, nan, 5e-4], [2e-4, 6e-4, 1e-4, 3e-4, nan], ["a", "b", "a", "b", "c"])
+    found = group(
+        [[4e-4, 2e-4], [0.0, nan], [5e-4, 1e-2]], [[2e-4, 6e-4], [1e-4, 3e-4], [nan, 1e-3]], {"a": 1e-3, "b": nan}
+    )
     (figure,) = estimates.compared(found)
+    assert figure.title == "Of 4 audited numbers 50 % are no further off than told"
     assert figure.caption == (
-        "3 audited variants, coloured by the result that differed most. Above the diagonal the estimate was too "
-        "small: 2 of them, at most 3 times. Drawn at the edge because zero or too small for the scale: 1. Triangles "
-        "at the right edge: 1 without an estimate. Not drawn: 1 that could not be compared."
+        "3 variants, a dot for every reported number; below the line its error was told large enough. Worst above it: "
+        "a, 100 times what was told. Not drawn: 2 numbers without one of both."
     )
     (axes,) = figure.drawing.axes
-    low, high = axes.get_xlim()
-    assert axes.get_ylim() == (low, high) and 0.0 < low < 1e-4 and high > 1e-3
+    assert axes.get_ylim() == axes.get_xlim() and axes.get_xlim()[0] < estimates.LEAST < axes.get_xlim()[1]
     lines = legend_of(axes)
-    assert set(lines) == {"as estimated", "tolerance", "a", "b"}
-    np.testing.assert_allclose(lines["as estimated"].get_xdata(), lines["as estimated"].get_ydata())
-    np.testing.assert_allclose(np.transpose(lines["a"].get_data()), [[4e-4, 2e-4], [low, 1e-4]])
-    np.testing.assert_allclose(np.transpose(lines["b"].get_data()), [[2e-4, 6e-4]])
-    triangles = [np.transpose(line.get_data()) for line in axes.get_lines() if line.get_marker() == ">"]
-    np.testing.assert_allclose(np.concatenate(triangles), [[high, 3e-4]])
+    assert set(lines) == {"as told", "tolerance", "held to a tolerance", "told only"}
+    np.testing.assert_allclose(lines["as told"].get_xdata(), lines["as told"].get_ydata())
+    np.testing.assert_allclose(lines["held to a tolerance"].get_data(), [[4e-4, estimates.LEAST], [2e-4, 1e-4]])
+    np.testing.assert_allclose(lines["told only"].get_data(), [[2e-4, 1e-2], [6e-4, 1e-3]])
+    np.testing.assert_allclose(lines["tolerance"].get_ydata(), 1e-3)
 
 
-def test_estimated_against_observed_needs_two_of_both() -> None:
+def test_told_against_observed_needs_two_of_both() -> None:
+    nan = np.nan
     assert estimates.compared(None) == []
-    assert estimates.compared(group([1e-4, np.nan, 1e-4], [1e-4, 1e-4, np.nan])) == []
-    (figure,) = estimates.compared(group([1e-4, 3e-4], [1e-4, 2e-4]))
-    assert figure.caption.endswith("No estimate was smaller than what was observed.")
-    assert estimates.compared(group([0.0, 0.0], [0.0, 0.0]))
-
-
-def test_many_results_share_the_last_colour() -> None:
-    worst = ["a"] * 5 + ["b"] * 4 + list("ccddefgh")
-    errors = (1e-4 * np.arange(1, len(worst) + 1)).tolist()
-    (figure,) = estimates.compared(group(errors, errors, worst))
-    (legend,) = [found for found in figure.drawing.axes[0].get_children() if isinstance(found, Legend)]
-    names = [text.get_text() for text in legend.get_texts()]
-    assert names[2:] == ["a", "b", "c", "d", "e", "others"]
-    lines = legend_of(figure.drawing.axes[0])
-    assert lines["a"].get_color() == BLUE and len(lines["others"].get_xdata()) == 3
-    assert len({lines[name].get_color() for name in names[2:]}) == 6
+    assert estimates.compared(group([[1e-4, nan, 1e-4]], [[1e-4, 1e-4, nan]], {"a": 1e-3, "b": 1e-3, "c": 1e-3})) == []
+    (figure,) = estimates.compared(group([[1e-4], [3e-4]], [[1e-4], [2e-4]], {"a": 1e-3}))
+    assert figure.title == "Of 2 audited numbers 100 % are no further off than told" and "Worst" not in figure.caption
+    assert estimates.compared(group([[0.0], [0.0]], [[0.0], [0.0]], {"a": nan}))
 
 
 def test_the_report_has_them_all(plane: xr.Dataset, tmp_path: Path) -> None:
     attributes = {"Conventions": "CF-1.11", "history": "made by a test", "schema_version": SCHEMA_VERSION}
     dataset = put(plane, **KNOWN).assign_attrs(attributes)
-    audit = group([6e-4, 8e-4, 5e-4], [5e-4, 9e-4, 1e-4]).assign_coords(
-        {"pace": ("sample", [6.0, 6.0, 4.0]), "mass": ("sample", [10.0, 20.0, 20.0])}
+    dataset = put_errors(dataset, {"midspan_max": 1e-3, "moment_max": 1e-3}, np.full((3, 2, 2), 5e-4))
+    told, observed = ([[first, 5e-4] for first in errors] for errors in ([6e-4, 8e-4, 5e-4], [5e-4, 9e-4, 1e-4]))
+    audit = group(told, observed, {"midspan_max": 1e-3, "moment_max": 1e-3}).assign_coords(
+        {
+            "pace": ("sample", [6.0, 6.0, 4.0], dataset["pace"].attrs),
+            "mass": ("sample", [10.0, 20.0, 20.0], dataset["mass"].attrs),
+        }
     )
     write_archive(tmp_path / "study.nc", dataset, {"/audit": audit})
     page = write_report(tmp_path / "study.nc", tmp_path / "out")

@@ -11,16 +11,21 @@ import pytest
 
 import engine
 import studies
+from engine.accuracy.choice import pilots_of
+from engine.chunk import run_chunk
+from engine.execution import run_jobs
 from engine.kernels.layout import LANES
 from engine.lanes import LaneValues
 from engine.march import march
 from engine.ode import ModalEquations
+from engine.plan import make_plan
 from engine.tables import SceneTables
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies import advice, answers, figures, ladders, trade
 from studies import precision as measured
 from studies.measuring import Work
+from studies.precision_variables import AUTOMATIC
 from tests.naive import ode
 from tests.naive.newmark import Newmark
 from tests.naive.newmark import march as naive_march
@@ -157,6 +162,40 @@ def test_the_total_error_is_that_against_a_reference_of_more_modes_and_steps() -
     assert float(precision.small().total_error.sel(point | {"quantity": "history"})) == pytest.approx(apart, rel=0.05)
 
 
+def test_the_automatic_choice_is_in_the_archive() -> None:
+    dataset = precision.small()
+    for variable in AUTOMATIC.values():
+        assert dataset[variable.name].dims == ("scene", "asked_tolerance")
+    assert (dataset.automatic_error > 0.0).all() and (dataset.automatic_error <= dataset.asked_tolerance).all()
+    assert (dataset.automatic_seconds_per_variant > 0.0).all() and (dataset.automatic_steps >= 32).all()
+    assert (dataset.automatic_modes >= 2).all()
+    told = [text for text in answers.findings(dataset) if text.startswith("The automatic choice at ")]
+    assert [text.split()[4] for text in told] == ["0.1", "0.01"]
+
+
+def test_the_automatic_choice_is_that_of_a_sweep_around_the_scene() -> None:
+    study = engine.load(precision.TEXT)
+    plan = make_plan(ladders.around(study, 0.1))
+    assert plan.size == 2048 and not plan.converges and 0 not in pilots_of(plan.cases, plan.members)
+    own = {"carriage.table.mass": 50.0, "carriage.table.motion.speed": 15.0, "body.bed.damping_ratio": 0.03}
+    assert plan.cases.values_of(0) == own
+    for path, value in own.items():
+        column = plan.cases.column(path) / value
+        assert 0.5 <= column.min() < 0.51 and 1.98 < column.max() <= 2.0
+    plan.choose(lambda jobs: run_jobs(jobs, 1), lambda: False)
+    group = next(group for group in plan.groups if 0 in group.variants)
+    flat, _ = run_chunk(plan, group, np.array([0]))
+    taken = precision.small().sel(scene="light", asked_tolerance=0.1)
+    assert flat["modes_used"][0] == taken.automatic_modes and flat["steps_used"][0] == taken.automatic_steps
+
+
+def test_there_is_no_automatic_choice_where_the_modes_are_given() -> None:
+    study = engine.load(precision.TEXT).with_values({"body.bed.damping_ratio": [0.03, 0.02]})
+    assert not ladders.leaves_modes_open(study) and ladders.leaves_modes_open(engine.load(precision.TEXT))
+    names = [piece.name for piece in studies.kind_named("work-precision").pieces(study)]
+    assert names and not any(name.startswith("automatic") for name in names)
+
+
 def test_jax_marches_the_same_where_it_is_installed() -> None:
     pytest.importorskip("jax")
     study = engine.load(precision.TEXT)
@@ -262,6 +301,8 @@ def test_figures_are_drawn_with_what_there_is() -> None:
         for scheme in map(str, dataset.scheme.values):
             has_points = bool(dataset.error.sel(scheme=scheme, quantity="history").notnull().any())
             assert (advice.scheme_words(scheme) in drawn) == has_points
+        (legend,) = next(one for one in found if one.name == "trade").drawing.legends
+        assert any("automatic choice" in text.get_text() for text in legend.get_texts())
         for scene in dataset.scene.values:
             assert any(axes.get_title(loc="left") == scene for axes in found[0].drawing.axes)
 
@@ -283,6 +324,7 @@ def test_figures_are_drawn_with_what_there_is() -> None:
         ("reference_modes = 3", r"question.reference_modes: must be >= 4"),
         ("mode_counts = [1, 8]\nreference_modes = 8", r"question.reference_modes: .*more than 8"),
         ("wanted = [2.0]", r"question.wanted.0: must be < 1"),
+        ("tolerances = [1e-2, 1e-3]", r"question.tolerances: a list in ascending order"),
         ("mode_count = [1]", r'question.mode_count: unknown key.*did you mean "mode_counts"'),
         ("[question.scenes.a]\n'carriage.table.mas' = 3", r'question.scenes.a: .*table.mas: unknown key.*"mass"'),
         ("[question.scenes.a]\n'body.bed.modes' = 'few'", r"question.scenes.a: .*body.bed.modes"),
@@ -320,7 +362,8 @@ def test_a_study_without_options_has_one_scene_and_everything() -> None:
     study = engine.load(precision.with_question(""))
     kind = studies.kind_named("work-precision")
     names = [piece.name for piece in kind.pieces(study)]
-    assert names == ["steps-the-scene", "solvers-the-scene", "modes-the-scene"]
+    automatic = [f"automatic-{tolerance}-the-scene" for tolerance in ("0-0001", "0-001", "0-01")]
+    assert names == ["steps-the-scene", "solvers-the-scene", "modes-the-scene", *automatic]
 
 
 def test_nothing_measured_is_refused() -> None:

@@ -147,6 +147,47 @@ def test_the_lead_takes_the_loosest_accuracy_whatever_the_order() -> None:
     assert "within 0.01" in lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-6, 1e-2)
 
 
+def with_automatic(dataset: xr.Dataset, tolerance: float, factors: tuple[float, ...], errors: tuple[float, ...]) -> str:
+    """What is said of automatic choices that cost so many times the front, and err so many times the tolerance."""
+    for scene, factor, error in zip(map(str, dataset.scene.values), factors, errors, strict=True):
+        place = {"scene": scene, "asked_tolerance": tolerance}
+        best = plain_choice(dataset, scene, "history", tolerance)
+        dataset.automatic_seconds_per_variant.loc[place] = factor * (best[0] if best else 1.0)
+        dataset.automatic_error.loc[place] = error * tolerance
+    return advice._automatic(trade.automatic_choices(dataset, tolerance), tolerance)
+
+
+def test_the_automatic_choice_is_compared_with_the_front() -> None:
+    dataset = precision.small().copy(deep=True)
+    assert with_automatic(dataset, 0.1, (1.8, 0.5), (0.25, 0.9)) == (
+        "The automatic choice at 0.1 costs at most 1.8 times the front at the error asked (light), in all 2 scenes. "
+        "Its histories err 0.25 to 0.9 times what was asked."
+    )
+    assert with_automatic(dataset, 0.1, (0.4, 3.5), (0.25, 1.5)) == (
+        "The automatic choice at 0.1 costs at most 3.5 times the front at the error asked (heavy and slow), in all 2 "
+        "scenes. Its histories err 0.25 to 1.5 times what was asked, too much in heavy and slow."
+    )
+    diverged = with_automatic(dataset, 0.1, (0.4, 3.5), (0.25, np.nan))
+    assert diverged.endswith("err 0.25 to infinitely many times what was asked, too much in heavy and slow.")
+
+
+def test_the_automatic_choice_is_not_compared_with_what_is_not_there() -> None:
+    dataset = precision.small().copy(deep=True)
+    assert with_automatic(dataset, 0.01, (1.0, 1.0), (0.5, 0.5)) == (
+        "The automatic choice at 0.01 cannot be compared with the front, where no point surely errs so little. "
+        "Its histories err 0.5 times what was asked."
+    )
+    light = dataset.total_error.sel(scene="light")
+    dataset.total_error.loc[{"scene": "light"}] = light.where(light.isnull(), 1e-3)
+    said = with_automatic(dataset, 0.01, (1.2, 1.0), (0.5, 0.5))
+    assert "1.2 times the front at the error asked (light), in 1 of 2 scenes; in the others no point" in said
+    dataset.automatic_steps.loc[{"scene": "heavy and slow"}] = 0
+    assert "(light), in the one scene." in with_automatic(dataset, 0.01, (1.2, 1.0), (0.5, 0.5))
+    without = dataset.drop_vars([name for name in dataset if str(name).startswith("automatic_")])
+    assert advice.automatic(without) == []
+    assert not any("automatic" in text for text in advice.findings(without, [1e-3]))
+
+
 def point(error: float) -> trade.Choice:
     return trade.Choice(3, True, "fox-goodwin", 100, error, 1e-6)
 

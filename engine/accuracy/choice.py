@@ -1,0 +1,250 @@
+"""What every variant of a sweep is computed with, by the measured errors of its neighbours among some pilots.
+
+A variant takes the cheapest rung of the ladder on which the errors of all its nearest pilots, times a margin, are
+within its tolerance; the same largest error, times the margin of each result, is the error told for it. Distances count
+every axis by how fast the errors of pilots change along it; margins are what pilots would have needed, had they been
+left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
+from engine.accuracy.reference import Halted, is_free
+from engine.accuracy.results import Result, deciding, results_of, worst_held
+from engine.kernels.choice import cheapest, nearest
+from engine.lanes import LaneValues
+from engine.outcome import Asked
+from engine.sweep import Cases
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Share = Callable[[Sequence[Callable[[], object]]], None]
+
+SEED = 20261122  # of the pilots; audits have another
+PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times
+BAND = 128  # pilots of one job: with two jobs a scene both of two threads are busy, and tables are shared by many
+NEIGHBOURS = 6  # 4 to 8 needed alike; more smooth what the margin must cover
+SURE = 0.985  # of the errors told for pilots that were left out are no smaller than the true ones
+LOGARITHMIC = 3.0  # times the smallest value of an axis that the largest is: ratios along it may count too
+NEXT_TO_NOTHING = 0.01  # of the largest value: what is added where an axis begins at 0, for ratios
+LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out for want of pilots that tell
+NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights
+TOLERANCE = "solver.tolerance"
+DECIDING = (0.1, 2.0)  # times the tolerance: errors among which a rung is chosen
+TELLING = (0.01, 100.0)  # of the tolerance: errors beyond tell nothing of what is chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The rung of every variant. pilots (P,): their flat numbers; neighbours (V, k) numbers of pilots; rung (V,): of
+    the ladder's columns x cuts; margin (R,) of each result; held_margin: of what decides."""
+
+    ladder: Ladder
+    results: tuple[Result, ...]
+    pilots: Counts
+    measured: Measured
+    neighbours: NDArray[np.int32]
+    rung: NDArray[np.int32]
+    margin: Array
+    decisive: Array
+
+    @property
+    def work(self) -> float:
+        """Modes x steps over a passage or cycle of all that pilots marched."""
+        return self.measured.work
+
+    def errors(self, variants: Counts) -> Array:
+        """(R, V) errors told for some variants; NaN where no estimate exists."""
+        worst = np.max(self._told[self.rung[variants, None], self.neighbours[variants]], axis=1)  # of (V, k, R)
+        return np.where(np.isfinite(worst), worst, np.nan).T
+
+    def held(self, variants: Counts) -> Array:
+        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances."""
+        return np.asarray(np.max(self.decisive[self.rung[variants, None], self.neighbours[variants]], axis=1))
+
+    @cached_property
+    def _told(self) -> Array:
+        """(columns x cuts, P, R) errors of the pilots with their margins, and of their references."""
+        found = self.margin * self.measured.error + self.measured.reference.T
+        return found.reshape(-1, *found.shape[2:])
+
+
+def choose(
+    asked: Asked,
+    cases: Cases,
+    grids: Sequence[SceneGrid],
+    members: Sequence[Counts],
+    share: Share,
+    halted: Halted,
+    count: int = PILOTS,
+) -> Choice:
+    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by so many pilots. Raises
+    Halted."""
+    pilots = pilots_of(cases, members, count)
+    climbs, order, span = [], [], tolerance_span(asked, cases)
+    for grid, part in zip(grids, members, strict=True):
+        for own in _bands(grid, cases, np.intersect1d(part, pilots)):
+            columns = cases.columns_of(own)
+            if TOLERANCE in columns:  # pilots serve the tightest that has them for neighbours
+                columns = {**columns, TOLERANCE: np.full(own.size, span[0] * asked.study.solver.tolerance)}
+            values = LaneValues(grid.scene.study, columns, own.size)
+            climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, span))
+            order.append(own)
+    share([climb.go for climb in climbs])
+    return _chosen(asked, cases, climbs, np.concatenate(order))
+
+
+def _bands(grid: SceneGrid, cases: Cases, pilots: Counts) -> list[Counts]:
+    """The pilots of a scene by their pace, as those of like pace share steps: as many jobs as keep a few threads
+    busy."""
+    if not pilots.size:
+        return []
+    values = LaneValues(grid.scene.study, cases.columns_of(pilots), pilots.size)
+    order = np.argsort(values.time_scale(grid.scene.carriages[0].name), kind="stable")
+    return np.array_split(pilots[order], -(-pilots.size // BAND))
+
+
+def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts) -> Choice:
+    """The choice, once the pilots (by flat numbers in the order of their climbs) are measured."""
+    results = results_of(asked)
+    measured = _joined([climb.measured() for climb in climbs])
+    ladder = climbs[0].ladder
+    cost = _cost(climbs[0])
+    tighter = cases_tolerance(asked, cases)
+    points = coordinates(cases, np.arange(cases.size))
+    weights = _weights(points[order], measured)
+    points = np.ascontiguousarray(points * weights)
+    neighbours = _neighbours(np.ascontiguousarray(points[order]), points, NEIGHBOURS)
+    telling = (DECIDING[0] * climbs[0].span[0], DECIDING[1] * climbs[0].span[1])
+    margin, held_margin = _margins(measured, np.ascontiguousarray(points[order]), results, telling)
+    held = held_margin * measured.held
+    if is_free(climbs[0].grid):  # what is told is what decides
+        error = margin * measured.error + measured.reference.T
+        held = worst_held(np.moveaxis(error, -1, 0), deciding(results, asked.study.solver.tolerance))
+    held = np.where(np.isnan(held), 0.0, held).reshape(-1, order.size)  # of pilots without a truth, which say nothing
+    rung = np.empty(cases.size, dtype=np.int32)
+    ranked = np.argsort(cost, kind="stable").astype(np.int32)
+    ranked = ranked[np.isfinite(held[ranked]).any(axis=1)]
+    worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
+    cheapest(held, ranked, worth, neighbours, tighter, rung)
+    return Choice(ladder, results, order, measured, neighbours, rung, margin, held)
+
+
+def pilots_of(cases: Cases, members: Sequence[Counts], count: int = PILOTS) -> Counts:
+    """Flat numbers of so many pilots, drawn at random: of a few scenes where there are many."""
+    random = np.random.default_rng(SEED)
+    chosen = random.permutation(len(members))[: max(1, min(MOST_SCENES, count // LEAST_IN_SCENE))]
+    pool = np.concatenate([members[number] for number in np.sort(chosen)])
+    return np.sort(random.permutation(pool)[:count])
+
+
+LEAST_IN_SCENE = 8  # pilots of a scene, where there are so many
+MOST_UNHELD = 5e6  # modes x steps, about two milliseconds, that a variant takes whose tolerance nothing holds
+MOST_SCENES = 24  # that pilots are drawn from: each climbs the ladder by tables of its own, about a second
+
+
+def cases_tolerance(asked: Asked, cases: Cases) -> Array:
+    """(V,) `solver.tolerance` of every variant over the study's."""
+    if TOLERANCE not in cases.paths:
+        return np.ones(cases.size)
+    return cases.column(TOLERANCE) / asked.study.solver.tolerance
+
+
+def tolerance_span(asked: Asked, cases: Cases) -> tuple[float, float]:
+    """The least and the largest of them."""
+    found = cases_tolerance(asked, cases)
+    return float(found.min()), float(found.max())
+
+
+def coordinates(cases: Cases, variants: Counts) -> Array:
+    """(V, D) places of variants along the axes of the sweep, from 0 to 1; where an axis spans large ratios these too:
+    the pilots tell which of both counts."""
+    positions = cases.positions(variants)
+    columns = []
+    for axis in cases.axes:
+        values = np.asarray(axis.values, dtype=np.float64)
+        low, high = values.min(), values.max()
+        if low == high or axis.paths == (TOLERANCE,):
+            continue
+        columns.append(_unit(values)[positions[axis.dim]])
+        if low >= 0.0 and high > LOGARITHMIC * low:
+            columns.append(_unit(np.log(values + (NEXT_TO_NOTHING * high if low == 0.0 else 0.0)))[positions[axis.dim]])
+    return np.stack(columns, axis=1) if columns else np.zeros((variants.size, 1))
+
+
+def _unit(values: Array) -> Array:
+    """Values from 0 to 1."""
+    return np.asarray((values - values.min()) / (values.max() - values.min()))
+
+
+def _weights(points: Array, measured: Measured) -> Array:
+    """(D,) how much each axis counts: squares of differences in the logarithm of errors between near pilots, as sums of
+    weighted squares of their distances along the axes, by least squares without negative weights."""
+    from scipy.optimize import nnls
+
+    held = measured.held[measured.marched]
+    logs = np.log(np.clip(held, *TELLING))
+    logs = logs[(logs.max(axis=1) - logs.min(axis=1)) > 0.1]
+    one, other = np.triu_indices(len(points), 1)
+    apart = (points[one] - points[other]) ** 2
+    near = np.argsort(apart.sum(axis=1), kind="stable")[: NEAR_PAIRS * len(points)]
+    if not logs.size or not near.size:
+        return np.ones(points.shape[1])
+    change = np.mean((logs[:, one[near]] - logs[:, other[near]]) ** 2, axis=0)
+    found = nnls(apart[near], change)[0]
+    return np.sqrt(np.maximum(found, LEAST_WEIGHT * found.max())) if found.max() > 0.0 else np.ones(points.shape[1])
+
+
+def _neighbours(pilots: Array, points: Array, count: int) -> NDArray[np.int32]:
+    """(V, k) numbers of the nearest pilots."""
+    found = np.empty((len(points), min(count, len(pilots))), dtype=np.int32)
+    nearest(points, pilots, found)
+    return found
+
+
+def _margins(
+    measured: Measured, pilots: Array, results: tuple[Result, ...], telling: tuple[float, float]
+) -> tuple[Array, float]:
+    """(R,) what the largest error of a pilot's neighbours must be multiplied with to be no less than its own, for all
+    but a few; and the same of what is held, for errors about the tolerance."""
+    others = _neighbours(pilots, pilots, NEIGHBOURS + 1)[:, 1:]  # the nearest is itself
+    if not others.shape[1]:
+        return np.ones(len(results)), 1.0
+    held, error = measured.held[measured.marched], measured.error[measured.marched]
+    told = np.max(held[:, others], axis=2)
+    near = np.nonzero(np.isfinite(told) & np.isfinite(held) & (told > telling[0]) & (told < telling[1]))
+    own, worst = error[near], np.max(error[near[0][:, None], others[near[1]]], axis=1)
+    margin = np.array([_quantile(own[:, number], worst[:, number]) for number in range(len(results))])
+    return margin, _quantile(held[near], told[near])
+
+
+def _quantile(own: Array, told: Array) -> float:
+    """The ratio of errors to what is told of them that few are beyond."""
+    known = (told > 0.0) & np.isfinite(own) & np.isfinite(told)
+    return float(max(1.0, np.quantile(own[known] / told[known], SURE))) if known.any() else 1.0
+
+
+def _cost(climb: Climb) -> Array:
+    """(columns x cuts,) modes x steps of every rung; nothing for statics."""
+    grid, ladder = climb.grid, climb.ladder
+    modes = [0 if c.fidelity == "static" else grid.model(c).body_modes for c in ladder.columns]
+    return np.asarray(np.outer(modes, grid.unit * np.array(ladder.cuts, dtype=np.float64)).reshape(-1))
+
+
+def _joined(parts: Sequence[Measured]) -> Measured:
+    """The pilots of all scenes."""
+    return Measured(
+        np.concatenate([part.error for part in parts], axis=2),
+        np.concatenate([part.held for part in parts], axis=2),
+        np.concatenate([part.reference for part in parts], axis=1),
+        np.any([part.marched for part in parts], axis=0),
+        sum(part.work for part in parts),
+    )

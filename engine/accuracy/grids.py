@@ -1,0 +1,155 @@
+"""One scene as all its marches see it: cut at its events by a coarse grid, on which marches of any steps meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.envelopes import with_companions
+from engine.kernels.schemes import SCHEMES
+from engine.lanes import LaneValues
+from engine.model import SceneModel, with_numerics
+from engine.numerics import Numerics, open_bodies
+from engine.outcome import Asked
+from engine.sensors import MOST_PLACES
+from engine.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
+from engine.tables import SceneTables, StaticUnit, kinks
+from engine.timeline import Grid, build_grid, refined
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+#: Steps of the grid over a passage, or over each of the two strokes of a cycle. The cheapest march that holds 1e-2 took
+#: 32 to 64 (208 passages), 50 over a cycle of a shuttle; the 200 phases of kept histories are a multiple of those.
+PASSAGE_STEPS, CYCLE_STEPS = 32, 50
+PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3
+MOST_COMPARED = 4096  # stations of the histories that are compared: 0.5 MB of 16 variants each signal
+LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
+
+
+@dataclass(eq=False)
+class SceneGrid:
+    """A scene of the study with all its variants' numbers (``values``).
+
+    unit: steps of the grid per unit of scene time; as many as the study fixes, where it fixes them. places: of each
+    envelope that marches watch, at most.
+    """
+
+    asked: Asked
+    scene: SceneModel
+    values: LaneValues
+    unit: int
+    places: int = MOST_PLACES
+    _models: dict[Numerics, SceneModel] = field(default_factory=dict)
+    _readings: dict[tuple[str, int], StaticUnit] = field(default_factory=dict)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The scene cut at its events, and where loads pass kinks of influence lines."""
+        model, whole = self.scene, self.asked.window == "whole"
+        stops = kinks(model, SceneTables(model, 1, self.asked.window).sensors) if whole and not self.fixed else ()
+        return build_grid(model.riders, self.unit, self.asked.window, self._free_unit, stops)
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the study says how many steps."""
+        return fixed_steps(self.values)
+
+    @property
+    def _free_unit(self) -> int:
+        """Steps of the grid per first period of free vibration: as in the mean passage."""
+        scale = self.values.time_scale(self.scene.carriages[0].name)
+        if self.fixed:
+            free, pairs = free_steps(self.scene), self.scene.scheme.stride
+            return free if pairs == 1 else max(-(-free // pairs), self.unit)  # whose whole histories come closer
+        passage = float(np.exp(np.mean(np.log(scale)))) * self.scene.first_omega / (2.0 * np.pi)
+        return max(LEAST_FREE, int(np.ceil(self.unit / passage)))
+
+    @property
+    def readings(self) -> Literal["contacts", "accelerations"]:
+        """What marches read besides the sensors."""
+        return "accelerations" if self.asked.accelerated else "contacts"
+
+    def of_pilots(self) -> SceneGrid:
+        """The same scene for marches that only measure errors: envelopes at a few places."""
+        return replace(self, places=PILOT_PLACES)
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the study leaves model, modes or scheme open."""
+        solver = self.asked.study.solver
+        return bool(open_bodies(self.asked.study)) or solver.fidelity == "auto" or solver.scheme == "auto"
+
+    def model(self, numerics: Numerics) -> SceneModel:
+        """The scene with other numerics, the same object for the same."""
+        if numerics not in self._models:
+            self._models[numerics] = with_numerics(self.scene, numerics)
+        return self._models[numerics]
+
+    def free_by(self, model: SceneModel, by: int) -> int:
+        """Steps of a march in one of the grid's free vibration, within its scheme's limit."""
+        least = 2.0 * np.pi * LIMIT_MARGIN * float(model.omega.max()) / model.first_omega / model.scheme.stability_limit
+        return by * max(1, int(np.ceil(least / (self._free_unit * by))))
+
+    def once(self, model: SceneModel, by: int) -> SceneTables:
+        """The same for one march alone."""
+        found = self.tables(model, by)
+        if not found.timeline.repeats:
+            found.kept_bytes = 0
+        return found
+
+    def tables(self, model: SceneModel, by: int) -> SceneTables:
+        """The tables of a march with ``by`` steps in one of the grid's; a pair's coarser march has as many."""
+        stride = model.scheme.stride
+        found = SceneTables(model, self.unit * by * stride, self.asked.window, self.readings, stride)
+        found.timeline = refined(self.grid.timeline(by, self.free_by(model, by * stride) // stride), stride)
+        found.static_over_window = self._statics(model)
+        return with_companions(found, self.places)
+
+    def _statics(self, model: SceneModel) -> StaticUnit:
+        """Static readings along the way: where all modes are known they are the scene's own, to the last bit, whichever
+        march asks first."""
+        numerics = model.numerics
+        key = (numerics.fidelity, 0 if numerics.static_correction else model.body_modes)
+        if key not in self._readings:
+            corrected = self.scene.numerics._replace(fidelity=numerics.fidelity, static_correction=True)
+            teller = self.model(corrected) if numerics.static_correction else model
+            own = SceneTables(teller, self.unit, self.asked.window, self.readings)
+            own.timeline = self.grid.timeline(1, 1)
+            self._readings[key] = own.static_over_window
+        return self._readings[key]
+
+    def stations(self, model: SceneModel, by: int) -> Counts:
+        """The grid's stations by their count in such a march; where there are very many, some of them, evenly."""
+        by *= model.scheme.stride
+        return self.grid.stations(by, self.free_by(model, by), MOST_COMPARED)
+
+    def safe_cuts(self, numerics: Numerics, values: LaneValues, by: int) -> Counts:
+        """(V,) ``by``, or the least power of two of steps that no variant's rules forbid."""
+        if self.fixed or numerics.fidelity == "static":
+            return np.full(values.size, by, dtype=np.int64)
+        model = self.model(numerics)
+        times = least_steps(model, values) / (self.unit * model.scheme.stride * by)
+        return by * np.exp2(np.ceil(np.log2(np.maximum(times, 1.0)) - 1e-9)).astype(np.int64)
+
+
+def fixed_steps(values: LaneValues) -> bool:
+    """Whether the study says how many steps."""
+    return values.study.solver.steps != "auto" or "solver.steps" in values.columns
+
+
+def unit_steps(scene: SceneModel) -> int:
+    """Steps of the grid over one passage or cycle."""
+    return PASSAGE_STEPS if scene.carriages[0].rider.motion.period is None else CYCLE_STEPS
+
+
+def swift_scheme_fits(scene: SceneModel) -> bool:
+    """Whether Fox-Goodwin may march a scene: free vibration with springs wants a scheme without a limit."""
+    return not (scene.springs and any(vibrates_freely(carriage) for carriage in scene.carriages))
+
+
+AVERAGE_ACCELERATION, FOX_GOODWIN = (SCHEMES[name]({}) for name in ("average-acceleration", "fox-goodwin"))

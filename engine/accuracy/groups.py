@@ -1,0 +1,199 @@
+"""Variants that are computed alike: marched with what was chosen for them, or level by level until they converge."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.choice import Choice
+from engine.accuracy.grids import MOST_COMPARED, SceneGrid
+from engine.accuracy.reference import Halted, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.results import differences, results_of, tolerances, worst_held
+from engine.kernels.layout import MARKS
+from engine.lanes import LaneValues
+from engine.model import SceneModel
+from engine.numerics import Numerics
+from engine.outcome import Flat, Outcome, outcome, used
+from engine.tables import SceneTables
+from engine.timeline import MOST_STATIONS
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Kept = Literal["numbers", "histories"]
+
+PACE = 1.2e9  # modes x steps x variants per second and thread of an ordinary server, for the size of chunks only
+PLACE = 0.2  # of a march of eight more modes, an envelope's place; likewise
+ANSWER_PART = 0.5  # of its tolerance by which an answer may still change from level to level
+TRUTH_PART = 0.1  # the same of the reference of an answer within what a study fixes
+USUAL_LEVEL = 2  # at which most answers converge, for the size of chunks only
+
+
+class Found(NamedTuple):
+    """What V variants report, what they were computed with (by the names of the archive), the errors told (R, V), and
+    the largest of those that are held, less what the study fixes, over their tolerances (V,)."""
+
+    outcome: Outcome
+    used: Flat
+    error: Array
+    held: Array
+
+
+@dataclass(eq=False)
+class Group:
+    """Variants of one scene that are computed alike."""
+
+    grid: SceneGrid
+    variants: Counts
+
+    @property
+    def scene(self) -> SceneModel:
+        """The scene as the study has it."""
+        return self.grid.scene
+
+    @abstractmethod
+    def found(
+        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+    ) -> Found:
+        """The results of some of its variants; kept: with the histories at the grid's stations or not. Raises
+        Halted."""
+
+    @property
+    @abstractmethod
+    def work(self) -> float:
+        """Modes x steps of a variant, all that it takes."""
+
+    @property
+    @abstractmethod
+    def tables(self) -> SceneTables:
+        """The tables of a march, as coarse as any of its variants takes."""
+
+    @property
+    def steps(self) -> int:
+        """Steps of that over one passage or cycle."""
+        return self.tables.steps
+
+    @property
+    @abstractmethod
+    def usual_steps(self) -> int:
+        """Steps over one passage or cycle that most of its variants take."""
+
+    @property
+    def chunk_bytes(self) -> float:
+        """Bytes of a variant's histories and marks while it is marched."""
+        asked, study = self.grid.asked, self.scene.study
+        steps = self.usual_steps
+        rows = (
+            min(2 * asked.reduction.stations, steps)
+            if asked.reduction is not None
+            else min(self.grid.unit, MOST_COMPARED)
+        )
+        places = max((envelope.places for envelope in study.envelope.values()), default=0)
+        signals = len(study.sensor) + len(self.scene.carriages)
+        found = 8.0 * rows * max(1, len(study.sensor)) + 8.0 * MARKS * max(signals, places)
+        pair = 24.0 * min(steps, MOST_STATIONS) * max(signals, places)  # which has all histories of a segment
+        return found + (pair if self.scene.scheme.stride > 1 else 0.0)
+
+    @cached_property
+    def seconds_per_variant(self) -> float:
+        """Expected time on one thread."""
+        signals, study = 1.0 + 0.1 * (len(self.scene.study.sensor) + len(self.scene.carriages)), self.scene.study
+        places = PLACE * sum(envelope.places for envelope in study.envelope.values())
+        units = max(rider.end for rider in self.scene.riders)
+        return float(self.work * units * (signals + places) * max(1.0, self.scene.ties**1.2) / PACE)
+
+    def forget(self) -> None:
+        """Drop the tables, when no chunk needs them any more."""
+
+
+@dataclass(eq=False)
+class MarchGroup(Group):
+    """Variants that share what was chosen for them: numerics, and the steps in one of the grid's."""
+
+    numerics: Numerics
+    by: int
+
+    @cached_property
+    def model(self) -> SceneModel:
+        """The scene with these numerics."""
+        return self.grid.model(self.numerics)
+
+    @cached_property
+    def _tables(self) -> SceneTables:
+        return self.grid.tables(self.model, self.by)
+
+    @property
+    def tables(self) -> SceneTables:
+        return self._tables
+
+    @property
+    def usual_steps(self) -> int:
+        return self.steps
+
+    @property
+    def work(self) -> float:
+        return float(self.model.body_modes * self.tables.steps)
+
+    def found(
+        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+    ) -> Found:
+        results = results_of(self.grid.asked)
+        stations = self.grid.stations(self.model, self.by)
+        now = outcome(self.grid.asked, self.tables, values, stations if kept == "histories" else stations[:0], halted)
+        unknown = np.full((len(results), variants.size), np.nan)
+        if choice is None:
+            return Found(now, used(self.tables, variants.size), unknown, unknown[0])
+        tighter = values.of("solver.tolerance") / self.scene.study.solver.tolerance
+        held = choice.held(variants) / tighter
+        if not np.isfinite(tolerances(results)).any():
+            held = np.full(variants.size, -np.inf)  # what is only told decides, and misses nothing
+        return Found(now, used(self.tables, variants.size), choice.errors(variants), held)
+
+    def forget(self) -> None:
+        self.tables.forget()
+
+
+@dataclass(eq=False)
+class ConvergingGroup(Group):
+    """Variants of one scene, each with as many modes and steps as it needs."""
+
+    @property
+    def work(self) -> float:
+        levels, values = as_fixed(self.grid), self.grid.values
+        own = float(np.mean(level_work(self.grid, values, levels, min(USUAL_LEVEL, len(levels.numerics) - 1))))
+        return (
+            1.3 * own
+            if is_free(self.grid)
+            else own + 1.3 * float(np.mean(level_work(self.grid, values, in_full(self.grid), USUAL_LEVEL)))
+        )
+
+    @property
+    def usual_steps(self) -> int:
+        levels = as_fixed(self.grid)
+        level = min(USUAL_LEVEL, len(levels.numerics) - 1)
+        modes = self.grid.model(levels.numerics[level]).body_modes
+        return int(level_work(self.grid, self.grid.values, levels, level).max() / modes)
+
+    @property
+    def tables(self) -> SceneTables:
+        """The tables of a march as the study fixes it."""
+        return self.grid.tables(self.grid.model(as_fixed(self.grid).numerics[0]), 1)
+
+    def found(
+        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+    ) -> Found:
+        asked, results = self.grid.asked, results_of(self.grid.asked)
+        levels = as_fixed(self.grid)
+        own = converge(self.grid, values, levels, ANSWER_PART, halted=halted)
+        tighter = values.of("solver.tolerance") / asked.study.solver.tolerance
+        if is_free(self.grid):
+            return Found(own.outcome, own.used, own.error, worst_held(own.error, results, tighter))
+        truth = converge(self.grid, values, in_full(self.grid), TRUTH_PART, halted=halted)
+        apart = differences(asked, self.scene, values, own.outcome, truth.outcome) + truth.error
+        left_open = len(levels.numerics) > 1
+        held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)
+        return Found(own.outcome, own.used, apart, held)

@@ -1,0 +1,249 @@
+"""The ladder of what a variant may be computed with, and the measured error of every rung for some variants (pilots).
+
+A column of the ladder is a model, a number of modes and a scheme; its rungs are numbers of steps. A pilot climbs each
+column that can hold its tolerance at all until the error is small or no longer falls; from there on, finer rungs count
+as no worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, swift_scheme_fits
+from engine.accuracy.reference import Converged, Halted, as_fixed, converge, in_full, is_free
+from engine.accuracy.results import deciding, differences, results_of, worst_held
+from engine.kernels.schemes import Scheme
+from engine.lanes import LaneValues
+from engine.model import SceneModel
+from engine.numerics import Numerics, open_bodies
+from engine.outcome import Asked, outcome
+from engine.step_rules import least_steps
+from results_schema.status import Fidelity
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+MODES = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # each a third to a half more than the one before
+SIMPLER = (("static", Fidelity.STATIC), ("force", Fidelity.FORCE), ("mass", Fidelity.MASS))  # than the carriages' own
+CUTS = tuple(sorted({2**k for k in range(16)} | {3 * 2**k for k in range(15)}))  # steps in one of the grid's
+#: Steps at which a column's modes are judged, per first period and in one of the grid's: by Fox-Goodwin (1e-7 of phase
+#: a period), and by schemes of second order (5e-5).
+FINE = {"fox-goodwin": (64.0, 8.0), "": (256.0, 16.0)}
+HOPELESS = 0.9  # of the tolerance that a column leaves at such steps: its coarser rungs leave more
+FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer has held 1e-2
+FLAT = 1.2  # times what a column leaves: finer rungs gain nothing
+MORE = 2.0  # times the fewest modes that leave little: nobody chooses more
+JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all
+ENOUGH = 0.3  # of the tolerance: pilots climb no further, as nobody chooses what is finer
+REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be too
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The columns of a study's ladder, and the steps of their rungs in those of the grid."""
+
+    columns: tuple[Numerics, ...]
+    cuts: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What P pilots found: error (columns, cuts, P, R) of every result, infinite where it is not known; held (columns,
+    cuts, P): the largest of those that are held, without what the study itself fixes, over their tolerances;
+    reference (R, P): the errors of the references themselves; marched (columns, cuts): rungs that any has marched;
+    work: modes x steps over a passage or cycle of all their marches."""
+
+    error: Array
+    held: Array
+    reference: Array
+    marched: NDArray[np.bool_]
+    work: float
+
+
+def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
+    """The ladder within what the study fixes."""
+    study, own = asked.study, grid.scene.numerics
+    names = open_bodies(study)
+    rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
+    modes = [count for count in MODES if count > rigid] if names else [0]
+    schemes = [own.scheme]
+    if study.solver.scheme == "auto" and not grid.fixed:
+        schemes = [AVERAGE_ACCELERATION, FOX_GOODWIN] if swift_scheme_fits(grid.scene) else [AVERAGE_ACCELERATION]
+    columns = [
+        own._replace(fidelity=name, scheme=scheme, modes=count)
+        for name in _models(asked, grid)
+        for count in (modes[:1] if name == "static" and own.static_correction else modes)
+        for scheme in (schemes[:1] if name == "static" else schemes)
+    ]
+    return Ladder(tuple(columns), (1,) if grid.fixed else CUTS)
+
+
+def _models(asked: Asked, grid: SceneGrid) -> list[str]:
+    """Models to choose from, the simplest first."""
+    own = grid.scene.numerics
+    if own.fidelity != "auto":
+        return [own.fidelity]
+    found = [name for name, model in SIMPLER if asked.least_fidelity <= model < grid.scene.fidelity]
+    if not own.static_correction:  # statics know the kept modes alone
+        found = [name for name in found if name != "static"]
+    if any(carriage.rides is not None for carriage in grid.scene.carriages):
+        found = [name for name in found if name == "static"]
+    return [*found, "auto"]
+
+
+@dataclass(eq=False)
+class Climb:
+    """Pilots of one scene on the ladder. span: the least and the largest `solver.tolerance` that a variant wants, over
+    the study's; ``values`` have the least."""
+
+    grid: SceneGrid
+    values: LaneValues
+    ladder: Ladder
+    halted: Halted
+    span: tuple[float, float] = (1.0, 1.0)
+    truth: Converged = field(init=False)
+    aim: Converged = field(init=False)
+    error: Array = field(init=False)
+    held: Array = field(init=False)
+    marched: NDArray[np.bool_] = field(init=False)
+    floor: dict[int, Array] = field(init=False)
+    enough: dict[str, Array] = field(init=False)
+    work: Array = field(init=False)
+
+    def go(self) -> None:
+        """Find the references of the pilots, what each model and number of modes can do for them, and with how many
+        steps. Raises Halted."""
+        full = converge(self.grid, self.values, in_full(self.grid), REFERENCE_PART, halted=self.halted)
+        self.truth, self.aim = full, full
+        if not is_free(self.grid):
+            self.aim = converge(self.grid, self.values, as_fixed(self.grid), REFERENCE_PART, halted=self.halted)
+        shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
+        self.error = np.full((*shape, len(full.error)), np.inf)
+        self.held = np.full(shape, np.inf)
+        self.marched, self.work = np.zeros(shape[:2], dtype=np.bool_), np.zeros(shape[0])
+        self.floor, self.enough = {}, {}
+        for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
+            self._judge(name)
+        for column in self.floor:
+            self._climb(column)
+        for name, enough in self.enough.items():
+            self._fill(name, enough)
+
+    def measured(self) -> Measured:
+        """What the jobs found."""
+        work = float(self.work.sum() + self.truth.spent.sum())
+        return Measured(self.error, self.held, self.truth.error, self.marched, work)
+
+    def _judge(self, name: str) -> None:
+        """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave
+        so little that many more are of no use."""
+        own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
+        everywhere = np.ones(self.values.size, dtype=np.bool_)
+        if name == "static" or len(self.ladder.cuts) == 1:
+            for column in own:
+                self._march(
+                    column, 0, np.flatnonzero(self._least(column)[0] <= 1.0 if name != "static" else everywhere)
+                )
+            return
+        families: dict[int, list[int]] = {}
+        for column in own:
+            families.setdefault(self.ladder.columns[column].modes, []).append(column)
+        if name != self.grid.scene.numerics.fidelity:
+            modes = next((count for count in families if count >= JUDGED_BY), max(families))
+            everywhere = self._floor(families[modes][-1], everywhere) <= HOPELESS * self.span[1]
+        enough = np.full(self.values.size, np.inf)
+        for count, columns in families.items():
+            floor = self._floor(columns[-1], everywhere & (count <= MORE * enough))
+            enough = np.where((floor <= ENOUGH * self.span[0]) & ~np.isfinite(enough), count, enough)
+            self.floor |= dict.fromkeys(columns, floor)
+        self.enough[name] = enough
+
+    def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
+        """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these
+        would be more work than the reference."""
+        cuts, fine = np.array(self.ladder.cuts), self._fine(column)
+        if not fits.any():
+            return np.full(self.values.size, np.inf)
+        work = cuts[np.minimum(fine, cuts.size - 1)] * self._unit(column) * self._model(column).body_modes
+        lanes = np.flatnonzero(fits & (fine < cuts.size) & (work <= self.truth.used["work"]))
+        for rung in np.unique(fine[lanes]):
+            self._march(column, int(rung), lanes[fine[lanes] == rung])
+        found = np.full(self.values.size, np.inf)
+        found[lanes] = self.held[column, fine[lanes], lanes]
+        return found
+
+    def _climb(self, column: int) -> None:
+        """From the coarsest rung that each pilot may take, until nothing is gained."""
+        floor = self.floor[column]
+        worth = floor <= HOPELESS * self.span[1]
+        if not worth.any():
+            return
+        cuts, fine = np.array(self.ladder.cuts), self._fine(column)
+        least, periods = self._least(column)
+        rung = np.searchsorted(cuts, np.maximum(least, FIRST / self._unit(column) * periods))
+        active = np.flatnonzero(worth & (rung < np.minimum(fine, cuts.size)))
+        while active.size:
+            here = int(rung[active].min())
+            own = active[rung[active] == here]
+            self._march(column, here, own)
+            small = self.held[column, here, own] <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
+            rung[own] += 1
+            done = own[small | (rung[own] >= np.minimum(fine[own], cuts.size))]
+            active = active[~np.isin(active, done)]
+
+    def _fill(self, name: str, enough: Array) -> None:
+        """Pilots for which fewer modes were enough are no worse with more and the same steps, within their rules."""
+        before: dict[Scheme, int] = {}
+        for column, numerics in enumerate(self.ladder.columns):
+            if numerics.fidelity != name:
+                continue
+            previous = before.get(numerics.scheme)
+            lanes = np.flatnonzero((numerics.modes > MORE * enough) & ~np.isfinite(self.held[column]).any(axis=0))
+            if previous is not None and lanes.size:
+                allowed = np.array(self.ladder.cuts)[:, None] >= self._least(column)[0][lanes]
+                self.held[column][:, lanes] = np.where(allowed, self.held[previous][:, lanes], np.inf)
+                self.error[column][:, lanes] = np.where(allowed[..., None], self.error[previous][:, lanes], np.inf)
+            before[numerics.scheme] = column
+
+    def _fine(self, column: int) -> Counts:
+        """(P,) the rung at which a column's modes are judged."""
+        least, periods = self._least(column)
+        of_period, of_grid = FINE.get(self._model(column).scheme.name, FINE[""])
+        wanted = np.maximum(least, np.maximum(of_period / self._unit(column) * periods, of_grid))
+        return np.searchsorted(np.array(self.ladder.cuts), wanted)
+
+    def _least(self, column: int) -> tuple[Array, Array]:
+        """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
+        model = self._model(column)
+        periods = self.values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
+        return least_steps(model, self.values) / self._unit(column), periods
+
+    def _model(self, column: int) -> SceneModel:
+        return self.grid.model(self.ladder.columns[column])
+
+    def _unit(self, column: int) -> int:
+        """Steps of the lowest rung over one passage or cycle."""
+        return self.grid.unit * self.ladder.columns[column].scheme.stride
+
+    def _march(self, column: int, rung: int, lanes: Counts) -> None:
+        """March some pilots on a rung; finer ones are no worse."""
+        if not lanes.size:
+            return
+        model, by, values = self._model(column), self.ladder.cuts[rung], self.values.part(lanes)
+        tables = self.grid.once(model, by)
+        now = outcome(self.grid.asked, tables, values, self.grid.stations(model, by), self.halted)
+        tables.forget()
+        results = deciding(results_of(self.grid.asked), self.grid.asked.study.solver.tolerance)
+        error = differences(self.grid.asked, model, values, now, self.truth.outcome.of(lanes))
+        against = error
+        if self.aim is not self.truth:
+            against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
+        held = worst_held(against, results)
+        self.marched[column, rung] = True
+        self.work[column] += lanes.size * model.body_modes * tables.steps
+        for finer in range(rung, len(self.ladder.cuts)):
+            self.error[column, finer, lanes] = error.T
+            self.held[column, finer, lanes] = held

@@ -1,0 +1,237 @@
+"""Marches with more and more modes and steps until what they report stays where it is: the truth that errors are
+measured against, and the answer of studies of few variants.
+
+The levels double the modes and take the steps that Fox-Goodwin needs for them, four times as many each. What a result
+still changes from one level to the next, d, bounds the error of the level before; its own is about d r/(1 - r), r being
+the ratio of two changes in a row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import (
+    AVERAGE_ACCELERATION,
+    FOX_GOODWIN,
+    SceneGrid,
+    swift_scheme_fits,
+    unit_steps,
+)
+from engine.accuracy.results import Result, deciding, differences, results_of, worst_held
+from engine.kernels.schemes import Scheme
+from engine.lanes import LaneValues
+from engine.numerics import Numerics, open_bodies
+from engine.outcome import Flat, Outcome, outcome, used
+from engine.step_rules import least_steps
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Halted = Callable[[], bool]
+
+MODES = (4, 8, 16, 32, 64)  # of the levels: 64 are what a beam's closed forms were tested for
+#: Modes x steps over a passage or cycle of one march at most: some ten milliseconds. 24 modes and 4,800 steps hold 1e-3
+#: for the hardest passage of accuracy.md; undamped loads that step on free ends needed a hundred times that at 1e-4.
+MOST_WORK = 3e7
+#: Modes x steps over the whole time of a march that a reference is not worth which is off by less than so much of the
+#: tolerance: in the built-in shuttles such marches were nine tenths of all, and the choice was the same.
+DEAR, DOUBTED = 1e7, 0.4
+FIRST_PERIODS = 20  # steps per first period of average acceleration at level 0: 8e-3 of phase, 2e-6 at level 3
+MARGIN = 1.25  # times the rules that no march may break: bands of growth end at 1.1 (`fidelity.LEAST_MARGIN`)
+#: Of d: the errors told of 200 passages and a train of 61 speeds were 1 to 10 times the true ones for nine tenths.
+SAFETY, LEAST_PART, MOST_PART, FIRST_PART = 3.0, 0.2, 9.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Converged:
+    """What V variants report by the last of their levels: error (R, V) of every result, NaN where no estimate exists;
+    used (V,) by the names of the archive; settled (V,): whether the held results changed by less than was wanted; spent
+    (V,): modes x steps of all levels."""
+
+    outcome: Outcome
+    error: Array
+    used: Flat
+    settled: NDArray[np.bool_]
+    spent: Array
+
+
+class Levels(NamedTuple):
+    """What is marched level by level; steps: whether these grow too, or are as the study says."""
+
+    numerics: tuple[Numerics, ...]
+    steps: Literal["grow", "as the study says"]
+
+
+def in_full(grid: SceneGrid) -> Levels:
+    """The levels with all terms, whatever the study fixes."""
+    return Levels(
+        tuple(Numerics("full", _scheme(grid), True, modes, 2**level) for level, modes in _modes(grid)), "grow"
+    )
+
+
+def as_fixed(grid: SceneGrid) -> Levels:
+    """The levels within what the study fixes."""
+    study, own = grid.scene.study, grid.scene.numerics
+    scheme: Scheme = own.scheme
+    if study.solver.scheme == "auto" and not grid.fixed:
+        scheme = _scheme(grid)
+    levels = [modes for _, modes in _modes(grid)] if open_bodies(study) else [0] * (1 if grid.fixed else len(MODES))
+    numerics = tuple(own._replace(scheme=scheme, modes=modes) for modes in levels)
+    return Levels(numerics, "as the study says" if grid.fixed else "grow")
+
+
+def _scheme(grid: SceneGrid) -> Scheme:
+    """Fox-Goodwin where the modes grow with the levels; the limit of the highest of modes that a study fixes, most of
+    which hardly move, would ask for far more steps than average acceleration needs."""
+    fits = bool(open_bodies(grid.scene.study)) and swift_scheme_fits(grid.scene)
+    return FOX_GOODWIN if fits else AVERAGE_ACCELERATION
+
+
+def _modes(grid: SceneGrid) -> Iterator[tuple[int, int]]:
+    """The levels with their modes; those that hold nothing but motions as a rigid body are left out."""
+    names = open_bodies(grid.scene.study)
+    rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
+    yield from enumerate(modes for modes in MODES if modes > rigid + 1)
+
+
+def is_free(grid: SceneGrid) -> bool:
+    """Whether the study fixes nothing that the levels in full would change."""
+    study = grid.scene.study
+    closed = [study.body[part.name] for part in grid.scene.bodies if part.name not in open_bodies(study)]
+    whole = all(body.with_more_modes(2) == body for body in closed)
+    terms = study.solver.fidelity in ("auto", "full") and study.solver.static_correction
+    return whole and terms and study.solver.scheme == "auto" and not grid.fixed
+
+
+def converge(
+    grid: SceneGrid,
+    values: LaneValues,
+    levels: Levels,
+    part: float,
+    beyond: int = 0,
+    halted: Halted = lambda: False,
+) -> Converged:
+    """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and ``beyond``
+    levels more that are not dear. Raises Halted."""
+    asked, results = grid.asked, results_of(grid.asked)
+    decisive = deciding(results, asked.study.solver.tolerance)
+    tighter = part * values.of("solver.tolerance") / grid.asked.study.solver.tolerance
+    now, spent = _march(grid, values, levels, 0, halted)
+    found = Converged(
+        now,
+        np.full((len(results), values.size), np.nan),
+        spent,
+        np.zeros(values.size, dtype=np.bool_),
+        spent["work"].copy(),
+    )
+    change, left = np.full((len(results), values.size), np.nan), np.full(values.size, beyond, dtype=np.int64)
+    active = np.arange(values.size)
+    for level in range(1, len(levels.numerics)):
+        active = active[_may_march(grid, values.part(active), levels, level)]
+        if not active.size:
+            break
+        own = values.part(active)
+        now, spent = _march(grid, own, levels, level, halted)
+        model = grid.model(levels.numerics[level])
+        apart = differences(asked, model, own, found.outcome.of(active), now)
+        left_over = _left_over(apart, change[:, active], results)
+        found = _updated(found, active, now, spent, left_over)
+        change[:, active] = apart
+        off = worst_held(left_over, decisive, tighter[active])
+        dear = _is_dear(grid, own, levels, level + 1)
+        settled = (off <= 1.0) | ((off * part <= DOUBTED) & dear)
+        found.settled[active] = settled
+        found.spent[active] += spent["work"]
+        done = settled & ((left[active] == 0) | dear)
+        left[active] -= settled
+        active = active[~done]
+    return found
+
+
+def _is_dear(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> NDArray[np.bool_]:
+    """(V,) whether a level takes more work, over the whole time, than a closer reference is worth."""
+    if level == len(levels.numerics):
+        return np.zeros(values.size, dtype=np.bool_)
+    units = max(rider.end for rider in grid.scene.riders)
+    return units * level_work(grid, values, levels, level) > DEAR
+
+
+def _left_over(change: Array, before: Array, results: tuple[Result, ...]) -> Array:
+    """(R, V) the error of a level from the change that led to it, and the one before that (NaN where there is none).
+    Held results of a sensor share the largest ratio of any of them, as one alone may be small by chance."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.clip(change / before, 0.0, 0.95)
+    for own in {result.of for result in results if np.isfinite(result.tolerance)}:
+        rows = [n for n, result in enumerate(results) if result.of == own and np.isfinite(result.tolerance)]
+        ratio[rows] = np.fmax.reduce(ratio[rows], axis=0)
+    part = np.clip(SAFETY * ratio / (1.0 - ratio), LEAST_PART, MOST_PART)
+    known = np.where(np.isfinite(before) & np.isfinite(part), part, FIRST_PART)
+    return np.where(np.isinf(change), np.nan, change * known)
+
+
+def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: Array) -> Converged:
+    whole = lanes.size == found.settled.size
+    everything = now if whole else found.outcome.replaced(lanes, now)
+    errors, used_ = found.error.copy(), {name: column.copy() for name, column in found.used.items()}
+    errors[:, lanes] = error
+    for name, column in used_.items():
+        column[lanes] = spent[name]
+    return replace(found, outcome=everything, error=errors, used=used_)
+
+
+def _march(grid: SceneGrid, values: LaneValues, levels: Levels, level: int, halted: Halted) -> tuple[Outcome, Flat]:
+    """One level of variants, each with its own number of steps."""
+    model, by = grid.model(levels.numerics[level]), _by(grid, values, levels, level)
+    found: Outcome | None = None
+    spent: Flat = {}
+    for cut in np.unique(by):
+        lanes = np.flatnonzero(by == cut)
+        tables = grid.once(model, int(cut))
+        now = outcome(grid.asked, tables, values.part(lanes), grid.stations(model, int(cut)), halted)
+        taken = used(tables, lanes.size)
+        tables.forget()
+        if lanes.size == values.size:
+            return now, taken
+        found = _room(now, values.size) if found is None else found
+        found = found.replaced(lanes, now)
+        for name, column in taken.items():
+            spent.setdefault(name, np.zeros(values.size, dtype=column.dtype))[lanes] = column
+    assert found is not None
+    return found, spent
+
+
+def _room(of: Outcome, size: int) -> Outcome:
+    """An outcome of so many variants that is yet to be filled."""
+    return of.of(np.zeros(size, dtype=np.int64))
+
+
+def _by(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> Counts:
+    """(V,) steps of a level in one of the grid's: powers of two, so that variants share tables."""
+    if levels.steps == "as the study says":
+        return np.ones(values.size, dtype=np.int64)
+    model = grid.model(levels.numerics[level])
+    alike = sum(grid.model(before).body_modes == model.body_modes for before in levels.numerics[:level])
+    wanted = np.full(values.size, unit_steps(grid.scene) * 4.0**level)
+    own = MARGIN * least_steps(model, values) * 2.0**alike  # no two levels are the same march
+    if not np.isfinite(model.scheme.stability_limit):
+        periods = values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
+        own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)
+    return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(wanted, own) / grid.unit).clip(0.0) - 1e-9)), dtype=np.int64)
+
+
+def _may_march(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> NDArray[np.bool_]:
+    """(V,) whether a level is worth its work, and within the rules that no march may break."""
+    if levels.steps == "as the study says":
+        numerics = levels.numerics[level]
+        return np.asarray(least_steps(grid.model(numerics), values) <= grid.unit * numerics.scheme.stride)
+    return level_work(grid, values, levels, level) <= MOST_WORK
+
+
+def level_work(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> Array:
+    """(V,) modes x steps of a level over one passage or cycle."""
+    model = grid.model(levels.numerics[level])
+    return np.asarray(model.body_modes * grid.unit * model.scheme.stride * _by(grid, values, levels, level), np.float64)

@@ -1,0 +1,56 @@
+"""Which pilots are a variant's nearest, and the cheapest rung that holds for all of them."""
+
+import numpy as np
+
+from engine.kernels.jit import kernel
+
+
+@kernel
+def nearest(points, pilots, found):
+    """found (V, k): numbers of the k nearest pilots (P, D) of every point (V, D), the nearest first."""
+    k = found.shape[1]
+    distance = np.empty(k)
+    for v in range(points.shape[0]):
+        distance[:] = np.inf
+        found[v] = 0
+        for p in range(pilots.shape[0]):
+            apart = 0.0
+            for d in range(points.shape[1]):
+                apart += (points[v, d] - pilots[p, d]) ** 2
+            place = k
+            while place > 0 and apart < distance[place - 1]:
+                place -= 1
+            for later in range(k - 1, place, -1):
+                distance[later], found[v, later] = distance[later - 1], found[v, later - 1]
+            if place < k:
+                distance[place], found[v, place] = apart, p
+
+
+@kernel
+def cheapest(held, order, worth, neighbours, limit, found):
+    """found (V,): the first rung in this order whose ``held`` (rungs, P) is within the variant's ``limit`` for all its
+    neighbours (V, k); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
+    for v in range(neighbours.shape[0]):
+        found[v] = -1
+        least = np.inf
+        for place in range(order.shape[0]):
+            rung, worst = order[place], 0.0
+            for p in neighbours[v]:
+                worst = held[rung, p] if not held[rung, p] <= worst else worst
+            if worst <= limit[v]:
+                found[v] = rung
+                break
+            if place < worth:
+                least = worst if worst < least else least
+        if found[v] < 0:
+            for rung in order[:worth]:
+                worst = 0.0
+                for p in neighbours[v]:
+                    worst = held[rung, p] if not held[rung, p] <= worst else worst
+                if worst <= ALIKE * least:
+                    found[v] = rung
+                    break
+            found[v] = order[worth - 1] if found[v] < 0 else found[v]
+
+
+ALIKE = 1.25  # times the least error: as good as that, where none is small enough

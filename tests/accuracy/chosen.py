@@ -1,0 +1,121 @@
+"""Sweeps for whose variants something is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.accuracy.choice import Choice
+from engine.accuracy.reference import converge, in_full
+from engine.accuracy.results import differences, results_of
+from engine.dataset import Collector
+from engine.execution import execute, run_jobs
+from engine.outcome import Flat
+from engine.plan import Plan, make_plan
+from engine.scene import Study
+from tests.accuracy.passages import SPEED, WEIGHT, ZETA, axis, passages
+from tests.engine.build import Table, beam, fixed
+
+Array = NDArray[np.float64]
+TOLERANCE = "solver.tolerance"
+LENGTHS = {"length": {"of": "body.bed.length", "values": [1.0, 1.1, 1.2]}}
+SPEEDS = {"speed": axis(SPEED, 0.3, 1.2, 30)}
+WEIGHTS = {"weight": {"of": WEIGHT, "values": [0.05, 0.15, 0.25]}}
+GRID = dict(passages(20, 15).data["sweep"])
+ALL_FIXED = {"steps": 200, "scheme": "fox-goodwin", "fidelity": "full"}
+
+
+def sweep(tolerance: float = 1e-2, **changes: Any) -> Study:
+    """300 passages."""
+    return passages(20, 15, **({"solver": {"tolerance": tolerance}} | changes))
+
+
+def midspan(tolerance: float | str) -> Table:
+    """One sensor with a tolerance of its own."""
+    return {"midspan": fixed(0.5) | {"tolerance": tolerance}}
+
+
+STUDIES: dict[str, Study] = {
+    "passages": sweep(),
+    "tight": sweep(2e-3),
+    "wide": sweep(5e-2),
+    "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-3, 1e-2, 5e-2]}}),
+    "lengths": sweep(sweep=LENGTHS | SPEEDS | WEIGHTS, sensor={"quarter": fixed(0.25)}),
+    "one value": sweep(sweep=GRID | {"zeta": axis(ZETA, 0.02, 0.02, 1)}),
+    "every history": sweep(output={"histories": {"every": 8}}),
+    "told only": sweep(sensor=midspan("told")),
+    "told only, out of reach": sweep(1e-9, sensor=midspan("told"), bed=beam(modes=3)),
+    "own tolerance": sweep(sensor=midspan(5e-2)),
+    "all is fixed": sweep(bed=beam(modes=3), solver=ALL_FIXED),
+}
+
+
+PILOTS = 48  # fewer than usual, so that sweeps of some hundred variants are quick
+
+
+@contextmanager
+def few_at_most(count: int = 20) -> Iterator[None]:
+    """Sweeps of more variants are chosen for."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("engine.plan.FEW", count)
+        patch.setattr("engine.plan.FEW_IN_SCENE", 1)
+        yield
+
+
+def chosen_plan(given: Study, threads: int = 2) -> Plan:
+    """The plan of a sweep with what is chosen for it."""
+    with few_at_most():
+        plan = make_plan(given)
+        plan.choose(lambda jobs: run_jobs(jobs, threads), lambda: False, PILOTS)
+    return plan
+
+
+class Run(NamedTuple):
+    """What a run of a sweep found, by the names of the archive (V, ...)."""
+
+    plan: Plan
+    arrays: Flat
+
+    @property
+    def choice(self) -> Choice:
+        assert self.plan.choice is not None
+        return self.plan.choice
+
+    def told(self, name: str) -> Array:
+        """(V,) the error told of a result."""
+        names = [result.name for result in results_of(self.plan.asked)]
+        return np.asarray(self.arrays["estimated_error"][:, names.index(name)], dtype=np.float64)
+
+
+def executed(given: Study, chunk: int | None = None, threads: int = 2) -> Run:
+    """Run a sweep."""
+    plan = chosen_plan(given, threads)
+    with few_at_most():
+        collector = Collector(plan.size)
+        execute(plan, collector.add, chunk=chunk, threads=threads)
+    return Run(plan, collector.arrays)
+
+
+@cache
+def run_of(name: str) -> Run:
+    """The run of one of the sweeps above."""
+    return executed(STUDIES[name])
+
+
+@cache
+def observed(name: str) -> Array:
+    """(R, V) how far the results of such a sweep are off."""
+    run = run_of(name)
+    found = np.full((len(results_of(run.plan.asked)), run.plan.size), np.nan)
+    for group in run.plan.groups:
+        values = run.plan.values(group, group.variants)
+        own = group.found(values, group.variants, run.choice, lambda: False, "histories").outcome
+        truth = converge(group.grid, values, in_full(group.grid), 0.01)
+        found[:, group.variants] = differences(run.plan.asked, group.scene, values, own, truth.outcome)
+    return found

@@ -1,0 +1,101 @@
+"""Which variants an audit takes, and what it finds of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.accuracy.audit import audit, audit_size, joined, sampled
+from engine.accuracy.results import results_of
+from engine.plan import Plan, make_plan
+from tests.accuracy.chosen import STUDIES, chosen_plan, observed, run_of
+from tests.accuracy.passages import WEIGHT, axis, passages
+from tests.engine.build import beam, mass, study, swing
+
+
+def on(plan: Plan, variants: Any) -> Any:
+    return audit(plan, np.asarray(variants, dtype=np.int64), lambda: False)
+
+
+def masses(count: int, **changes: Any) -> Plan:
+    return make_plan(passages(sweep={"weight": axis(WEIGHT, 0.05, 0.25, count)}, bed=beam(modes=4), **changes))
+
+
+def test_the_draw_is_the_studys_alone() -> None:
+    first, again, fewer = (sampled(masses(200, solver={"audit": count})) for count in (16, 16, 8))
+    np.testing.assert_array_equal(first, again)
+    assert first.size == 16 == np.unique(first).size and set(fewer.tolist()) < set(first.tolist())
+    assert first.min() >= 0 and first.max() < 200
+
+
+@pytest.mark.parametrize(("count", "wanted", "found"), [(7, 7, 7), (7, 9, 7), (2, 1, 1), (15, 14, 14), (15, 0, 0)])
+def test_as_many_as_are_wanted(count: int, wanted: int, found: int) -> None:
+    assert sampled(masses(count, solver={"audit": wanted})).size == found
+
+
+def test_no_pilot_is_audited() -> None:
+    with_all = STUDIES["passages"].with_values({"solver.audit": 300})
+    plan = chosen_plan(with_all)
+    assert plan.choice is not None
+    others = np.setdiff1d(np.arange(300), plan.choice.pilots)
+    np.testing.assert_array_equal(sampled(plan), others)
+
+
+def test_a_hundredth_is_audited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.accuracy.audit.FREE_SECONDS", np.inf)
+    assert [audit_size(masses(count)) for count in (3, 100, 4000, 100_000)] == [3, 16, 40, 256]
+
+
+def test_half_as_many_until_that_takes_no_longer_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.accuracy.audit.MOST_TIME", 0.0)
+    sizes = []
+    for seconds in (1e3, 1e-2, 1e-3, 1e-9):
+        monkeypatch.setattr("engine.accuracy.audit.FREE_SECONDS", seconds)
+        sizes.append(audit_size(masses(4000)))
+    assert sizes == sorted(sizes, reverse=True) and sizes[0] == 40 and sizes[-1] == 0
+    assert set(sizes) <= {40, 20, 10, 5, 2, 1, 0}
+
+
+def test_what_is_observed_is_what_a_finer_march_finds() -> None:
+    """Beside what the archive tells, for every result."""
+    run = run_of("passages")
+    picked = np.arange(0, 300, 11)
+    found = on(run.plan, picked)
+    np.testing.assert_array_equal(found.variants, picked)
+    assert found.left_out == 0 and found.observed.shape == (len(results_of(run.plan.asked)), picked.size)
+    np.testing.assert_allclose(found.observed[:3], observed("passages")[:3, picked], rtol=0.1, atol=1e-4)
+    np.testing.assert_allclose(found.told.T, run.arrays["estimated_error"][picked], rtol=1e-6)
+    assert np.mean(found.observed[:3] <= found.told[:3]) >= 0.95
+
+
+def test_parts_are_joined_to_the_same_audit() -> None:
+    plan = run_of("lengths").plan
+    picked = np.arange(0, plan.size, 23)
+    whole, parts = on(plan, picked), joined([on(plan, picked[1::2]), on(plan, picked[::2])], plan, picked.size)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_few_variants_are_audited_too() -> None:
+    plan = make_plan(passages(3, 3))
+    found = on(plan, sampled(plan))
+    assert found.variants.tolist() == list(range(9))
+    assert np.all(found.observed[:3] <= np.maximum(found.told[:3], 1e-4)) and np.all(found.doubt[:3] < 1e-3)
+
+
+def test_variants_without_a_truth_are_left_out() -> None:
+    """Parametric resonance without damping grows until nothing is left."""
+    sweep = {"weight": {"of": WEIGHT, "values": [0.001, 1.0, 0.002]}}
+    car = mass(0.5, swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 150))
+    plan = make_plan(study(beam(modes=3), car, sweep=sweep, solver={"steps": 200, "tolerance": 0.1}))
+    found = on(plan, [0, 1])
+    assert found.variants.tolist() == [0] and found.left_out == 1
+
+
+def test_no_variants_are_an_audit_too() -> None:
+    plan = make_plan(passages(2, 2))
+    found = on(plan, [])
+    assert found.variants.size == 0 == found.left_out and found.observed.shape == (len(results_of(plan.asked)), 0)

@@ -1,0 +1,200 @@
+"""What variants are computed with, by the measured errors of pilots near them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.accuracy.choice import MOST_SCENES, PILOTS, coordinates, pilots_of
+from engine.accuracy.reference import converge, in_full
+from engine.kernels.choice import ALIKE, cheapest, nearest
+from engine.plan import make_plan
+from results_schema.status import Status
+from tests.accuracy.chosen import LENGTHS, SPEEDS, STUDIES, TOLERANCE, WEIGHTS, executed, observed, run_of
+from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
+
+Array = NDArray[np.float64]
+ROOT = Path(__file__).parents[2]
+
+
+def near_by_numpy(points: Array, pilots: Array, count: int) -> NDArray[np.int64]:
+    apart = ((points[:, None] - pilots) ** 2).sum(axis=2)
+    return np.argsort(apart, axis=1, kind="stable")[:, :count]
+
+
+def cheapest_by_numpy(held: Array, order: Any, worth: int, neighbours: Any, limit: Array) -> NDArray[np.int64]:
+    found = []
+    for near, most in zip(neighbours, limit, strict=True):
+        worst = held[order][:, near].max(axis=1)
+        fits = np.flatnonzero(worst <= most)
+        least = worst[:worth].min()
+        alike = np.flatnonzero(worst[:worth] <= ALIKE * least) if np.isfinite(least) else np.array([worth - 1])
+        found.append(order[fits[0] if fits.size else alike[0]])
+    return np.array(found)
+
+
+def given_numbers(seed: int) -> tuple[Array, Array, Array, NDArray[np.int32], Array]:
+    """Points on a coarse lattice, so that many distances are equal, and errors, some of them unknown."""
+    random = np.random.default_rng(seed)
+    points, pilots = (random.integers(0, 6, (size, 3)) / 4.0 for size in (50, 20))
+    held = np.exp(random.normal(0.0, 2.0, (15, 20)))
+    held[random.random(held.shape) < 0.1] = np.inf
+    return points, pilots, held, random.permutation(15).astype(np.int32), np.exp(random.normal(0.0, 1.0, 50))
+
+
+def by_kernels(seed: int) -> tuple[Any, Any]:
+    points, pilots, held, order, limit = given_numbers(seed)
+    neighbours, rung = np.empty((50, 4), dtype=np.int32), np.empty(50, dtype=np.int32)
+    nearest(points, pilots, neighbours)
+    cheapest(held, order, 9, neighbours, limit, rung)
+    return neighbours, rung
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_kernels_are_their_numpy_twins(seed: int) -> None:
+    points, pilots, held, order, limit = given_numbers(seed)
+    neighbours, rung = by_kernels(seed)
+    np.testing.assert_array_equal(neighbours, near_by_numpy(points, pilots, 4))
+    np.testing.assert_array_equal(rung, cheapest_by_numpy(held, order, 9, neighbours, limit))
+    assert len(np.unique(rung)) > 3
+
+
+def test_kernels_without_the_compiler(tmp_path: Path) -> None:
+    script = (
+        "import json; from tests.accuracy.test_choice import by_kernels\n"
+        "print(json.dumps([part.tolist() for part in by_kernels(1)]))"
+    )
+    plain = os.environ | {"NUMBA_DISABLE_JIT": "1", "WANDERLAST_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=plain, capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert json.loads(done.stdout) == [part.tolist() for part in by_kernels(1)]
+
+
+def test_fewer_pilots_than_neighbours() -> None:
+    found = np.empty((5, 2), dtype=np.int32)
+    nearest(np.linspace(0.0, 1.0, 5)[:, None], np.array([[0.9], [0.1]]), found)
+    assert found.tolist() == [[1, 0], [1, 0], [0, 1], [0, 1], [0, 1]] or found[2].tolist() == [1, 0]
+
+
+def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
+    lengths = {"length": axis("body.bed.length", 1.0, 2.0, 40)}
+    plan = make_plan(passages(sweep=lengths | SPEEDS, sensor={}))
+    found = pilots_of(plan.cases, plan.members)
+    np.testing.assert_array_equal(found, pilots_of(plan.cases, plan.members))
+    assert found.size == PILOTS == np.unique(found).size and found.max() < plan.size
+    assert sum(np.isin(members, found).any() for members in plan.members) <= MOST_SCENES < len(plan.members)
+
+
+def test_distances_know_axes_of_more_than_one_value() -> None:
+    """From 0 to 1; ratios too where an axis spans several; not the tolerance."""
+    sweep = {
+        "narrow": {"of": WEIGHT, "values": [0.2, 0.25, 0.4]},
+        "far": {"of": SPEED, "values": [0.1, 1.0, 10.0]},
+        "wanted": {"of": TOLERANCE, "values": [1e-3, 1e-2]},
+        "alone": {"of": "body.bed.damping_ratio", "values": [0.02]},
+    }
+    cases = make_plan(passages(sweep=sweep)).cases
+    found = coordinates(cases, np.arange(cases.size)).reshape(3, 3, 2, 3)
+    np.testing.assert_allclose(found[:, 0, 0, 0], [0.0, 0.25, 1.0])
+    np.testing.assert_allclose(found[0, :, 0, 1], [0.0, 0.9 / 9.9, 1.0])
+    np.testing.assert_allclose(found[0, :, 0, 2], [0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(found[:, :, 0], found[:, :, 1])
+
+
+def test_an_axis_that_begins_at_nothing_has_ratios_too() -> None:
+    cases = make_plan(passages(sweep={"zeta": axis("body.bed.damping_ratio", 0.0, 0.1, 3)})).cases
+    found = coordinates(cases, np.arange(3))
+    assert found.shape == (3, 2) and np.all(np.diff(found[:, 1]) > 0.0)
+    np.testing.assert_allclose(found[[0, -1]], [[0.0, 0.0], [1.0, 1.0]])
+
+
+def test_neighbours_are_the_nearest_pilots() -> None:
+    choice = run_of("passages").choice
+    assert choice.neighbours.shape == (300, 6)
+    assert all(len(set(row)) == 6 for row in choice.neighbours.tolist())
+    own = choice.neighbours[choice.pilots]
+    np.testing.assert_array_equal(own[:, 0], np.arange(choice.pilots.size))  # a pilot is nearest to itself
+
+
+@pytest.mark.parametrize(("chunk", "threads"), [(37, 1), (128, 2)])
+def test_the_choice_follows_from_the_study_alone(chunk: int, threads: int) -> None:
+    whole, other = run_of("passages"), executed(STUDIES["passages"], chunk, threads)
+    np.testing.assert_array_equal(other.choice.rung, whole.choice.rung)
+    for name, array in whole.arrays.items():
+        assert other.arrays[name].tobytes() == array.tobytes(), name
+
+
+@pytest.mark.parametrize("name", ["passages", "tight", "wide", "lengths"])
+def test_what_is_chosen_holds_the_tolerance(name: str) -> None:
+    """Of nearly all variants, and what is told is no less than what is observed."""
+    run, off = run_of(name), observed(name)
+    told = np.asarray(run.arrays["estimated_error"]).T
+    fine = run.arrays["status"] == Status.OK
+    assert fine.mean() > 0.95
+    assert np.mean(off[:3, fine].max(axis=0) <= run.plan.study.solver.tolerance) >= 0.97
+    assert np.mean(off[:3, fine] <= told[:3, fine]) >= 0.97
+
+
+def test_a_choice_costs_less_than_converging() -> None:
+    run = run_of("passages")
+    (grid,) = run.plan.grids
+    reference = converge(grid, grid.values, in_full(grid), 0.5)
+    assert run.arrays["work"].mean() < 0.5 * reference.used["work"].mean()
+
+
+def test_a_tighter_tolerance_takes_no_less_work() -> None:
+    works = [run_of(name).arrays["work"].mean() for name in ("wide", "passages", "tight")]
+    assert works == sorted(works) and works[0] < 0.7 * works[2]
+
+
+def test_a_swept_tolerance_is_each_variants_own() -> None:
+    run = run_of("swept tolerance")
+    shape = run.plan.cases.shape
+    work, status = (run.arrays[name].reshape(shape) for name in ("work", "status"))
+    wanted = run.plan.cases.column(TOLERANCE)
+    assert np.all(np.diff(work.mean(axis=(0, 1))) < 0.0)
+    assert (status == Status.OK).mean() > 0.95
+    fine = run.arrays["status"] == Status.OK
+    assert np.all(run.arrays["error_estimate"][fine] <= wanted[fine] * (1.0 + 1e-6))
+    assert np.mean(observed("swept tolerance")[:3, fine].max(axis=0) <= wanted[fine]) >= 0.97
+
+
+def test_a_structural_axis_is_one_of_the_distance() -> None:
+    """Lengths make scenes of their own, among whose variants pilots are drawn alike."""
+    run = run_of("lengths")
+    assert len(run.plan.grids) == len(LENGTHS["length"]["values"])
+    assert all(np.isin(members, run.choice.pilots).any() for members in run.plan.members)
+    spread = coordinates(run.plan.cases, np.arange(run.plan.size))
+    assert spread.shape[1] >= 3 and len(WEIGHTS["weight"]["values"]) == 3
+
+
+def test_an_axis_of_one_value_changes_nothing() -> None:
+    one, without = run_of("one value"), run_of("passages")
+    for name in ("midspan_max", "midspan_rms", "estimated_error", "work", "status"):
+        assert one.arrays[name].tobytes() == without.arrays[name].tobytes(), name
+
+
+def test_kept_histories_do_not_keep_a_study_from_choosing() -> None:
+    """Disk space is asked for before anything is chosen."""
+    every, few = run_of("every history"), run_of("passages")
+    assert np.unique(every.choice.rung).size > 1
+    assert every.arrays["work"].mean() < 4.0 * few.arrays["work"].mean()
+    assert np.all(observed("every history")[:3] < 2e-2)
+
+
+def test_statics_are_chosen_where_they_are_enough() -> None:
+    slow = {
+        "speed": axis(SPEED, 2e-4, 2e-3, 150),
+        "weight": axis(WEIGHT, 0.01, 0.02, 2),
+    }
+    run = executed(passages(sweep=slow))
+    assert np.all(run.arrays["work"] == 0.0) and np.all(run.arrays["status"] == Status.OK)

@@ -1,0 +1,97 @@
+"""One grid for all marches of a scene: they meet at its stations, and none breaks a rule of its scheme."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.step_rules import least_steps
+from tests.accuracy.passages import OPEN, only_grid, passages
+from tests.engine.build import beam, cruise, fixed, mass, oscillator, shuttle, swing
+
+SCENES: dict[str, dict[str, Any]] = {
+    "cruise": {},
+    "over both ends": {"car": mass(0.2, cruise(-0.13, 1.21, 0.9))},
+    "free vibration": {"car": mass(0.2, cruise(0.0, 1.0, 0.9, after=1.7))},
+    "kink": {"sensor": {"moment": fixed(0.3137, "bending_moment")}},
+    "out and back": {"car": mass(0.2, shuttle(0.2, 0.83, 0.7, 0.1, 2))},
+    "swing": {"car": mass(0.2, swing(0.4, 0.3, 0.6, 3))},
+    "several": {"car": {"a": mass(0.2, cruise(0.0, 1.0, 0.9)), "b": mass(0.1, cruise(1.1, 0.0, 0.5), delay=0.37)}},
+    "pairs": {"solver": {"scheme": "richardson"}, "car": mass(0.2, cruise(-0.13, 1.21, 0.9, after=0.4))},
+}
+
+
+def instants(grid: SceneGrid, by: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Whether the grid's stations are in free vibration, and when they are, in scene time or in parts of it."""
+    tables, counts = grid.tables(grid.scene, by), grid.stations(grid.scene, by)
+    number, time = tables.timeline.moments(counts)
+    free = np.array([segment.free for segment in tables.timeline.segments])
+    first = min((segment.first for segment in tables.timeline.segments if segment.free), default=0)
+    after = (counts - first) / (tables.timeline.segments[-1].first + tables.timeline.segments[-1].steps - first)
+    return free[number], np.where(free[number], after, time)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_all_timelines_meet_at_the_grids_stations(name: str) -> None:
+    grid = only_grid(passages(**SCENES[name]))
+    coarse = instants(grid, 1)
+    assert coarse[0].any() == (name in ("free vibration", "pairs"))
+    for by in (2, 3, 8):
+        free, time = instants(grid, by)
+        np.testing.assert_array_equal(free, coarse[0])
+        np.testing.assert_allclose(time, coarse[1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", ["linear-acceleration", "fox-goodwin", "central-difference"])
+@pytest.mark.parametrize("by", [1, 4, 32])
+def test_free_vibration_is_within_the_schemes_limit(scheme: str, by: int) -> None:
+    way = cruise(0.0, 1.0, 0.9, after=2.0)
+    grid = only_grid(passages(bed=beam(modes=16), car=mass(0.2, way), solver={"scheme": scheme}))
+    model = grid.scene
+    steps = sum(segment.steps for segment in grid.tables(model, by).timeline.segments if segment.free)
+    step = 2.0 * 2.0 * np.pi / model.first_omega / steps
+    assert model.omega.max() * step <= model.scheme.stability_limit
+
+
+def test_a_study_that_fixes_its_steps_has_a_grid_of_these() -> None:
+    grid = only_grid(passages(solver={"steps": 333}))
+    assert grid.fixed and grid.tables(grid.scene, 1).steps == 333
+    assert only_grid(passages(solver={"steps": 334, "scheme": "richardson"})).unit == 167
+
+
+def test_variants_that_need_more_steps_than_a_rung_has_take_them() -> None:
+    """By a power of two, and only these."""
+    grid = only_grid(passages(30, bed=beam(modes=24), solver={"scheme": "fox-goodwin"}))
+    cuts = grid.safe_cuts(grid.scene.numerics, grid.values, 4)
+    least = least_steps(grid.scene, grid.values)
+    assert len(np.unique(cuts)) > 1
+    assert np.all(least <= grid.unit * cuts * (1.0 + 1e-9))
+    assert np.all((cuts == 4) | (2.0 * least > grid.unit * cuts))
+
+
+def test_contacts_on_springs_are_resolved() -> None:
+    """No step is longer than a period of the contact on its spring."""
+    stiff = oscillator(0.5, 1e5, cruise(0.0, 1.0, 0.9))
+    soft, hard = (only_grid(passages(bed=OPEN, car=stiff | {"stiffness": k})) for k in (1e2, 1e6))
+    few, many = (float(least_steps(grid.scene, grid.values)[0]) for grid in (soft, hard))
+    assert many > np.sqrt(1e6 / 0.5) / 0.9 / (2.0 * np.pi) > few
+
+
+def test_very_many_steps_are_compared_at_some_stations() -> None:
+    """The same of all marches, the ends of every part among them."""
+    grid = only_grid(passages(car=mass(0.2, cruise(-0.13, 1.21, 0.9, after=0.4)), solver={"steps": 1_000_000}))
+    free, time = instants(grid, 1)
+    assert 4000 < time.size < 9000
+    assert set(grid.grid.parts[1][:2]) <= set(time[~free].tolist())
+    np.testing.assert_allclose(instants(grid, 2)[1], time, rtol=0, atol=1e-12)
+
+
+def test_pairs_are_halved_however_many_steps_they_have() -> None:
+    grid = only_grid(passages(solver={"scheme": "richardson", "steps": 25_602}))
+    fine = grid.tables(grid.scene, 1)
+    halves = [2 * segment.steps for segment in fine.coarser.timeline.segments]
+    assert len(halves) > 1 and halves == [segment.steps for segment in fine.timeline.segments]

@@ -1,0 +1,144 @@
+"""Variants that are computed alike: what is told of each, and what its status says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from engine.accuracy.groups import ConvergingGroup, MarchGroup
+from engine.dataset import Collector
+from engine.execution import execute, run
+from engine.plan import make_plan
+from results_schema.status import Fidelity, Status
+from tests.accuracy.chosen import STUDIES, chosen_plan, few_at_most, run_of
+from tests.accuracy.passages import OPEN, passages
+from tests.engine.build import beam, cruise, fixed, mass, study, swing
+
+HARD = mass(1.0, cruise(0.0, 1.0, 3.0))  # of which moments are far from 1e-6 with any modes
+TIGHT = {"tolerance": 1e-6}
+
+
+def status_of(found: xr.Dataset) -> set[int]:
+    return set(np.unique(found.status.values).tolist())
+
+
+def test_few_variants_converge_each_by_itself() -> None:
+    plan = make_plan(passages(4, 4))
+    assert all(isinstance(group, ConvergingGroup) for group in plan.groups)
+    found = run(passages(4, 4))
+    assert status_of(found) == {Status.OK} and plan.choice is None
+    assert float(found.error_estimate.max()) <= 1e-3
+    assert np.unique(found.work.values).size > 1
+
+
+def test_many_are_marched_with_what_is_chosen() -> None:
+    groups = run_of("passages").plan.groups
+    assert all(isinstance(group, MarchGroup) for group in groups) and len(groups) > 3
+    variants = np.concatenate([group.variants for group in groups])
+    assert sorted(variants.tolist()) == list(range(300))
+
+
+def test_errors_are_told_of_every_result() -> None:
+    found = run(passages(2, 2))
+    names = found.result.values.tolist()
+    assert {"midspan_max", "midspan_rms", "midspan_max_position", "car_contact_force_min"} <= set(names)
+    assert np.isfinite(found.estimated_error.values).all()
+    held = [name for name in names if np.isfinite(float(found.tolerance.sel(result=name)))]
+    assert held == ["midspan_max", "midspan_min", "midspan_rms"]
+    worst = found.estimated_error.sel(result=held).max("result")
+    np.testing.assert_allclose(found.error_estimate.values, worst.values, rtol=1e-6)
+
+
+def test_what_is_held_and_missed_is_said() -> None:
+    found = run(passages(car=HARD, sensor={"moment": fixed(0.5, "bending_moment")}, solver=TIGHT))
+    assert status_of(found) <= {Status.TOLERANCE_MISSED, Status.UNRESOLVED}
+    assert np.isfinite(float(found.moment_max))
+
+
+@pytest.mark.parametrize("own", ["told", 0.5])
+def test_what_is_only_told_misses_nothing(own: Any) -> None:
+    """Nor does what is held to a wider tolerance of its own."""
+    sensors = {"moment": fixed(0.5, "bending_moment") | {"tolerance": own}}
+    found = run(passages(car=mass(0.2, cruise(0.0, 1.0, 1.0)), sensor=sensors, solver={"tolerance": 1e-3}))
+    assert status_of(found) == {Status.OK}
+    assert np.isnan(float(found.error_estimate)) == (own == "told")
+    assert np.isfinite(float(found.estimated_error.sel(result="moment_max")))
+
+
+def test_accelerations_do_not_spoil_a_displacement() -> None:
+    """Loads that enter excite every mode, so that accelerations converge slowly or not at all."""
+    both = {"midspan": fixed(0.5), "fast": fixed(0.4, "acceleration")}
+    alone, together = run(passages(3, 3)), run(passages(3, 3, sensor=both))
+    assert status_of(alone) == status_of(together) == {Status.OK}
+    np.testing.assert_array_equal(together.work.values, alone.work.values)
+    assert np.nanmax(together.estimated_error.sel(result="fast_max").values) > float(together.error_estimate.max())
+
+
+@pytest.mark.parametrize("name", ["told only", "told only, out of reach", "own tolerance", "all is fixed"])
+def test_sweeps_miss_only_what_is_held(name: str) -> None:
+    run = run_of(name)
+    assert set(np.unique(run.arrays["status"])) == {Status.OK}
+    assert np.isfinite(run.told("midspan_max")).all()
+
+
+FIXED: dict[str, dict[str, Any]] = {
+    "coarse": {"bed": beam(modes=2), "solver": {"steps": 40, "fidelity": "force"}},
+    "a moment": {"bed": beam(modes=3), "sensor": {"midspan": fixed(0.5, "bending_moment")}, "solver": {"steps": 300}},
+    "hard": {"bed": beam(modes=6), "car": HARD, "solver": {"steps": 2000} | TIGHT},
+    "springs": {
+        "bed": beam(modes=4, supports=[{"at": 0.0, "stiffness": 60.0}, {"at": 1.0, "stiffness": 90.0}]),
+        "car": mass(0.4, cruise(-0.25, 1.25, 1.0, after=0.4)),
+        "solver": {"steps": 600},
+    },
+}
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_fixed_modes_and_steps_are_never_unresolved(name: str) -> None:
+    """Their error is told, and misses nothing: the study chose it."""
+    found = run(passages(**FIXED[name]))
+    assert status_of(found) <= {Status.OK, Status.SEPARATED}
+    assert float(found.error_estimate) > 0.0
+    assert int(found.steps_used) == FIXED[name]["solver"]["steps"] if name != "springs" else True
+
+
+def test_fixed_modes_and_steps_are_as_far_off_as_is_told() -> None:
+    found = run(passages(bed=beam(modes=2), solver={"steps": 60}))
+    exact = run(passages(bed=beam(modes=40), solver={"steps": 20000, "scheme": "fox-goodwin"}))
+    off = abs(float(found.midspan_max) - float(exact.midspan_max)) / (0.2 * 9.81 / 48.0)
+    told = float(found.estimated_error.sel(result="midspan_max"))
+    assert off <= told <= 20.0 * off
+
+
+def test_what_diverges_is_said_and_has_no_numbers() -> None:
+    """Parametric resonance without damping; its neighbours keep values and errors."""
+    sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
+    car = mass(0.5, swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 150))
+    found = run(study(beam(modes=3), car, sweep=sweep, solver={"steps": 200, "tolerance": 0.1}))
+    assert found.status.values.tolist() == [Status.OK, Status.DIVERGED, Status.OK]
+    for name in ("midspan_max", "error_estimate"):
+        assert np.isnan(found[name].values).tolist() == [False, True, False]
+
+
+def test_statics_take_no_steps() -> None:
+    found = run(passages(bed=OPEN, solver={"fidelity": "static"}))
+    assert int(found.fidelity_used) == Fidelity.STATIC
+    assert int(found.steps_used) == 0 and float(found.work) == 0.0
+    assert float(found.error_estimate) > 1e-3 and status_of(found) == {Status.OK}
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_variants_that_are_done_are_left_out(many: bool) -> None:
+    """And the others come out as they would with them."""
+    with few_at_most():
+        plans = [chosen_plan(STUDIES["passages"]) if many else make_plan(passages(4, 4)) for _ in range(2)]
+        plan, (whole, rest) = plans[0], (Collector(part.size) for part in plans)
+        execute(plan, whole.add)
+        execute(plans[1], rest.add, done=np.arange(0, plan.size, 3), chunk=11)
+    left = np.setdiff1d(np.arange(plan.size), np.arange(0, plan.size, 3))
+    for name, array in whole.arrays.items():
+        assert rest.arrays[name][left].tobytes() == array[left].tobytes(), name

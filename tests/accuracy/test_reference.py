@@ -1,0 +1,162 @@
+"""Levels of more and more modes and steps: what they converge to, and what is told of what they miss."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.results import differences, results_of
+from engine.lanes import LaneValues
+from engine.scene import Study
+from results_schema.status import Status
+from tests.accuracy.passages import OPEN, WEIGHT, ZETA, only_grid, passages
+from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
+from tests.reference import values
+
+PART = 0.1  # of the tolerance by which an answer may still change
+
+
+def levels(grid: SceneGrid, part: float = PART, beyond: int = 0) -> Converged:
+    return converge(grid, grid.values, as_fixed(grid), part, beyond)
+
+
+def told(grid: SceneGrid, found: Converged, name: str) -> np.ndarray:
+    return found.error[[result.name for result in results_of(grid.asked)].index(name)]
+
+
+def crossing(alpha: float, mu: float, **changes: Any) -> Study:
+    """A published passage, with its 20 modes and no static correction."""
+    way = cruise(0.0, 1.0, math.pi * alpha)
+    solver = {"static_correction": False} | changes.pop("solver", {})
+    car = mass(mu, way) if mu else force(values.WEIGHT, way)
+    return study(beam(modes=20, **changes), car, gravity=values.WEIGHT / (mu or 1.0), solver=solver)
+
+
+@pytest.mark.parametrize("case", values.MOVING_MASS, ids=lambda case: f"{case.mu}-{case.alpha}")
+def test_levels_converge_to_the_published_moving_masses(case: values.MovingMass) -> None:
+    grid = only_grid(crossing(case.alpha, case.mu))
+    found = levels(grid)
+    error = told(grid, found, "midspan_max")[0]
+    assert error <= 1e-3
+    assert abs(found.outcome.numbers["midspan_max"][0] - case.largest) <= error + 1e-8
+
+
+@pytest.mark.parametrize(
+    ("which", "zeta"), [("MOVING_MASS_DAMPED_2_PERCENT", 0.02), ("MOVING_MASS_WITHOUT_CONVECTIVE", 0.0)]
+)
+def test_levels_converge_to_its_variations(which: str, zeta: float) -> None:
+    fidelity = "full" if zeta else "mass-without-convective"
+    for case in getattr(values, which):
+        grid = only_grid(crossing(case.alpha, case.mu, damping_ratio=zeta, solver={"fidelity": fidelity}))
+        found = levels(grid)
+        off = abs(found.outcome.numbers["midspan_max"][0] - case.largest)
+        assert off <= told(grid, found, "midspan_max")[0] + 1e-8
+
+
+def test_levels_converge_to_moving_forces_of_many_modes() -> None:
+    for alpha, largest in values.MOVING_FORCE.items():
+        way = force(values.WEIGHT, cruise(0.0, 1.0, math.pi * alpha))
+        grid = only_grid(study(beam(modes="auto"), way))
+        found = levels(grid)
+        assert is_free(grid) and found.settled[0]
+        off = abs(found.outcome.numbers["midspan_max"][0] - largest)
+        assert off <= told(grid, found, "midspan_max")[0] + 1e-6
+
+
+SCENES: dict[str, Study] = {
+    "passages": passages(4, 4),
+    "moments": passages(3, 3, sensor={"moment": fixed(0.5, "bending_moment")}),
+    "shuttles": passages(3, 3, car=mass(0.2, shuttle(0.2, 0.8, 0.5, 0.1, 2)), bed=OPEN | {"damping_ratio": 0.05}),
+    "free vibration": passages(3, 3, car=mass(0.2, cruise(0.0, 1.0, 0.9, after=2.0))),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_told_is_no_less_than_the_truth(name: str) -> None:
+    """Of the held results, against a level beyond those that changed by a hundredth; rarely a little less."""
+    grid = only_grid(SCENES[name])
+    found = converge(grid, grid.values, in_full(grid), 0.5)
+    truth = converge(grid, grid.values, in_full(grid), 0.01, beyond=1)
+    off = differences(grid.asked, grid.scene, grid.values, found.outcome, truth.outcome)
+    held = np.isfinite([result.tolerance for result in results_of(grid.asked)])
+    over = off[held] / (found.error[held] + truth.error[held])
+    assert np.mean(over <= 1.0) >= 0.85 and over.max() <= 2.0
+    assert np.all(off[held] <= 1e-3)
+
+
+def test_levels_end_where_nothing_changes_any_more() -> None:
+    """A wider tolerance takes less work, and what is settled says so."""
+    fine, coarse = (levels(only_grid(passages(3, 3, solver={"tolerance": t}))) for t in (1e-4, 1e-2))
+    assert coarse.settled.all() and fine.settled.all()
+    assert np.all(coarse.used["work"] <= fine.used["work"]) and coarse.used["work"].sum() < fine.used["work"].sum()
+
+
+def test_a_variant_does_not_depend_on_its_neighbours() -> None:
+    grid = only_grid(passages(4, 3, output={"histories": "auto"}))
+    whole = levels(grid)
+    for lane in (0, 5, 11):
+        alone = converge(grid, grid.values.part(np.array([lane])), as_fixed(grid), PART)
+        for name, numbers in alone.outcome.numbers.items():
+            assert numbers.tobytes() == whole.outcome.numbers[name][[lane]].tobytes(), name
+        assert alone.error.tobytes() == np.ascontiguousarray(whole.error[:, [lane]]).tobytes()
+        assert {name: column[0] for name, column in alone.used.items()} == {
+            name: column[lane] for name, column in whole.used.items()
+        }
+
+
+def test_a_diverging_variant_has_no_error() -> None:
+    """Parametric resonance without damping grows until nothing is left."""
+    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 150)
+    sweep = {"weight": {"of": WEIGHT, "values": [0.001, 1.0, 0.002]}}
+    grid = only_grid(study(beam(modes=3), mass(0.5, way), sweep=sweep, solver={"steps": 200}))
+    found = converge(grid, grid.values, in_full(grid), 1.0)
+    assert found.outcome.status.tolist() == [Status.OK, Status.DIVERGED, Status.OK]
+    assert np.isnan(found.error[:, 1]).all() and not found.settled[1]
+    assert np.isnan(found.outcome.numbers["midspan_max"]).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "free"),
+    [
+        ({}, True),
+        ({"bed": beam(modes=4)}, False),
+        ({"solver": {"fidelity": "force"}}, False),
+        ({"solver": {"static_correction": False}}, False),
+        ({"solver": {"scheme": "fox-goodwin"}}, False),
+        ({"solver": {"steps": 400}}, False),
+    ],
+)
+def test_levels_keep_to_what_the_study_fixes(changes: dict[str, Any], free: bool) -> None:
+    grid = only_grid(passages(**changes))
+    assert is_free(grid) == free
+    study_, found = grid.scene.study, as_fixed(grid)
+    for numerics in found.numerics:
+        assert numerics.fidelity == study_.solver.fidelity
+        assert numerics.static_correction == study_.solver.static_correction
+        assert (numerics.modes == 0) == ("bed" in changes)
+        assert study_.solver.scheme in ("auto", numerics.scheme.name)
+    assert (found.steps == "grow") == (study_.solver.steps == "auto")
+    assert {numerics.fidelity for numerics in in_full(grid).numerics} == {"full"}
+
+
+def test_lanes_may_stop_at_different_levels() -> None:
+    sweep = {"zeta": {"of": ZETA, "values": [0.0, 0.3]}, "weight": {"of": WEIGHT, "values": [0.01, 2.0]}}
+    grid = only_grid(passages(bed=OPEN, sweep=sweep, solver={"tolerance": 1e-4}))
+    found = levels(grid)
+    assert len(np.unique(found.used["work"])) > 1
+    assert isinstance(grid.values, LaneValues) and np.all(found.used["steps_used"] > 0)
+
+
+@pytest.mark.parametrize("modes", ["auto", 4, 20, 64])
+@pytest.mark.parametrize("scheme", ["auto", "average-acceleration", "central-difference"])
+def test_no_two_levels_are_the_same_march(modes: Any, scheme: str) -> None:
+    """Or nothing would seem to be missed: also where the rules of many modes ask for more steps than the levels do."""
+    grid = only_grid(passages(3, bed=OPEN | {"modes": modes}, solver={"scheme": scheme}))
+    for found in (as_fixed(grid), in_full(grid)):
+        work = np.array([level_work(grid, grid.values, found, level) for level in range(len(found.numerics))])
+        assert len(work) >= 4 and np.all(np.diff(work, axis=0) > 0.0)

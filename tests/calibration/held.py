@@ -1,0 +1,128 @@
+"""How well tolerances are held, and what is told of errors, over a random sample of scenes, each a sweep.
+
+`python -m tests.calibration.held [--seed N] [--scenes FIRST LAST] [--size V] [--tolerances T ...]` chooses for V
+variants of every scene (8: they converge by themselves) and judges 8 of them, none a pilot, beside marches of one level
+more than the references of pilots have. Every scene follows from seed and number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from functools import partial
+from multiprocessing import get_context
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.audit import SEED, audit
+from engine.accuracy.results import results_of
+from engine.linear_algebra import one_thread
+from engine.plan import make_plan
+from studies.study import kind_of
+from tests.calibration.scenes import draw, reads_moment
+
+Array = NDArray[np.float64]
+
+JUDGED = 8  # variants of a scene
+CANNOT_JUDGE = 0.3  # of the tolerance: a truth that may be off by more
+MATTERS = 0.01  # of the tolerance: smaller errors need not be told well
+
+
+class Row(NamedTuple):
+    """One variant that was judged: its worst held error and that of its truth over the tolerance, whether the archive
+    marks it, its work; and told over true errors of its held results that matter."""
+
+    scene: int
+    tolerance: float
+    moment: bool
+    worst: float
+    doubt: float
+    marked: bool
+    work: float
+    ratios: tuple[float, ...]
+
+
+@one_thread()
+def judged(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
+    """The rows of a scene."""
+    scene = draw(seed, number, size)
+    kind, study = kind_of(scene.study(tolerance=tolerance)), scene.study(tolerance=tolerance)
+    plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
+    plan.choose(lambda jobs: [job() for job in jobs] and None, lambda: False)
+    pilots = np.zeros(0, dtype=np.int64) if plan.choice is None else plan.choice.pilots
+    others = np.setdiff1d(np.arange(plan.size), pilots)
+    picked = np.sort(np.random.default_rng([SEED, number]).permutation(others)[:JUDGED])
+    found = audit(plan, picked, lambda: False)
+    held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
+    observed, told, doubt = (part[held] / tolerance for part in (found.observed, found.told, found.doubt))
+    work = {int(v): group.work for group in plan.groups for v in np.intersect1d(group.variants, picked)}
+    rows = []
+    for v, variant in enumerate(found.variants):
+        matter = (observed[:, v] > MATTERS) & (observed[:, v] > doubt[:, v])
+        ratios = tuple((told[matter, v] / observed[matter, v]).tolist())
+        worst, marked = float(observed[:, v].max()), bool(np.nanmax(told[:, v]) > 1.0 or np.isnan(told[:, v]).any())
+        rows.append(
+            Row(
+                number,
+                tolerance,
+                reads_moment(number),
+                worst,
+                float(np.nanmax(doubt[:, v])),
+                marked,
+                work[int(variant)],
+                ratios,
+            )
+        )
+    return rows
+
+
+def said(rows: Sequence[Row], words: str) -> str:
+    """One line on some variants."""
+    worst, doubt = (np.array([getattr(row, name) for row in rows]) for name in ("worst", "doubt"))
+    missed, doubtful = ~(worst <= 1.0), ~(doubt <= CANNOT_JUDGE)
+    marked = np.array([row.marked for row in rows])
+    ratios = np.concatenate([row.ratios for row in rows]) if rows else np.zeros(0)
+    return (
+        f"{words}: {len(rows)} variants, held {100 * np.mean(~missed):.2f} % ({missed.sum()} missed, of which "
+        f"{(missed & marked).sum()} marked and {(missed & doubtful).sum()} with a truth that cannot judge; "
+        f"{(missed & ~marked & ~doubtful).sum()} neither); marked though held {100 * np.mean(marked & ~missed):.1f} %; "
+        f"told below the true error {100 * np.mean(ratios < 1.0):.1f} %, more than 30 times "
+        f"{100 * np.mean(ratios > 30.0):.1f} % of {ratios.size}, median {np.median(ratios):.1f}"
+    )
+
+
+def main() -> None:
+    """Judge and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=20240609)
+    parser.add_argument("--scenes", type=int, nargs=2, default=(0, 250))
+    parser.add_argument("--size", type=int, default=1024)
+    parser.add_argument("--tolerances", type=float, nargs="+", default=(1e-2, 1e-3, 1e-4))
+    parser.add_argument("--processes", type=int, default=2)
+    given = parser.parse_args()
+    numbers, started = range(*given.scenes), time.perf_counter()
+    with get_context("spawn").Pool(given.processes) as pool:
+        for tolerance in given.tolerances:
+            work = partial(judged, given.seed, given.size, tolerance)
+            rows = [row for part in pool.imap_unordered(work, numbers) for row in part]
+            for words, own in (
+                ("displacements", [r for r in rows if not r.moment]),
+                ("with a moment", [r for r in rows if r.moment]),
+            ):
+                print(f"{tolerance:g}, {said(own, words)}", flush=True)
+            worst = sorted(rows, key=lambda row: -row.worst)[:12]
+            print(
+                "  worst: "
+                + "; ".join(
+                    f"scene {r.scene}: {r.worst:.2g} (truth {r.doubt:.2g}{', marked' if r.marked else ''})"
+                    for r in worst
+                )
+            )
+            print(f"  {time.perf_counter() - started:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

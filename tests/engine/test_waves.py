@@ -1,0 +1,92 @@
+"""Sines, cosines and exponentials of our own: against long doubles, exact identities, themselves in other company."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.kernels.layout import LANES
+from engine.kernels.shapes import Span, beam_shapes, combined_rows
+from engine.kernels.waves import decay, sin_cos
+
+Array = NDArray[np.float64]
+LONG_PI = np.longdouble("3.14159265358979323846264338327950288")
+TURNS = np.concatenate([np.random.default_rng(1).uniform(-300.0, 300.0, 20_000), np.linspace(-2.0, 2.0, 4001)])
+PATHS = np.concatenate([np.random.default_rng(2).uniform(0.0, 60.0, 20_000), np.linspace(0.0, 700.0, 7001)])
+AMPLITUDES = {"sine": 0, "cosine": 1, "near": 2, "far": 3}
+
+
+def plain(function: object) -> object:
+    """A piece without the compiler."""
+    return getattr(function, "py_func", function)
+
+
+def wave(kind: str, turns: Array, x: float | Array, order: int = 0) -> Array:
+    """(S, N) one of the four waves of N modes at places x (S,) of a span, by the compiled kernel."""
+    places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    amplitudes = np.zeros((turns.size, 4))
+    amplitudes[:, AMPLITUDES[kind]] = 1.0
+    span = Span(np.zeros((4, 1, 0)), turns, np.pi * turns, amplitudes, np.full(turns.size, 2.0))
+    found = np.empty((1, places.size, turns.size))
+    beam_shapes(places, np.arange(places.size), span, np.array([order]), np.ones(1), found)
+    return np.asarray(found[0])
+
+
+def test_sine_and_cosine() -> None:
+    sine, cosine = plain(sin_cos)(TURNS)  # type: ignore[operator]
+    angle = LONG_PI * TURNS.astype(np.longdouble)
+    np.testing.assert_allclose(sine, np.sin(angle).astype(np.float64), rtol=0, atol=2.5e-16)
+    np.testing.assert_allclose(cosine, np.cos(angle).astype(np.float64), rtol=0, atol=2.5e-16)
+    small = 2.0 ** np.arange(-60.0, -2.0)
+    np.testing.assert_allclose(plain(sin_cos)(small)[0], np.sin(np.pi * small), rtol=5e-16)  # type: ignore[operator]
+
+
+def test_quarters_of_a_turn_are_exact() -> None:
+    halves = np.arange(-200.0, 200.0)
+    sine, cosine = plain(sin_cos)(0.5 * halves)  # type: ignore[operator]
+    assert np.array_equal(sine, np.array([0.0, 1.0, 0.0, -1.0])[halves.astype(int) % 4])
+    assert np.array_equal(cosine, np.array([1.0, 0.0, -1.0, 0.0])[halves.astype(int) % 4])
+
+
+def test_decay() -> None:
+    expected = np.exp(-PATHS.astype(np.longdouble)).astype(np.float64)
+    np.testing.assert_allclose(plain(decay)(PATHS), expected, rtol=5e-16)  # type: ignore[operator]
+    far = np.array([708.5, 1000.0, 1e6])
+    assert np.all(plain(decay)(far) < 1e-307) and np.all(plain(decay)(far) >= 0.0)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("kind", AMPLITUDES)
+def test_compiled_as_without_the_compiler(kind: str) -> None:
+    x, turns = np.linspace(-1.0, 1.0, 501), np.array([0.5, 3.0, 20.25, 100.0, 300.0])
+    sine, cosine = plain(sin_cos)(x[:, None] * turns)  # type: ignore[operator]
+    rate = np.pi * turns
+    near, far = (plain(decay)((1.0 + side * x[:, None]) * rate) for side in (1.0, -1.0))  # type: ignore[operator]
+    expected = {"sine": sine, "cosine": cosine, "near": near, "far": far}[kind]
+    np.testing.assert_allclose(wave(kind, turns, x), expected, rtol=1e-13, atol=4e-16)  # a contracted argument
+
+
+@pytest.mark.parametrize("kind", AMPLITUDES)
+@pytest.mark.parametrize("order", range(4))
+def test_derivatives_follow_each_other(kind: str, order: int) -> None:
+    """Of wave number 2: a sine becomes a cosine, the wave from the left end changes its sign."""
+    x, turns = np.linspace(-1.0, 1.0, 100), np.array([1.5, 4.0])
+    turned = wave({"sine": "cosine", "cosine": "sine"}.get(kind, kind) if order % 2 else kind, turns, x)
+    sign = {"sine": 1 - 2 * (order // 2), "cosine": -1 if order in (1, 2) else 1, "near": (-1) ** order, "far": 1}[kind]
+    np.testing.assert_allclose(wave(kind, turns, x, order), sign * 2.0**order * turned, rtol=1e-15)
+
+
+def test_a_value_does_not_depend_on_its_neighbours() -> None:
+    x, turns = np.random.default_rng(4).uniform(-1.0, 1.0, 3 * LANES + 5), np.array([0.7, 12.3])
+    for kind in AMPLITUDES:
+        whole = wave(kind, turns, x)
+        assert np.array_equal(whole, np.concatenate([wave(kind, turns, one) for one in x]))
+        assert np.array_equal(whole[:, 1:], wave(kind, turns[1:], x))
+
+
+def test_combined_rows() -> None:
+    draw = np.random.default_rng(5)
+    numbers, weights = draw.integers(0, 7, (11, 3)), draw.normal(size=(2, 11, 3))
+    table, found = draw.normal(size=(7, 5)), np.empty((2, 11, 5))
+    combined_rows(numbers, weights, table, found)
+    np.testing.assert_allclose(found, np.einsum("jsi,sik->jsk", weights, table[numbers]), atol=1e-14)

@@ -1,0 +1,301 @@
+"""Reports of archives alone: nothing else is opened, and what they say of their study is what they hold (fault 47)."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from results_schema.archive import Archive, open_archive, write_archive
+from results_schema.errors import ArchiveError
+from studies import theory
+from studies.answers import findings_of
+from studies.archived import results_of
+from studies.cli import main
+from studies.results import Results
+from tests.bodies.frames import LENGTH
+from tests.studies import at_rest, imported, scenes
+from tests.studies.small import SMALL, write
+
+Captured = pytest.CaptureFixture[str]
+Change = Callable[[dict[str, Any], Archive], None]
+
+ON_THE_MOVE: dict[str, dict[str, Any]] = {
+    "passage": {"kind": "cruise", "start": 0.0, "end": LENGTH, "speed": 20.0},
+    "asymmetry": {"kind": "out-and-back", "start": 3.0, "end": 12.0, "speed": 5.0, "turn": 0.1, "cycles": 2},
+    "double-peak": {"kind": "sinusoidal", "centre": 7.5, "amplitude": 7.4, "frequency": 0.4, "cycles": 3},
+}
+PICKED = 4  # numbers of a kind that are changed, each of which costs a report
+AUDITED = """
+import sys
+from pathlib import Path
+here, kept = Path(sys.argv[1]).resolve(), (sys.argv[2], sys.argv[3])
+def hook(event, arguments):
+    if event in ("subprocess.Popen", "os.exec", "os.fork", "os.posix_spawn", "os.system"):
+        raise SystemExit(f"started {arguments[0]}")
+    if event in ("open", "os.listdir", "os.scandir") and isinstance(arguments[0], str | bytes):
+        path = Path(arguments[0] if isinstance(arguments[0], str) else arguments[0].decode()).absolute()
+        if path.is_relative_to(here) and path != here and path.relative_to(here).parts[0] not in kept:
+            raise SystemExit(f"opened {path}")
+sys.addaudithook(hook)
+from studies.cli import main
+code = main(["info", sys.argv[2]])
+sys.exit(code or main(["report", sys.argv[2], "-o", sys.argv[3]]))
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def audited(folder: Path) -> subprocess.CompletedProcess[str]:
+    """`info` and `report` of out.nc in a process that ends where it opens anything else here, or starts another."""
+    order = [sys.executable, "-c", AUDITED, str(folder), "out.nc", "page"]
+    return subprocess.run(order, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def changed(path: str, change: Change) -> None:
+    """Another archive in its place, sealed as ours are."""
+    archive = open_archive(path)
+    datasets = {"/": archive.root, **archive.groups}
+    change(datasets, archive)
+    root = datasets.pop("/")
+    write_archive(path, root, datasets)
+
+
+def with_text(old: str, new: str) -> Change:
+    """Another text of the study."""
+
+    def change(datasets: dict[str, Any], archive: Archive) -> None:
+        text = archive.root.attrs["study"]
+        assert old in text
+        datasets["/"] = archive.root.assign_attrs(study=text.replace(old, new))
+
+    return change
+
+
+@pytest.mark.parametrize("kind", [*ON_THE_MOVE, "influence", "eigenfrequencies", "stability"])
+def test_fault_47_a_report_opens_nothing_but_the_archive(kind: str, here: Path) -> None:
+    """Fault 47: info and report with the model's files gone, seen by an audit hook in a process of its own."""
+    car = {"on": "bed", "kind": "mass", "mass": 50.0, "motion": ON_THE_MOVE.get(kind, ON_THE_MOVE["passage"])}
+    imported.write(here, imported.matrices(here), kind, carriage={"car": car})
+    assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
+    for path in here.iterdir():
+        if path.name != "out.nc":
+            path.unlink()
+    done = audited(here)
+    assert done.returncode == 0, done.stderr
+    assert (here / "page" / "report.html").stat().st_size > 10_000
+
+
+def test_fault_47_a_hostile_archive_makes_nothing_be_read(here: Path) -> None:
+    """Fault 47: paths in the study of an archive are words."""
+    imported.write(here, imported.matrices(here))
+    assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
+    (here / "secret").mkdir()
+    (here / "secret" / "key").write_text("secret", encoding="utf-8")
+    secret = str(here / "secret" / "key")
+    changed("out.nc", with_text("stiffness.mtx", secret))
+    assert audited(here).returncode == 0
+    changed("out.nc", lambda datasets, _: datasets.pop("/model/bed"))
+    done = audited(here)
+    assert done.returncode == 4 and "what this archive says of its study" in done.stderr
+    for table in ('kind = "reduced"\nfile', 'kind = "nastran"\ntrack = { nodes = [1, 2] }\nnodes = "x"\nmatrices'):
+        text = SMALL.replace("[body.beam]", f'[body.more]\n{table} = "{secret}"\n\n[body.beam]')
+        write(here, SMALL)
+        assert main(["run", "small.toml", "-o", "out.nc", "--overwrite"]) == 0
+        changed("out.nc", with_text(SMALL, text))
+        assert audited(here).returncode == 0  # nothing uses that body
+        changed("out.nc", with_text('on = "beam"', 'on = "more"'))
+        done = audited(here)
+        assert done.returncode == 4 and "what this archive says of its study" in done.stderr
+
+
+@pytest.mark.parametrize("kind", ON_THE_MOVE)
+@pytest.mark.parametrize("sweep", ["", "speed", "unit"])
+def test_fault_47_what_is_recorded_tells_what_the_files_tell(kind: str, sweep: str, here: Path) -> None:
+    """Fault 47: sentences and closed forms from the archive alone, and with the model's files read again."""
+    key = "frequency" if kind == "double-peak" else "speed"
+    axes = {
+        "": {},
+        "speed": {"pace": {"of": f"carriage.car.motion.{key}", "values": [0.3, 0.5]}},
+        "unit": {"unit": {"of": "body.bed.force_unit", "values": [1.0, 2.0]}},
+    }
+    car = {"car": {"on": "bed", "kind": "mass", "mass": 50.0, "motion": ON_THE_MOVE[kind]}}
+    bed = imported.matrices(here) | {"damping_ratio": [0.02, 0.03, 0.03, 0.03]}
+    imported.write(here, bed, kind, carriage=car, sweep=axes[sweep], solver={"steps": 2000})
+    assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
+    archive = open_archive("out.nc")
+    alone, whole = results_of(archive), Results.of(archive.root)
+    assert findings_of(alone) == findings_of(whole)
+    assert theory.body_mass(alone, "bed") == theory.body_mass(whole, "bed")
+    omega = [np.asarray(theory.first_omega(results)) for results in (alone, whole)]
+    assert omega[0].shape == (() if sweep != "unit" else (2,))
+    np.testing.assert_allclose(omega[0], omega[1], rtol=1e-15)
+    ratios = np.array([0.1, 0.5])
+    loaded = [theory.loaded_frequency(results, ratios) for results in (alone, whole)]
+    np.testing.assert_allclose(loaded[0], loaded[1], rtol=1e-6)
+    assert float(np.max(theory.damping_ratio(alone))) == 0.02
+
+
+def put(name: str, place: tuple[int, ...], value: Any, group: str = "/") -> Change:
+    """Another number at a place of a variable, the first one unless said."""
+
+    def change(datasets: dict[str, Any], archive: Archive) -> None:
+        dataset = datasets[group].copy(deep=True)
+        values = np.array(dataset[name].values)
+        values[place or (0,) * values.ndim] = value
+        datasets[group] = dataset.assign({name: (dataset[name].dims, values, dataset[name].attrs)})
+
+    return change
+
+
+def renamed(datasets: dict[str, Any], archive: Archive) -> None:
+    """Another name of a sensor."""
+    datasets["/"] = archive.root.assign_coords(sensor=("sensor", ["elsewhere"], archive.root.sensor.attrs))
+
+
+def moved(datasets: dict[str, Any], archive: Archive) -> None:
+    """Another axis."""
+    speed = archive.root["speed"]
+    datasets["/"] = archive.root.assign_coords(speed=("speed", speed.values + 1.0, speed.attrs))
+
+
+def exchanged(datasets: dict[str, Any], archive: Archive) -> None:
+    """The axes in another order."""
+    datasets["/"] = archive.root.transpose("mass", "speed", ...)
+
+
+def cut(datasets: dict[str, Any], archive: Archive) -> None:
+    """Fewer variants than the study has."""
+    datasets["/"] = archive.root.isel(speed=slice(0, 3))
+
+
+def instead(text: str) -> Change:
+    """Another text altogether."""
+    return lambda datasets, archive: datasets.update({"/": archive.root.assign_attrs(study=text)})
+
+
+def without(name: str) -> Change:
+    """A variable less."""
+    return lambda datasets, archive: datasets.update({"/": archive.root.drop_vars(name)})
+
+
+FORGED: Mapping[str, tuple[Change, str]] = {
+    "label": (renamed, "sensor: expected"),
+    "axis": (moved, "speed: expected the values of the study's axis"),
+    "order": (exchanged, "status: expected"),
+    "cut": (cut, "expected the axes"),
+    "status": (put("status", (0, 0), 99), "status: expected one of its flag_values, received 99"),
+    "fidelity": (put("fidelity_used", (1, 1), -3), "fidelity_used: expected one of"),
+    "large": (put("midspan_max", (2, 1), 1.7e308), "midspan_max: expected numbers below 1e+150"),
+    "negative": (put("midspan_max", (2, 1), -1.7e308), "expected numbers below"),
+    "infinite": (put("midspan_min", (2, 1), np.inf), "midspan_min: expected finite"),
+    "nan": (put("midspan_rms", (2, 1), np.nan), "received NaN at (2, 1)"),
+    "failed": (put("status", (2, 1), 5), "where the status keeps no values"),
+    "missing": (without("midspan_max"), "midspan_max: expected in every passage"),
+    "kind": (with_text('kind = "passage"', 'kind = "asymmetry"'), "study_kind"),
+    "sensor": (with_text("[sensor.midspan]", "[sensor.other]"), "sensor: expected"),
+    "huge": (with_text("count = 8", "count = 8000000"), "expected the axes"),
+    "no study": (with_text("length = 1.0", "length = -1.0"), "body.beam.length"),
+    "no text": (instead("nothing"), "not valid TOML"),
+    "a path": (instead("small.toml"), "not valid TOML"),
+    "newer": (with_text("schema_version = 1", "schema_version = 7"), "unknown version"),
+    "a body": (lambda d, _: d.update({"/model/other": d["/model/beam"]}), "expected a body of the study"),
+    "sample": (
+        lambda d, _: d.update(
+            {"/audit": d["/audit"].assign_coords(sample=("sample", [10**6], d["/audit"].sample.attrs))}
+        ),
+        "/audit: sample: expected different numbers from 0 to 15",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The archive of a small study with an audit."""
+    folder = tmp_path_factory.mktemp("small")
+    path = write(folder, SMALL.replace('steps = "auto"', 'steps = "auto"\naudit = 1'))
+    assert main(["run", str(path), "-o", str(folder / "small.nc")]) == 0
+    return folder / "small.nc"
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_fault_47_what_an_archive_says_is_what_it_holds(name: str, small: Path, here: Path, capsys: Captured) -> None:
+    """Fault 47: changed labels, another axis, status 99, values 1.7e308 and indices out of range end with 4."""
+    (here / "small.nc").write_bytes(small.read_bytes())
+    change, words = FORGED[name]
+    changed("small.nc", change)
+    capsys.readouterr()
+    assert main(["report", "small.nc"]) == 4
+    message = capsys.readouterr().err
+    assert "small.nc" in message and words in message and "what this archive says of its study" in message
+    assert sorted(path.name for path in here.iterdir()) == ["small.nc"]
+
+
+def test_fault_47_histories_out_of_range(here: Path) -> None:
+    """Fault 47: flat numbers of variants that the study does not have."""
+    write(here, SMALL.replace("count = 8", "count = 70"))
+    assert main(["run", "small.toml"]) == 0
+
+    def beyond(datasets: dict[str, Any], archive: Archive) -> None:
+        history = archive.root["history"]
+        datasets["/"] = archive.root.assign_coords(history=("history", history.values + 100, history.attrs))
+
+    changed("small.nc", beyond)
+    with pytest.raises(ArchiveError, match="history: expected different numbers from 0 to 139"):
+        results_of(open_archive("small.nc"))
+
+
+@pytest.mark.parametrize("name", ["correction", "mode_count", "position", "checked_position", "on_body"])
+def test_fault_47_coordinates_of_a_study_at_rest(name: str, here: Path) -> None:
+    """Fault 47: another coordinate than the study asks for."""
+    write(here, at_rest.text_of("eigenfrequencies", "positions = 3\nmode_counts = [4, 8]"))
+    assert main(["run", "small.toml"]) == 0
+    changed("small.nc", put(name, (0,), "x" if name == "on_body" else 3))
+    with pytest.raises(ArchiveError, match=f"{name}: expected"):
+        results_of(open_archive("small.nc"))
+
+
+def texts() -> dict[str, str]:
+    """One study of every sort."""
+    found = {kind: scenes.text_of(kind) for kind in scenes.MOTIONS}
+    found |= {
+        kind: at_rest.text_of(kind, "positions = 3\nmode_counts = [4, 8]", at_rest.MASS) for kind in at_rest.KINDS
+    }
+    return found
+
+
+def numbers(archive: Archive) -> list[tuple[str, str, Any]]:
+    """Some strange numbers with group and variable, the same ones every time."""
+    found = [
+        (group, str(name), value)
+        for group, dataset in {"/": archive.root, **archive.groups}.items()
+        for name, array in dataset.variables.items()
+        if array.dtype.kind in "iuf"
+        for value in ((-1.0, 0.0, 1e149, 1.7e308, np.nan, 99.0) if array.dtype.kind == "f" else (-1, 0, 99))
+    ]
+    picked = np.random.default_rng(47).permutation(len(found))[:PICKED]
+    return [found[place] for place in picked.tolist()]
+
+
+@pytest.mark.parametrize("kind", texts())
+def test_fault_47_any_other_number_is_refused_or_told(kind: str, here: Path) -> None:
+    """Fault 47: strange numbers anywhere in an archive are no bug of ours: 4, or a report of them."""
+    write(here, texts()[kind])
+    assert main(["run", "small.toml"]) in (0, 3)
+    whole, codes = Path("small.nc").read_bytes(), []
+    for group, name, value in numbers(open_archive("small.nc")):
+        Path("small.nc").write_bytes(whole)
+        changed("small.nc", put(name, (), value, group))
+        codes.append(((group, name, value), main(["report", "small.nc"])))
+    assert len(codes) == PICKED
+    assert [found for found in codes if found[1] not in (0, 4)] == []
