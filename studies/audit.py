@@ -155,7 +155,8 @@ class Verdict:
     def of(cls, group: xr.Dataset) -> Verdict:
         """The verdict of the archive's group."""
         errors = relative_errors(group)
-        over = np.nanmax(np.where(np.isfinite(group["tolerance"].values), errors, -1.0), axis=1)
+        held = np.isfinite(group["tolerance"].values)
+        over = np.max(np.where(held, errors, -1.0), axis=1, initial=-1.0)  # one that is not known makes it NaN
         ours = np.asarray(group["variant_status"].values) == int(Status.OK)
         known = ~np.isnan(over)
         place = int(np.argmax(np.where(known & ours, over, -1.0)))

@@ -23,7 +23,7 @@ from engine.timeline import Grid, build_grid, refined
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-#: Steps of the grid over a passage, or over each of the two strokes of a cycle. The cheapest march that holds 1e-2 took
+#: Steps of the grid over a passage, or over a cycle. The cheapest march that holds 1e-2 took
 #: 32 to 64 (208 passages), 50 over a cycle of a shuttle; the 200 phases of kept histories are a multiple of those.
 PASSAGE_STEPS, CYCLE_STEPS = 32, 50
 PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3

@@ -28,7 +28,7 @@ Kept = Literal["numbers", "histories"]
 
 PACE = 1.2e9  # modes x steps x variants per second and thread of an ordinary server, for the size of chunks only
 PLACE = 0.2  # of a march of eight more modes, an envelope's place; likewise
-ANSWER_PART = 0.5  # of its tolerance by which an answer may still change from level to level
+ANSWER_PART = 0.5  # of its tolerance by which an answer may be off by the estimate of its level
 TRUTH_PART = 0.1  # the same of the reference of an answer within what a study fixes
 USUAL_LEVEL = 2  # at which most answers converge, for the size of chunks only
 

@@ -193,3 +193,12 @@ def test_what_marches_nothing_refuses_it() -> None:
     with pytest.raises(BadInput, match=r"solver\.audit"):
         refuse_audit(given)
     refuse_audit(given.with_values({"solver.audit": "auto"}))
+
+
+def test_one_held_result_without_a_number_is_not_held(tmp_path: Path) -> None:
+    found = outcome(crossing(RICH, FINE), tmp_path)
+    group = group_of(found).copy(deep=True)
+    held = int(np.flatnonzero(np.isfinite(group["tolerance"].values))[-1])
+    group["observed_error"].values[0, held] = np.nan
+    verdict = Verdict.of(group)
+    assert verdict.unknown == 1 and not verdict.held
