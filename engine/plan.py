@@ -13,10 +13,11 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.choice import PILOTS, Choice, Share, cases_tolerance, choose
+from engine.accuracy.choice import PILOTS, Choice, cases_tolerance, choose
 from engine.accuracy.grids import SceneGrid, fixed_steps, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
 from engine.accuracy.ladder import ladder_of
+from engine.accuracy.reference import Share
 from engine.accuracy.results import results_of
 from engine.envelopes import check_places, places_read
 from engine.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.groups import PACE, Group
 from engine.accuracy.ladder import REFERENCE_PART
-from engine.accuracy.reference import Converged, Halted, converge, in_full, level_work
+from engine.accuracy.reference import Converged, Halted, converge, in_full, usual_work
 from engine.accuracy.results import differences, results_of
 from engine.chunk import told_errors
 from engine.kernels.layout import LANES
@@ -26,7 +26,6 @@ Counts = NDArray[np.int64]
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-USUAL_LEVEL = 3  # to which most audits go, one beyond most references; for expected times only
 TABLES = 24  # variants that take as long as the tables of a march; likewise
 
 
@@ -67,11 +66,9 @@ def _seconds(plan: Plan, count: int) -> float:
     """Expected time of an audit on one thread."""
     share, found = min(1.0, count / plan.size), 0.0
     for grid, members in zip(plan.grids, plan.members, strict=True):
-        levels = in_full(grid)
-        work = level_work(grid, grid.values, levels, min(USUAL_LEVEL, len(levels.numerics) - 1))
         own = share * members.size
         lanes = max(own, LANES * min(1.0, own)) + TABLES * min(1.0, own)
-        found += float(np.mean(work)) * max(rider.end for rider in grid.scene.riders) * lanes * grid.scene.ties / PACE
+        found += float(np.mean(usual_work(grid))) * lanes * grid.scene.ties / PACE
     return found
 
 

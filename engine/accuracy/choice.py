@@ -8,7 +8,7 @@ left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
-from engine.accuracy.reference import Halted, is_free
+from engine.accuracy.reference import Halted, Share, in_turn, is_free
 from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.choice import cheapest, nearest
 from engine.lanes import LaneValues
@@ -26,11 +26,12 @@ from engine.sweep import Cases
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Share = Callable[[Sequence[Callable[[], object]]], None]
 
 SEED = 20261122  # of the pilots; audits have another
 PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times
-BAND = 128  # pilots of one job: with two jobs a scene both of two threads are busy, and tables are shared by many
+#: Variants for each pilot, and the fewest pilots: 2,000 variants took 1.25 times the work by 128 that they took by 256,
+#: the pilots half the time; by 96 one of 20 missed the tolerance.
+SHARE_OF_PILOTS, FEWEST_PILOTS = 16, 128
 NEIGHBOURS = 6  # 4 to 8 needed alike; more smooth what the margin must cover
 SURE = 0.985  # of the errors told for pilots that were left out are no smaller than the true ones
 LOGARITHMIC = 3.0  # times the smallest value of an axis that the largest is: ratios along it may count too
@@ -63,7 +64,8 @@ class Choice:
 
     def errors(self, variants: Counts) -> Array:
         """(R, V) errors told for some variants; NaN where no estimate exists."""
-        worst = np.max(self._told[self.rung[variants, None], self.neighbours[variants]], axis=1)  # of (V, k, R)
+        marches = self._march[self.rung[variants, None], self.neighbours[variants]]
+        worst = np.max(self._told[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(worst), worst, np.nan).T
 
     def held(self, variants: Counts) -> Array:
@@ -72,9 +74,18 @@ class Choice:
 
     @cached_property
     def _told(self) -> Array:
-        """(columns x cuts, P, R) errors of the pilots with their margins, and of their references."""
-        found = self.margin * self.measured.error + self.measured.reference.T
-        return found.reshape(-1, *found.shape[2:])
+        """(M, R) errors told by the marches of pilots."""
+        return told(self.measured, self.margin)
+
+    @cached_property
+    def _march(self) -> NDArray[np.int32]:
+        """(columns x cuts, P) the march that tells of a rung."""
+        return self.measured.march.reshape(-1, self.measured.march.shape[2])
+
+
+def told(measured: Measured, margin: Array) -> Array:
+    """(M, R) errors of the marches of pilots with their margins, and those of their references."""
+    return np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
 
 
 def choose(
@@ -84,32 +95,23 @@ def choose(
     members: Sequence[Counts],
     share: Share,
     halted: Halted,
-    count: int = PILOTS,
+    most: int = PILOTS,
 ) -> Choice:
-    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by so many pilots. Raises
+    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by at most so many pilots. Raises
     Halted."""
-    pilots = pilots_of(cases, members, count)
-    climbs, order, span = [], [], tolerance_span(asked, cases)
-    for grid, part in zip(grids, members, strict=True):
-        for own in _bands(grid, cases, np.intersect1d(part, pilots)):
+    pilots = pilots_of(cases, members, most)
+    climbs, span = [], tolerance_span(asked, cases)
+    parts = [np.intersect1d(part, pilots) for part in members]
+    within = share if sum(part.size > 0 for part in parts) == 1 else in_turn
+    for grid, own in zip(grids, parts, strict=True):
+        if own.size:
             columns = cases.columns_of(own)
             if TOLERANCE in columns:  # pilots serve the tightest that has them for neighbours
                 columns = {**columns, TOLERANCE: np.full(own.size, span[0] * asked.study.solver.tolerance)}
             values = LaneValues(grid.scene.study, columns, own.size)
-            climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, span))
-            order.append(own)
-    share([climb.go for climb in climbs])
-    return _chosen(asked, cases, climbs, np.concatenate(order))
-
-
-def _bands(grid: SceneGrid, cases: Cases, pilots: Counts) -> list[Counts]:
-    """The pilots of a scene by their pace, as those of like pace share steps: as many jobs as keep a few threads
-    busy."""
-    if not pilots.size:
-        return []
-    values = LaneValues(grid.scene.study, cases.columns_of(pilots), pilots.size)
-    order = np.argsort(values.time_scale(grid.scene.carriages[0].name), kind="stable")
-    return np.array_split(pilots[order], -(-pilots.size // BAND))
+            climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, within, span))
+    (in_turn if within is share else share)([climb.go for climb in climbs])
+    return _chosen(asked, cases, climbs, np.concatenate([own for own in parts if own.size]))
 
 
 def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts) -> Choice:
@@ -127,8 +129,7 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts) 
     margin, held_margin = _margins(measured, np.ascontiguousarray(points[order]), results, telling)
     held = held_margin * measured.held
     if is_free(climbs[0].grid):  # what is told is what decides
-        error = margin * measured.error + measured.reference.T
-        held = worst_held(np.moveaxis(error, -1, 0), deciding(results, asked.study.solver.tolerance))
+        held = worst_held(told(measured, margin).T, deciding(results, asked.study.solver.tolerance))[measured.march]
     held = np.where(np.isnan(held), 0.0, held).reshape(-1, order.size)  # of pilots without a truth, which say nothing
     rung = np.empty(cases.size, dtype=np.int32)
     ranked = np.argsort(cost, kind="stable").astype(np.int32)
@@ -138,8 +139,10 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts) 
     return Choice(ladder, results, order, measured, neighbours, rung, margin, held)
 
 
-def pilots_of(cases: Cases, members: Sequence[Counts], count: int = PILOTS) -> Counts:
-    """Flat numbers of so many pilots, drawn at random: of a few scenes where there are many."""
+def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:
+    """Flat numbers of pilots, as many as are worth it and at most so many, drawn at random: of a few scenes where there
+    are many."""
+    count = min(most, max(FEWEST_PILOTS, cases.size // SHARE_OF_PILOTS))
     random = np.random.default_rng(SEED)
     chosen = random.permutation(len(members))[: max(1, min(MOST_SCENES, count // LEAST_IN_SCENE))]
     pool = np.concatenate([members[number] for number in np.sort(chosen)])
@@ -218,12 +221,12 @@ def _margins(
     others = _neighbours(pilots, pilots, NEIGHBOURS + 1)[:, 1:]  # the nearest is itself
     if not others.shape[1]:
         return np.ones(len(results)), 1.0
-    held, error = measured.held[measured.marched], measured.error[measured.marched]
-    told = np.max(held[:, others], axis=2)
-    near = np.nonzero(np.isfinite(told) & np.isfinite(held) & (told > telling[0]) & (told < telling[1]))
-    own, worst = error[near], np.max(error[near[0][:, None], others[near[1]]], axis=1)
+    held, march = measured.held[measured.marched], measured.march[measured.marched]
+    most = np.max(held[:, others], axis=2)
+    near = np.nonzero(np.isfinite(most) & np.isfinite(held) & (most > telling[0]) & (most < telling[1]))
+    own, worst = measured.error[march[near]], np.max(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
     margin = np.array([_quantile(own[:, number], worst[:, number]) for number in range(len(results))])
-    return margin, _quantile(held[near], told[near])
+    return margin, _quantile(held[near], most[near])
 
 
 def _quantile(own: Array, told: Array) -> float:
@@ -241,8 +244,12 @@ def _cost(climb: Climb) -> Array:
 
 def _joined(parts: Sequence[Measured]) -> Measured:
     """The pilots of all scenes."""
+    marches = np.cumsum([0, *(len(part.error) for part in parts)])
+    pilots = np.cumsum([0, *(part.reference.shape[1] for part in parts)])
     return Measured(
-        np.concatenate([part.error for part in parts], axis=2),
+        np.concatenate([part.error for part in parts]),
+        np.concatenate([part.pilot + first for part, first in zip(parts, pilots, strict=False)]),
+        np.concatenate([part.march + np.int32(first) for part, first in zip(parts, marches, strict=False)], axis=2),
         np.concatenate([part.held for part in parts], axis=2),
         np.concatenate([part.reference for part in parts], axis=1),
         np.any([part.marched for part in parts], axis=0),

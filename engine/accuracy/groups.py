@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.choice import Choice
 from engine.accuracy.grids import MOST_COMPARED, SceneGrid
-from engine.accuracy.reference import Halted, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.reference import USUAL_LEVEL, Halted, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
 from engine.kernels.layout import MARKS
 from engine.lanes import LaneValues
@@ -30,7 +30,6 @@ PACE = 1.2e9  # modes x steps x variants per second and thread of an ordinary se
 PLACE = 0.2  # of a march of eight more modes, an envelope's place; likewise
 ANSWER_PART = 0.5  # of its tolerance by which an answer may be off by the estimate of its level
 TRUTH_PART = 0.1  # the same of the reference of an answer within what a study fixes
-USUAL_LEVEL = 2  # at which most answers converge, for the size of chunks only
 
 
 class Found(NamedTuple):

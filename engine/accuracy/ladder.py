@@ -7,13 +7,15 @@ as no worse.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, swift_scheme_fits
-from engine.accuracy.reference import Converged, Halted, as_fixed, converge, in_full, is_free
+from engine.accuracy.reference import Converged, Halted, Share, as_fixed, converge, in_full, is_free
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
 from engine.lanes import LaneValues
@@ -37,7 +39,7 @@ FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer
 FLAT = 1.2  # times what a column leaves: finer rungs gain nothing
 MORE = 2.0  # times the fewest modes that leave little: nobody chooses more
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all
-ENOUGH = 0.3  # of the tolerance: pilots climb no further, as nobody chooses what is finer
+ENOUGH = 0.2  # of the tolerance: pilots climb no further, as nobody chooses what is finer
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be too
 
 
@@ -51,12 +53,15 @@ class Ladder:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What P pilots found: error (columns, cuts, P, R) of every result, infinite where it is not known; held (columns,
-    cuts, P): the largest of those that are held, without what the study itself fixes, over their tolerances;
-    reference (R, P): the errors of the references themselves; marched (columns, cuts): rungs that any has marched;
-    work: modes x steps over a passage or cycle of all their marches."""
+    """What P pilots found: error (M, R) of every result in each march of a pilot, the first infinite; pilot (M,): whose
+    it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
+    largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
+    the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
+    over a passage or cycle of all their marches."""
 
     error: Array
+    pilot: Counts
+    march: NDArray[np.int32]
     held: Array
     reference: Array
     marched: NDArray[np.bool_]
@@ -97,45 +102,49 @@ def _models(asked: Asked, grid: SceneGrid) -> list[str]:
 @dataclass(eq=False)
 class Climb:
     """Pilots of one scene on the ladder. span: the least and the largest `solver.tolerance` that a variant wants, over
-    the study's; ``values`` have the least."""
+    the study's; ``values`` have the least. share: does marches that need not wait for each other."""
 
     grid: SceneGrid
     values: LaneValues
     ladder: Ladder
     halted: Halted
+    share: Share
     span: tuple[float, float] = (1.0, 1.0)
     truth: Converged = field(init=False)
     aim: Converged = field(init=False)
-    error: Array = field(init=False)
+    found: list[tuple[Counts, Array]] = field(init=False)
+    march: NDArray[np.int32] = field(init=False)
     held: Array = field(init=False)
     marched: NDArray[np.bool_] = field(init=False)
     floor: dict[int, Array] = field(init=False)
     enough: dict[str, Array] = field(init=False)
     work: Array = field(init=False)
+    _rules: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    _finding: threading.Lock = field(default_factory=threading.Lock)
 
     def go(self) -> None:
         """Find the references of the pilots, what each model and number of modes can do for them, and with how many
         steps. Raises Halted."""
-        full = converge(self.grid, self.values, in_full(self.grid), REFERENCE_PART, halted=self.halted)
-        self.truth, self.aim = full, full
-        if not is_free(self.grid):
-            self.aim = converge(self.grid, self.values, as_fixed(self.grid), REFERENCE_PART, halted=self.halted)
+        refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, halted=self.halted, share=self.share)
+        full = refer(levels=in_full(self.grid))
+        self.truth, self.aim = full, full if is_free(self.grid) else refer(levels=as_fixed(self.grid))
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
-        self.error = np.full((*shape, len(full.error)), np.inf)
+        self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(full.error)), np.inf))]
+        self.march = np.zeros(shape, dtype=np.int32)
         self.held = np.full(shape, np.inf)
         self.marched, self.work = np.zeros(shape[:2], dtype=np.bool_), np.zeros(shape[0])
         self.floor, self.enough = {}, {}
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        for column in self.floor:
-            self._climb(column)
+        self.share([partial(self._climb, column) for column in self.floor])
         for name, enough in self.enough.items():
             self._fill(name, enough)
 
     def measured(self) -> Measured:
         """What the jobs found."""
         work = float(self.work.sum() + self.truth.spent.sum())
-        return Measured(self.error, self.held, self.truth.error, self.marched, work)
+        pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
+        return Measured(error, pilot, self.march, self.held, self.truth.error, self.marched, work)
 
     def _judge(self, name: str) -> None:
         """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave
@@ -169,8 +178,8 @@ class Climb:
             return np.full(self.values.size, np.inf)
         work = cuts[np.minimum(fine, cuts.size - 1)] * self._unit(column) * self._model(column).body_modes
         lanes = np.flatnonzero(fits & (fine < cuts.size) & (work <= self.truth.used["work"]))
-        for rung in np.unique(fine[lanes]):
-            self._march(column, int(rung), lanes[fine[lanes] == rung])
+        rungs = [int(rung) for rung in np.unique(fine[lanes])[::-1]]
+        self.share([partial(self._march, column, rung, lanes[fine[lanes] == rung]) for rung in rungs])
         found = np.full(self.values.size, np.inf)
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
@@ -201,11 +210,11 @@ class Climb:
             if numerics.fidelity != name:
                 continue
             previous = before.get(numerics.scheme)
-            lanes = np.flatnonzero((numerics.modes > MORE * enough) & ~np.isfinite(self.held[column]).any(axis=0))
+            lanes = np.flatnonzero((numerics.modes > enough) & ~np.isfinite(self.held[column]).any(axis=0))
             if previous is not None and lanes.size:
                 allowed = np.array(self.ladder.cuts)[:, None] >= self._least(column)[0][lanes]
                 self.held[column][:, lanes] = np.where(allowed, self.held[previous][:, lanes], np.inf)
-                self.error[column][:, lanes] = np.where(allowed[..., None], self.error[previous][:, lanes], np.inf)
+                self.march[column][:, lanes] = np.where(allowed, self.march[previous][:, lanes], 0)
             before[numerics.scheme] = column
 
     def _fine(self, column: int) -> Counts:
@@ -217,9 +226,11 @@ class Climb:
 
     def _least(self, column: int) -> tuple[Array, Array]:
         """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
-        model = self._model(column)
-        periods = self.values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
-        return least_steps(model, self.values) / self._unit(column), periods
+        if column not in self._rules:
+            model = self._model(column)
+            periods = self.values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
+            self._rules[column] = least_steps(model, self.values) / self._unit(column), periods
+        return self._rules[column]
 
     def _model(self, column: int) -> SceneModel:
         return self.grid.model(self.ladder.columns[column])
@@ -243,7 +254,9 @@ class Climb:
             against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
         held = worst_held(against, results)
         self.marched[column, rung] = True
-        self.work[column] += lanes.size * model.body_modes * tables.steps
-        for finer in range(rung, len(self.ladder.cuts)):
-            self.error[column, finer, lanes] = error.T
-            self.held[column, finer, lanes] = held
+        self.work[column] += lanes.size * model.body_modes * tables.steps  # one column is climbed by one thread
+        self.held[column, rung:, lanes] = held[:, None]
+        with self._finding:
+            first = sum(pilot.size for pilot, _ in self.found)
+            self.found.append((lanes, error.T))
+        self.march[column, rung:, lanes] = first + np.arange(lanes.size)[:, None]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.choice import MOST_SCENES, PILOTS, coordinates, pilots_of
+from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, PILOTS, coordinates, pilots_of
 from engine.accuracy.reference import converge, in_full
 from engine.kernels.choice import ALIKE, cheapest, nearest
 from engine.plan import make_plan
@@ -90,8 +90,15 @@ def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
     plan = make_plan(passages(sweep=lengths | SPEEDS, sensor={}))
     found = pilots_of(plan.cases, plan.members)
     np.testing.assert_array_equal(found, pilots_of(plan.cases, plan.members))
-    assert found.size == PILOTS == np.unique(found).size and found.max() < plan.size
+    assert found.size == FEWEST_PILOTS == np.unique(found).size and found.max() < plan.size
     assert sum(np.isin(members, found).any() for members in plan.members) <= MOST_SCENES < len(plan.members)
+
+
+def test_more_variants_have_more_pilots() -> None:
+    """Up to as many as are worth it."""
+    plan = make_plan(passages(100, 100))
+    assert pilots_of(plan.cases, plan.members).size == PILOTS > FEWEST_PILOTS
+    assert pilots_of(plan.cases, plan.members, 16).size == 16
 
 
 def test_distances_know_axes_of_more_than_one_value() -> None:

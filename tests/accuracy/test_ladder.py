@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from engine.accuracy.ladder import ENOUGH, Climb, ladder_of
+from engine.accuracy.reference import in_turn
 from tests.accuracy.passages import only_grid, passages
 from tests.engine.build import Table, beam, cruise, fixed, force, oscillator
 from tests.engine.riders import FLEXIBLE, THREE, riding
@@ -63,7 +64,7 @@ def test_bodies_that_ride_have_statics_and_the_full_model() -> None:
 def climbed() -> Climb:
     """Twelve pilots."""
     grid = only_grid(passages(4, 3, solver={"tolerance": 1e-2}))
-    found = Climb(grid, grid.values, ladder_of(grid.asked, grid), lambda: False)
+    found = Climb(grid, grid.values, ladder_of(grid.asked, grid), lambda: False, in_turn)
     found.go()
     return found
 

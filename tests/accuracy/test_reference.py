@@ -78,14 +78,14 @@ SCENES: dict[str, Study] = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_what_is_told_is_no_less_than_the_truth(name: str) -> None:
-    """Of the held results, against a level beyond those that changed by a hundredth; rarely a little less."""
+    """Of the held results, against a level beyond those that changed by a hundredth."""
     grid = only_grid(SCENES[name])
     found = converge(grid, grid.values, in_full(grid), 0.5)
     truth = converge(grid, grid.values, in_full(grid), 0.01, beyond=1)
     off = differences(grid.asked, grid.scene, grid.values, found.outcome, truth.outcome)
     held = np.isfinite([result.tolerance for result in results_of(grid.asked)])
     over = off[held] / (found.error[held] + truth.error[held])
-    assert np.mean(over <= 1.0) >= 0.85 and over.max() <= 2.0
+    assert over.max() <= 1.0
     assert np.all(off[held] <= 1e-3)
 
 
