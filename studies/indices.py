@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.kernels.legs import add_legs
+
 Array = NDArray[np.float64]
 
 FLAT = 1e-8  # of its largest value, below which a range is rounding
@@ -103,15 +105,10 @@ def asymmetry(legs: Legs, forward: float) -> Asymmetry:
     goes along the position, -1 against it. NaN where the static response does not vary but for rounding.
     """
     level = np.abs(legs.static).max(axis=0)
-    along, across, area, odd_square, even_square = (np.zeros(legs.size.shape) for _ in range(5))
-    fields = zip(legs.weight, legs.forward, legs.backward, legs.static, legs.slope, strict=True)
-    for weight, out, back, static, slope in fields:
-        odd, excess, rise = 0.5 * (out - back), 0.5 * (out + back) - static, forward * slope
-        along += weight * (rise * rise)
-        across += weight * (odd * rise)
-        area += weight * (2.0 * odd)
-        odd_square += weight * (odd * odd)
-        even_square += weight * (excess * excess)
+    sums, rows = np.zeros((5, legs.size.size)), (legs.weight.size, legs.size.size)
+    fields = (legs.forward, legs.backward, legs.static, forward * legs.slope)
+    add_legs(legs.weight, *(np.ascontiguousarray(field).reshape(rows) for field in fields), sums)
+    along, across, area, odd_square, even_square = sums.reshape(5, *legs.size.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (across / along, area / legs.size, np.sqrt(odd_square) / legs.size, np.sqrt(even_square) / legs.size)
     varies = legs.size > FLAT * level

@@ -41,7 +41,7 @@ MODES = (4, 8, 16, 32, 64)  # of the levels: 64 are what a beam's closed forms w
 MOST_WORK = 3e7
 #: Modes x steps over the whole time of a march that a reference is not worth which is off by less than so much of the
 #: tolerance: in the built-in shuttles such marches were nine tenths of all, and the choice was the same.
-DEAR, DOUBTED = 3e7, 0.4
+DEAR, DOUBTED = 1e7, 0.4
 FIRST_PERIODS = 20  # steps per first period of average acceleration at level 0: 8e-3 of phase, 2e-6 at level 3
 USUAL_LEVEL = 2  # to which most pilots and answers go; for expected times only
 MARGIN = 1.25  # times the rules that no march may break: bands of growth end at 1.1 (`fidelity.LEAST_MARGIN`)

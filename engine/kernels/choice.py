@@ -7,23 +7,24 @@ from engine.kernels.jit import kernel
 
 @kernel
 def nearest(points, pilots, found):
-    """found (V, k): numbers of the k nearest pilots (P, D) of every point (V, D), the nearest first."""
+    """found (V, k): numbers of the k nearest pilots (D, P) of every point (V, D), the nearest first."""
     k = found.shape[1]
-    distance = np.empty(k)
+    distance, apart = np.empty(k), np.empty(pilots.shape[1])
     for v in range(points.shape[0]):
         distance[:] = np.inf
         found[v] = 0
-        for p in range(pilots.shape[0]):
-            apart = 0.0
-            for d in range(points.shape[1]):
-                apart += (points[v, d] - pilots[p, d]) ** 2
-            place = k
-            while place > 0 and apart < distance[place - 1]:
-                place -= 1
-            for later in range(k - 1, place, -1):
-                distance[later], found[v, later] = distance[later - 1], found[v, later - 1]
-            if place < k:
-                distance[place], found[v, place] = apart, p
+        apart[:] = 0.0
+        for d in range(points.shape[1]):
+            at = points[v, d]
+            for p in range(pilots.shape[1]):
+                apart[p] += (at - pilots[d, p]) ** 2
+        for p in range(pilots.shape[1]):
+            if apart[p] < distance[k - 1]:
+                place = k - 1
+                while place > 0 and apart[p] < distance[place - 1]:
+                    distance[place], found[v, place] = distance[place - 1], found[v, place - 1]
+                    place -= 1
+                distance[place], found[v, place] = apart[p], p
 
 
 @kernel

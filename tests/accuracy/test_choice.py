@@ -53,7 +53,7 @@ def given_numbers(seed: int) -> tuple[Array, Array, Array, NDArray[np.int32], Ar
 def by_kernels(seed: int) -> tuple[Any, Any]:
     points, pilots, held, order, limit = given_numbers(seed)
     neighbours, rung = np.empty((50, 4), dtype=np.int32), np.empty(50, dtype=np.int32)
-    nearest(points, pilots, neighbours)
+    nearest(points, np.ascontiguousarray(pilots.T), neighbours)
     cheapest(held, order, 9, neighbours, limit, rung)
     return neighbours, rung
 
@@ -81,7 +81,7 @@ def test_kernels_without_the_compiler(tmp_path: Path) -> None:
 
 def test_fewer_pilots_than_neighbours() -> None:
     found = np.empty((5, 2), dtype=np.int32)
-    nearest(np.linspace(0.0, 1.0, 5)[:, None], np.array([[0.9], [0.1]]), found)
+    nearest(np.linspace(0.0, 1.0, 5)[:, None], np.array([[0.9, 0.1]]), found)
     assert found.tolist() == [[1, 0], [1, 0], [0, 1], [0, 1], [0, 1]] or found[2].tolist() == [1, 0]
 
 
