@@ -110,13 +110,13 @@ def outcome(
 ) -> Outcome:
     """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
     own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
-    counts = np.union1d(own, stations)
+    counts = np.unique(np.concatenate([own, stations, *(side.counts for side in tables.kinks)]))
     lanes, size = values.padded, values.size
     marched = march_chosen(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
-        **_extremes(tables, marched),
+        **_extremes(tables, marched, counts),
         **_contact_forces(tables, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
@@ -157,9 +157,12 @@ def _rests(tables: SceneTables) -> bool:
     return tables.model.fidelity is Fidelity.STATIC
 
 
-def _extremes(tables: SceneTables, marched: Marched) -> Flat:
+def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
     """Largest and smallest value of every sensor, where the first carriage was then, and the root mean square."""
     found: Flat = {}
+    for side in tables.kinks:
+        reading = np.tensordot(side.weights, marched.history[np.searchsorted(counts, side.counts), side.sensor], 1)
+        _raise(marched.marks[side.sensor], reading, side.at)
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         marks = marched.marks[j]
         seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
@@ -169,6 +172,13 @@ def _extremes(tables: SceneTables, marched: Marched) -> Flat:
         found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, marks[SMALLEST_AT])
         found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / np.where(marks[SECONDS] > 0.0, marks[SECONDS], 1.0))
     return found
+
+
+def _raise(marks: Array, reading: Array, at: float) -> None:
+    """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
+    for value, place, beyond in ((LARGEST, LARGEST_AT, np.greater), (SMALLEST, SMALLEST_AT, np.less)):
+        more = beyond(reading, marks[value])
+        marks[value], marks[place] = np.where(more, reading, marks[value]), np.where(more, at, marks[place])
 
 
 def _envelopes(own: SceneTables, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:

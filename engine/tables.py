@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -12,12 +11,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine import kinks
 from engine.contacts import ContactForce
 from engine.grips import residual
 from engine.influence import static_readings
 from engine.kernels.layout import Alpha, Newmark, Ties, Watch
 from engine.model import SceneModel
-from engine.readings import OF_SECTIONS, Sensor
+from engine.readings import Sensor
 from engine.signals import Signal, build_signals, last_signals, tabulate_missed, tabulate_watch
 from engine.step_rules import free_steps
 from engine.ties import Grip
@@ -89,7 +89,7 @@ class SceneTables:
         if self.refinement > 1:
             free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
         steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
-        stops = kinks(self.model, self.sensors) if self.stops == "kinks" and self.window == "whole" else ()
+        stops = kinks.stops(self.model, self.sensors) if self.stops == "kinks" and self.window == "whole" else ()
         return build_timeline(self.model.riders, steps, self.window, free, stops)
 
     @cached_property
@@ -112,6 +112,12 @@ class SceneTables:
     def sensors(self) -> tuple[Sensor, ...]:
         """The study's sensors."""
         return tuple(signal for signal in self.signals if isinstance(signal, Sensor))
+
+    @cached_property
+    def kinks(self) -> tuple[kinks.Side, ...]:
+        """Kinks of the study's sensors between the stations of a cycle."""
+        own = self.sensors[: len(self.model.study.sensor)]
+        return kinks.sides(self.model, own, self.timeline) if self.window == "last-cycle" else ()
 
     @cached_property
     def scheme(self) -> Newmark | Alpha:
@@ -253,15 +259,6 @@ class SceneTables:
         )
         change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
         return np.asarray(change / (after - before)[:, None])
-
-
-def kinks(model: SceneModel, sensors: Iterable[Sensor]) -> Iterator[float]:
-    """Scene times at which a load passes a sensor whose influence line has a kink there: steps must not miss it."""
-    for sensor in sensors:
-        if sensor.under is None and sensor.quantity in OF_SECTIONS:
-            for carriage in model.carriages:
-                for rider, _ in carriage.loads if carriage.body == sensor.body else ():
-                    yield from model.riders[rider].passes(sensor.at)
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

@@ -202,6 +202,13 @@ class Timeline:
         index = np.maximum(np.searchsorted(firsts, counts, side="left") - 1, 0)
         return index, starts[index] + (counts - firsts[index]) * steps[index]
 
+    def counts_at(self, tau: Array) -> Array:
+        """Fractional counts of scene times before any free vibration, between their neighbouring stations."""
+        firsts, starts, steps, _ = self._columns
+        driven = [not segment.free for segment in self.segments]
+        index = np.maximum(np.searchsorted(starts[driven], tau, side="right") - 1, 0)
+        return np.asarray(firsts[index] + (tau - starts[index]) / steps[index])
+
     @cached_property
     def _columns(self) -> tuple[Counts, Array, Array, NDArray[np.bool_]]:
         """First count, start and step of every segment, and (segments, riders) who is in contact."""

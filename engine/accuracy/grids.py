@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from engine.envelopes import with_companions
 from engine.kernels.schemes import SCHEMES
+from engine.kinks import stops
 from engine.lanes import LaneValues
 from engine.model import SceneModel, with_numerics
 from engine.numerics import Numerics, open_bodies
 from engine.outcome import Asked
 from engine.sensors import MOST_PLACES
 from engine.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
-from engine.tables import SceneTables, StaticUnit, kinks
+from engine.tables import SceneTables, StaticUnit
 from engine.timeline import Grid, build_grid, refined
 
 Array = NDArray[np.float64]
@@ -52,8 +53,8 @@ class SceneGrid:
     def grid(self) -> Grid:
         """The scene cut at its events, and where loads pass kinks of influence lines."""
         model, whole = self.scene, self.asked.window == "whole"
-        stops = kinks(model, SceneTables(model, 1, self.asked.window).sensors) if whole and not self.fixed else ()
-        return build_grid(model.riders, self.unit, self.asked.window, self._free_unit, stops)
+        cut = stops(model, SceneTables(model, 1, self.asked.window).sensors) if whole and not self.fixed else ()
+        return build_grid(model.riders, self.unit, self.asked.window, self._free_unit, cut)
 
     @property
     def fixed(self) -> bool:

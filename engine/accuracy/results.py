@@ -17,7 +17,7 @@ from engine.envelopes import envelope_names
 from engine.lanes import LaneValues, weights
 from engine.model import SceneModel
 from engine.outcome import Asked, Outcome
-from engine.reduction import Compared
+from engine.reduction import HISTORY_PART, Compared
 from engine.scene import Study
 from results_schema.status import Status
 
@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 TOLD = ("velocity", "acceleration", "contact_force")  # need not converge: forces that enter excite every mode
 EXTREMES = ("max", "min", "rms")
 ENDS = ("max", "min")
-#: Of what histories differ by that extremes may be off without differing: with none of it 40 % of the errors told of
-#: 300 passages were too small, as two extremes agree by chance.
-HISTORY_PART = 0.5
 
 
 class Result(NamedTuple):
@@ -150,7 +147,8 @@ class OfCycles:
     def differences(self, pair: Pair) -> Iterator[Array]:
         if pair.asked.reduction is not None:
             scale = pair.other.scale
-            compared = Compared(pair.one.numbers, pair.other.numbers, scale, pair.values)
+            apart = pair.apart[: len(pair.asked.study.sensor)]
+            compared = Compared(pair.one.numbers, pair.other.numbers, scale, apart, pair.values)
             for gaps in pair.asked.reduction.differences(compared).values():
                 yield from np.where(np.isinf(scale), 0.0, gaps).T
 

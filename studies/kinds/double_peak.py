@@ -125,7 +125,7 @@ class DoublePeakReduction:
         gaps = compared.gap("harmonic")
         known = ~np.isnan(gaps).all(axis=2)  # few steps tell few harmonics
         harmonics = np.where(known, np.max(np.where(np.isnan(gaps), -np.inf, gaps), axis=2), np.nan)
-        return {"peak_value": compared.relative(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
+        return {"peak_value": compared.of_readings(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
 
 
 class DoublePeak:

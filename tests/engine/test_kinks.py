@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from engine.execution import run
+from engine.outcome import outcome
 from engine.plan import make_plan
 from engine.tables import SceneTables
 from engine.timeline import Rider
+from studies import kind_named
 from tests.engine.build import beam, cruise, fixed, force, shuttle, study
 
 AT = 0.3137
@@ -39,3 +41,35 @@ def test_chosen_steps_do_not_jump_over_a_kink() -> None:
 def test_static_readings_know_the_kink() -> None:
     found = run(study(beam(modes=4), SLOW, sensor=MOMENT, solver={"fidelity": "static"}))
     assert float(found.moment_max) == pytest.approx(AT * (1.0 - AT), rel=1e-12)
+
+
+@pytest.mark.parametrize("steps", [101, 130, 250])
+def test_the_steps_of_a_cycle_do_not_jump_over_a_kink(steps: int) -> None:
+    """A slow force to and fro: the largest moment is P a b/L there, and the shear forces on either side are its parts,
+    though no station is near."""
+    car = force(1.0, shuttle(0.05, 0.95, 0.002, 0.1, 1))
+    sensors = MOMENT | {"shear": fixed(AT, "shear_force")}
+    given = study(
+        beam(modes=6, damping_ratio=0.1), car, sensor=sensors, solver={"steps": steps, "scheme": "average-acceleration"}
+    )
+    plan = make_plan(given, reduction=kind_named("double-peak").reduction(given))
+    tables = plan.groups[0].tables
+    assert np.abs(tables.timeline.positions(0, np.arange(steps + 1.0)) - AT).min() > 1e-4
+    found = outcome(plan.asked, tables, plan.values(plan.groups[0], np.zeros(1, np.int64)), np.zeros(0, np.int64))
+    assert float(found.numbers["moment_max"][0]) == pytest.approx(AT * (1.0 - AT), rel=1e-4)
+    assert float(found.numbers["moment_max_position"][0]) == pytest.approx(AT, abs=1e-9)
+    ends = sorted(float(abs(found.numbers[f"shear_{end}"][0])) for end in ("max", "min"))
+    assert ends == pytest.approx([AT, 1.0 - AT], rel=2e-3)
+
+
+def test_weights_beside_a_kink_are_those_of_parabolas() -> None:
+    given = study(beam(), force(1.0, shuttle(0.1, 0.9, 1.0, 0.2, 2)), sensor=MOMENT)
+    tables = SceneTables(make_plan(given).base, 64, "last-cycle")
+    first, last = tables.timeline.window
+    assert len(tables.kinks) == 4
+    for side in tables.kinks:
+        tau, times = (tables.timeline.moments(np.atleast_1d(at))[1] for at in (side.at, side.counts))
+        assert side.weights @ (3.0 - times + 7.0 * times**2) == pytest.approx(
+            3.0 - tau[0] + 7.0 * tau[0] ** 2, rel=1e-9
+        )
+        assert first <= side.counts[0] and side.counts[-1] <= last and np.abs(side.counts - side.at).min() < 1.0

@@ -32,7 +32,7 @@ def gaps(one: Array, other: Array) -> tuple[float, tuple[float, float]]:
     """How far the peaks of two cycles are apart by what the study reports, and how many both have."""
     here, there = (answers(cycle) | {"harmonic": np.zeros((1, 1, 1))} for cycle in (one, other))
     values = LaneValues(study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak"), {}, 1)
-    compared = Compared(here, there, np.ones((1, 1)), values)
+    compared = Compared(here, there, np.ones((1, 1)), np.zeros((1, 1)), values)
     numbers = float(here["peaks_per_cycle"][0, 0]), float(there["peaks_per_cycle"][0, 0])
     return float(DoublePeakReduction().differences(compared)["peak_value"][0, 0]), numbers
 
@@ -92,7 +92,8 @@ def test_a_peak_that_is_missing_is_told_by_harmonics() -> None:
     scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
     cycles = [TWO, TWO + bump(0.45, 0.1, 0.05)]
     one, other = (answers(cycle) | {"harmonic": harmonics(cycle[:, None, None]).T} for cycle in cycles)
-    found = DoublePeakReduction().differences(Compared(one, other, np.ones((1, 1)), LaneValues(scene, {}, 1)))
+    compared = Compared(one, other, np.ones((1, 1)), np.zeros((1, 1)), LaneValues(scene, {}, 1))
+    found = DoublePeakReduction().differences(compared)
     assert found["harmonic"][0, 0] == pytest.approx(2.0 * 0.1 * 0.05 * np.sqrt(np.pi), rel=0.05)
 
 
@@ -127,3 +128,11 @@ def test_histories_of_a_chunk_fit_their_memory_whatever_the_steps() -> None:
         stations = counts_reduced(group.tables.timeline, STATIONS).size
         assert stations == steps + 1 if steps <= 8192 else 8192 < stations <= 16384
         assert 8 * stations * plan.lanes_per_chunk(group) <= 1.01 * CHUNK_BYTES
+
+
+def test_peaks_are_told_no_less_than_half_of_what_histories_differ_by() -> None:
+    """Of two cycles that are shifted the peaks are the same by chance."""
+    scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
+    same = answers(TWO) | {"harmonic": np.zeros((1, 1, 1))}
+    compared = Compared(same, same, np.full((1, 1), 2.0), np.full((1, 1), 0.3), LaneValues(scene, {}, 1))
+    assert DoublePeakReduction().differences(compared)["peak_value"].tolist() == [[pytest.approx(0.3 / 2.0 / 2.0)]]
