@@ -61,22 +61,15 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
 
 def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
     """The audit, shared out among threads."""
-    from engine.accuracy.audit import audit, joined
+    from engine.accuracy.audit import audit
     from engine.execution import run_jobs
     from engine.march import Halted
 
-    found: dict[int, Audit] = {}
-
-    def one(number: int, part: Counts) -> None:
-        found[number] = audit(plan, part, work.halted)
-
-    parts = np.array_split(variants, work.threads)
     try:
-        run_jobs([partial(one, number, part) for number, part in enumerate(parts)], work.threads)
+        return audit(plan, variants, work.halted, partial(run_jobs, threads=work.threads))
     except Halted:
         work.check()
         raise
-    return joined([found[number] for number in range(len(parts))], plan, variants.size)
 
 
 def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:

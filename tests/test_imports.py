@@ -27,7 +27,7 @@ STAGES = {
     "what a variant is computed with": "numerics",
     "bodies as modes": "bodies.*",
     "scenes as arrays": "timeline ties standing model ways grips statics track readings contacts signals lanes "
-    "influence coupled step_rules tables envelopes histories reduction scenes",
+    "influence coupled step_rules kinks tables envelopes histories reduction scenes",
     "the march": "starting march quasistatic richardson ode transition comparison cycles",
     "what a march reports": "outcome",
     "errors that are measured": "accuracy accuracy.*",

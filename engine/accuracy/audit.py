@@ -5,14 +5,16 @@ references of pilots have.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, Group
 from engine.accuracy.ladder import REFERENCE_PART
-from engine.accuracy.reference import Converged, Halted, converge, in_full, usual_work
+from engine.accuracy.reference import Converged, Halted, Share, converge, in_full, in_turn, usual_work
 from engine.accuracy.results import differences, results_of
 from engine.chunk import told_errors
 from engine.kernels.layout import LANES
@@ -65,26 +67,31 @@ def audit_size(plan: Plan) -> int:
 def _seconds(plan: Plan, count: int) -> float:
     """Expected time of an audit on one thread."""
     share, found = min(1.0, count / plan.size), 0.0
-    for grid, members in zip(plan.grids, plan.members, strict=True):
-        own = share * members.size
-        lanes = max(own, LANES * min(1.0, own)) + TABLES * min(1.0, own)
-        found += float(np.mean(usual_work(grid))) * lanes * grid.scene.ties / PACE
+    for grid in plan.grids:
+        work, number = np.unique(usual_work(grid), return_counts=True)  # each march has its tables, and whole blocks
+        own = share * number
+        lanes = np.maximum(own, LANES * np.minimum(1.0, own)) + TABLES * np.minimum(1.0, own)
+        found += float(work @ lanes) * grid.scene.ties**1.2 / PACE
     return found
 
 
-def audit(plan: Plan, variants: Counts, halted: Halted) -> Audit:
-    """Compute some variants again. Raises Halted."""
-    found = []
-    for grid, members in zip(plan.grids, plan.members, strict=True):
-        own = np.intersect1d(members, variants)
-        if own.size:
-            values = LaneValues(grid.scene.study, plan.cases.columns_of(own), own.size)
-            truth = converge(grid, values, in_full(grid), REFERENCE_PART, beyond=1, halted=halted)
-            found += [
-                _compared(plan, group, own, truth, halted)
-                for group in plan.groups
-                if group.grid is grid and np.isin(own, group.variants).any()
-            ]
+def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) -> Audit:
+    """Compute some variants again, by jobs that ``share`` does. Raises Halted."""
+    parts = [variants[np.isin(variants, members)] for members in plan.members]
+    of_scenes = [(grid, own) for grid, own in zip(plan.grids, parts, strict=True) if own.size]
+    within, across = (share, in_turn) if len(of_scenes) == 1 else (in_turn, share)
+    found: list[Audit] = []
+
+    def of_scene(grid: SceneGrid, own: Counts) -> None:
+        values = LaneValues(grid.scene.study, plan.cases.columns_of(own), own.size)
+        truth = converge(grid, values, in_full(grid), REFERENCE_PART, beyond=1, halted=halted, share=within)
+        groups = [g for g in plan.groups if g.grid is grid and np.isin(own, g.variants).any()]
+        within([partial(compare, group, own, truth) for group in groups])
+
+    def compare(group: Group, own: Counts, truth: Converged) -> None:
+        found.append(_compared(plan, group, own, truth, halted))
+
+    across([partial(of_scene, *scene) for scene in of_scenes])
     return joined(found, plan, variants.size)
 
 
