@@ -52,9 +52,8 @@ def chosen(plan: Plan) -> list[Part]:
 def _chosen(plan: Plan, group: MarchGroup) -> Part:
     assert plan.choice is not None
     some = group.variants[spread(group.variants.size, MOST_LOOKED_AT)]
-    return Part(
-        group.variants.size, used(group.tables, 1), _largest(plan, plan.choice.errors(some)), plan.choice.held(some)
-    )
+    held = plan.choice.held(some, plan.cases_tolerance[some])
+    return Part(group.variants.size, used(group.tables, 1), _largest(plan, plan.choice.errors(some)), held)
 
 
 def converged(plan: Plan, found: Found) -> Iterator[Part]:

@@ -47,7 +47,8 @@ TELLING = (0.01, 100.0)  # of the tolerance: errors beyond tell nothing of what 
 @dataclass(frozen=True, eq=False)
 class Choice:
     """The rung of every variant. pilots (P,): their flat numbers; neighbours (V, k) numbers of pilots; rung (V,): of
-    the ladder's columns x cuts; margin (R,) of each result; held_margin: of what decides."""
+    the ladder's columns x cuts; margin (R,) of each result; decisive (2, columns x cuts, P): errors that are held over
+    their tolerances, of those that follow the study's and of those that have their own."""
 
     ladder: Ladder
     results: tuple[Result, ...]
@@ -69,9 +70,11 @@ class Choice:
         worst = np.max(self._told[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(worst), worst, np.nan).T
 
-    def held(self, variants: Counts) -> Array:
-        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances."""
-        return np.asarray(np.max(self.decisive[self.rung[variants, None], self.neighbours[variants]], axis=1))
+    def held(self, variants: Counts, tighter: Array) -> Array:
+        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
+        `solver.tolerance` of the variants over the study's."""
+        follows, own = np.max(self.decisive[:, self.rung[variants, None], self.neighbours[variants]], axis=2)
+        return np.asarray(np.maximum(follows / tighter, own))
 
     @cached_property
     def _told(self) -> Array:
@@ -123,12 +126,15 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, 
     weights = _weights(pilots, measured)
     pilots = np.ascontiguousarray((pilots * weights).T)
     margin, held_margin = _margins(measured, pilots, results, (DECIDING[0] * span[0], DECIDING[1] * span[1]))
-    held = held_margin * measured.held
     if is_free(climbs[0].grid):  # what is told is what decides
-        held = worst_held(told(measured, margin).T, deciding(results, asked.study.solver.tolerance))[measured.march]
-    held = np.where(np.isnan(held), 0.0, held).reshape(-1, order.size)  # of pilots without a truth, which say nothing
+        error = told(measured, margin).T
+        parts = [worst_held(error, part)[measured.march] for part in _parted(asked)]
+    else:
+        parts = [np.where(_holds(part), held_margin * measured.held, 0.0) for part in _parted(asked)]
+    held = np.stack(parts)
+    held = np.where(held > 0.0, held, 0.0).reshape(2, -1, order.size)  # pilots without a truth say nothing
     ranked = np.argsort(cost, kind="stable").astype(np.int32)
-    ranked = ranked[np.isfinite(held[ranked]).any(axis=1)]
+    ranked = ranked[np.any(np.isfinite(held[:, ranked].max(axis=0)), axis=1)]
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
     tighter, rung = cases_tolerance(asked, cases), np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=np.int32)
@@ -140,6 +146,18 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, 
 
     share([partial(choose_for, part) for part in np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))])
     return Choice(climbs[0].ladder, results, order, measured, neighbours, rung, margin, held)
+
+
+def _parted(asked: Asked) -> tuple[tuple[Result, ...], tuple[Result, ...]]:
+    """The results that decide, held to the study's tolerance, which a sweep may set, and held to one of their own."""
+    results = deciding(results_of(asked), asked.study.solver.tolerance)
+    follow = tuple(r if r.follows else r._replace(tolerance=np.nan) for r in results)
+    return follow, tuple(r._replace(tolerance=np.nan) if r.follows else r for r in results)
+
+
+def _holds(results: tuple[Result, ...]) -> bool:
+    """Whether any of some results is held to a tolerance."""
+    return bool(np.isfinite([result.tolerance for result in results]).any())
 
 
 def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:

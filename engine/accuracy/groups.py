@@ -147,7 +147,7 @@ class MarchGroup(Group):
         if choice is None:
             return Found(now, used(self.tables, variants.size), unknown, unknown[0])
         tighter = values.of("solver.tolerance") / self.scene.study.solver.tolerance
-        held = choice.held(variants) / tighter
+        held = choice.held(variants, tighter)
         if not np.isfinite(tolerances(results)).any():
             held = np.full(variants.size, -np.inf)  # what is only told decides, and misses nothing
         return Found(now, used(self.tables, variants.size), choice.errors(variants), held)

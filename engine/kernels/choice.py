@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from engine.kernels.jit import kernel
+from engine.kernels.jit import kernel, piece
 
 
 @kernel
@@ -27,28 +27,35 @@ def nearest(points, pilots, found):
                 distance[place], found[v, place] = apart[p], p
 
 
+@piece
+def worst_of(held, rung, near, limit):
+    """The largest of the errors ``held`` (2, rungs, P) on a rung of the pilots ``near`` (k,): of the first over the
+    variant's ``limit``, of the second as they are."""
+    worst = 0.0
+    for p in near:
+        follows, own = held[0, rung, p] / limit, held[1, rung, p]
+        worst = follows if not follows <= worst else worst
+        worst = own if not own <= worst else worst
+    return worst
+
+
 @kernel
 def cheapest(held, order, worth, neighbours, limit, found):
-    """found (V,): the first rung in this order whose ``held`` (rungs, P) is within the variant's ``limit`` for all its
-    neighbours (V, k); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
+    """found (V,): the first rung in this order on which all neighbours (V, k) of a variant hold, by `worst_of` with its
+    ``limit`` (V,); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
     for v in range(neighbours.shape[0]):
         found[v] = -1
         least = np.inf
         for place in range(order.shape[0]):
-            rung, worst = order[place], 0.0
-            for p in neighbours[v]:
-                worst = held[rung, p] if not held[rung, p] <= worst else worst
-            if worst <= limit[v]:
-                found[v] = rung
+            worst = worst_of(held, order[place], neighbours[v], limit[v])
+            if worst <= 1.0:
+                found[v] = order[place]
                 break
             if place < worth:
                 least = worst if worst < least else least
         if found[v] < 0:
             for rung in order[:worth]:
-                worst = 0.0
-                for p in neighbours[v]:
-                    worst = held[rung, p] if not held[rung, p] <= worst else worst
-                if worst <= ALIKE * least:
+                if worst_of(held, rung, neighbours[v], limit[v]) <= ALIKE * least:
                     found[v] = rung
                     break
             found[v] = order[worth - 1] if found[v] < 0 else found[v]

@@ -52,6 +52,10 @@ STUDIES: dict[str, Study] = {
     "told only": sweep(sensor=midspan("told")),
     "told only, out of reach": sweep(1e-9, sensor=midspan("told"), bed=beam(modes=3)),
     "own tolerance": sweep(sensor=midspan(5e-2)),
+    "own tolerance, others swept": sweep(
+        sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [1e-2, 1e-1]}},
+        sensor=midspan(2e-3) | {"quarter": fixed(0.25)},
+    ),
     "all is fixed": sweep(bed=beam(modes=3), solver=ALL_FIXED),
 }
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, PILOTS, coordinates, pilots_of
 from engine.accuracy.reference import converge, in_full
+from engine.accuracy.results import results_of
 from engine.kernels.choice import ALIKE, cheapest, nearest
 from engine.plan import make_plan
 from results_schema.status import Status
@@ -33,8 +34,8 @@ def near_by_numpy(points: Array, pilots: Array, count: int) -> NDArray[np.int64]
 def cheapest_by_numpy(held: Array, order: Any, worth: int, neighbours: Any, limit: Array) -> NDArray[np.int64]:
     found = []
     for near, most in zip(neighbours, limit, strict=True):
-        worst = held[order][:, near].max(axis=1)
-        fits = np.flatnonzero(worst <= most)
+        worst = np.maximum(held[0][order][:, near] / most, held[1][order][:, near]).max(axis=1)
+        fits = np.flatnonzero(worst <= 1.0)
         least = worst[:worth].min()
         alike = np.flatnonzero(worst[:worth] <= ALIKE * least) if np.isfinite(least) else np.array([worth - 1])
         found.append(order[fits[0] if fits.size else alike[0]])
@@ -45,7 +46,7 @@ def given_numbers(seed: int) -> tuple[Array, Array, Array, NDArray[np.int32], Ar
     """Points on a coarse lattice, so that many distances are equal, and errors, some of them unknown."""
     random = np.random.default_rng(seed)
     points, pilots = (random.integers(0, 6, (size, 3)) / 4.0 for size in (50, 20))
-    held = np.exp(random.normal(0.0, 2.0, (15, 20)))
+    held = np.exp(random.normal(0.0, 2.0, (2, 15, 20)) - np.array([0.0, 1.0])[:, None, None])
     held[random.random(held.shape) < 0.1] = np.inf
     return points, pilots, held, random.permutation(15).astype(np.int32), np.exp(random.normal(0.0, 1.0, 50))
 
@@ -173,6 +174,17 @@ def test_a_swept_tolerance_is_each_variants_own() -> None:
     fine = run.arrays["status"] == Status.OK
     assert np.all(run.arrays["error_estimate"][fine] <= wanted[fine] * (1.0 + 1e-6))
     assert np.mean(observed("swept tolerance")[:3, fine].max(axis=0) <= wanted[fine]) >= 0.97
+
+
+def test_a_tolerance_of_a_sensors_own_is_held_beside_a_looser_one() -> None:
+    """Whatever a sweep asks of the others."""
+    run = run_of("own tolerance, others swept")
+    names = [result.name for result in results_of(run.plan.asked)]
+    own = [names.index(f"midspan_{end}") for end in ("max", "min", "rms")]
+    fine = run.arrays["status"] == Status.OK
+    assert fine.mean() > 0.95
+    assert np.all(run.arrays["estimated_error"][fine][:, own] <= 2e-3 * (1.0 + 1e-6))
+    assert np.mean(observed("own tolerance, others swept")[own][:, fine].max(axis=0) <= 2e-3) >= 0.97
 
 
 def test_a_structural_axis_is_one_of_the_distance() -> None:
