@@ -25,7 +25,7 @@ def reduced(
 
     def static() -> Array:
         unit = tables.static_at(counts)
-        found = unit.gravity[:, :, None] * values.of("gravity")
+        found = unit.gravity[:, :, None] * values.gravity
         for r in range(loads.shape[0]):
             found = found + unit.force[:, :, r, None] * loads[r]
         return found

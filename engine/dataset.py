@@ -147,7 +147,7 @@ def _speed_ratio(plan: Plan) -> Array | None:
     found = np.empty(plan.size)
     for grid, members in zip(plan.grids, plan.members, strict=True):
         scene = grid.scene
-        speed = grid.values.of(f"carriage.{scene.carriages[0].name}.motion.speed")
+        speed = grid.values.speed(scene.carriages[0].name)
         found[members] = speed * np.pi / (scene.first_omega * scene.leading_body.modal.length)
     return found
 

@@ -77,7 +77,7 @@ def _name(model: SceneModel, contact: ContactForce) -> str:
 
 def _loads(model: SceneModel, values: LaneValues) -> Array:
     """(C + 1, V) weight of every carriage in N, and gravity."""
-    return np.stack([*weights(model, values), values.of("gravity")])
+    return np.stack([*weights(model, values), values.gravity])
 
 
 def _together(one: Array, other: Array) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from engine.bodies.beam import Rayleigh
 from engine.kernels.layout import LANES, Lanes
 from engine.model import SceneModel
 from engine.scene import Study
+from engine.ties import DamperTie, SpringTie
 
 Array = NDArray[np.float64]
 
@@ -38,13 +39,52 @@ class LaneValues:
     columns: Mapping[str, Array]
     size: int
 
-    def of(self, path: str) -> Array:
+    def _of(self, path: str) -> Array:
         """(V,) values at a dotted key."""
         found = self.columns.get(path)
         if found is None:
             value = self.study.value(path)
             return np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
         return found
+
+    @property
+    def gravity(self) -> Array:
+        """(V,) m/s^2."""
+        return self._of("gravity")
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """(V,) steps over a passage or cycle, where the study fixes them."""
+        return self._of("solver.steps").astype(np.int64)
+
+    @property
+    def tighter(self) -> Array:
+        """(V,) `solver.tolerance` over the study's own."""
+        return self._of("solver.tolerance") / self.study.solver.tolerance
+
+    def speed(self, carriage: str) -> Array:
+        """(V,) m/s, the top speed of a motion that has one."""
+        return self._of(f"carriage.{carriage}.motion.speed")
+
+    def force(self, carriage: str) -> Array:
+        """(V,) N of a carriage without inertia."""
+        return self._of(f"carriage.{carriage}.force")
+
+    def wheel_mass(self, carriage: str) -> Array:
+        """(V,) kg of a sprung carriage that touch the body."""
+        return self._of(f"carriage.{carriage}.wheel_mass")
+
+    def sprung_mass(self, spring: SpringTie) -> Array:
+        """(V,) kg that stand on a spring."""
+        return self._of(f"{spring.key}.mass")
+
+    def stiffness(self, spring: SpringTie) -> Array:
+        """(V,) N/m."""
+        return self._of(f"{spring.key}.stiffness")
+
+    def damping(self, tie: SpringTie | DamperTie) -> Array:
+        """(V,) N s/m of a damper, or of that beside a spring."""
+        return self._of(tie.key if isinstance(tie, DamperTie) else f"{tie.key}.damping")
 
     @property
     def padded(self) -> LaneValues:
@@ -63,14 +103,14 @@ class LaneValues:
         if pace is None:
             return np.full(self.size, motion.time_scale)
         way = float(motion.time_scale * getattr(motion, pace))
-        return way / self.of(f"carriage.{carriage}.motion.{pace}")
+        return way / self._of(f"carriage.{carriage}.motion.{pace}")
 
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""
         spec = self.study.carriage[carriage]
         if spec.headway is None:
-            return self.of(f"carriage.{carriage}.delay")
-        return self.of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
+            return self._of(f"carriage.{carriage}.delay")
+        return self._of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
 
     def timing(self) -> dict[str, tuple[Array, Array]]:
         """Per carriage pace and delay (V,) relative to the first one's time scale, rounded so that they group."""
@@ -83,18 +123,18 @@ class LaneValues:
     def own_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage by its own keys."""
         keys = self.study.carriage[carriage].masses
-        return sum((self.of(f"carriage.{carriage}.{key}") for key in keys), np.zeros(self.size))
+        return sum((self._of(f"carriage.{carriage}.{key}") for key in keys), np.zeros(self.size))
 
     def damping_rates(self, body: str, omega: Array) -> Array:
         """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
         key = f"body.{body}.damping_ratio"
         spec = self.study.body[body].damping_ratio
         if isinstance(spec, Rayleigh):
-            return self.of(f"{key}.rayleigh.0") + self.of(f"{key}.rayleigh.1") * omega[:, None] ** 2
+            return self._of(f"{key}.rayleigh.0") + self._of(f"{key}.rayleigh.1") * omega[:, None] ** 2
         if isinstance(spec, tuple):
             last = len(spec) - 1  # goes on for modes beyond the list
-            return np.stack([2.0 * self.of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
-        return 2.0 * self.of(key) * omega[:, None]
+            return np.stack([2.0 * self._of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
+        return 2.0 * self._of(key) * omega[:, None]
 
 
 def moving_mass(model: SceneModel, values: LaneValues, carriage: int) -> Array:
@@ -107,8 +147,8 @@ def weight(model: SceneModel, values: LaneValues, carriage: int) -> Array:
     """(V,) N of a carriage along the deflections of the track that it rides."""
     tie = model.carriages[carriage]
     if not model.study.carriage[tie.name].inertial:
-        return values.of(f"carriage.{tie.name}.force")
-    return moving_mass(model, values, carriage) * values.of("gravity") * model.bodies[tie.body].modal.gravity_share
+        return values.force(tie.name)
+    return moving_mass(model, values, carriage) * values.gravity * model.bodies[tie.body].modal.gravity_share
 
 
 def weights(model: SceneModel, values: LaneValues) -> Array:
@@ -182,22 +222,20 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     masses = [_contact_mass(model, values, number) for number in numbers]
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
     rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
-    coefficients = [
-        values.of(key) for key in (*(d.key for d in model.dampers), *(f"{s.key}.damping" for s in model.springs))
-    ]
-    stiffness = [none if s.rigid else values.of(f"{s.key}.stiffness") for s in model.springs]
+    coefficients = [*map(values.damping, model.dampers), *map(values.damping, model.springs)]
+    stiffness = [none if spring.rigid else values.stiffness(spring) for spring in model.springs]
     ones = np.ones((model.body_modes, values.size))
     return LaneTable(
         omega=model.omega,
         rates=to_blocks(np.concatenate([*rates, np.zeros((len(model.sprung), values.size))])),
-        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.of(f"{s.key}.mass")[None] for s in model.sprung)])),
+        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.sprung_mass(s)[None] for s in model.sprung)])),
         mass=to_blocks(np.stack(masses + dampers + springs)),
         joint=to_blocks(np.stack(carriages + dampers + rigid)),
         weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs])),
         damper=to_blocks(np.stack(carriages + coefficients)),
         spring=to_blocks(np.stack(carriages + dampers + stiffness)),
         time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
-        gravity=to_blocks(values.of("gravity")),
+        gravity=to_blocks(values.gravity),
     )
 
 
@@ -208,4 +246,4 @@ def _contact_mass(model: SceneModel, values: LaneValues, number: int) -> Array:
         return np.zeros(values.size)
     if not model.springs_of(number):
         return moving_mass(model, values, number)
-    return values.of(f"carriage.{carriage.name}.wheel_mass")
+    return values.wheel_mass(carriage.name)

@@ -246,7 +246,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 def _statics(tables: SceneTables, values: LaneValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
     unit = tables.static_over_window
-    loads, gravity = weights(tables.model, values), values.of("gravity")
+    loads, gravity = weights(tables.model, values), values.gravity
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):

@@ -242,7 +242,7 @@ def _grids(
             check_springs(scene)
         yield SceneGrid(asked, scene, values, unit_steps(scene)), variants
         return
-    steps = values.of("solver.steps").astype(np.int64)
+    steps = values.steps
     check_even_steps(scene, steps)
     check_most_steps(scene, steps)
     check_steps(scene, values, steps)

@@ -39,7 +39,7 @@ def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int, sam
     """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
     first ``sampled`` signals, or of the sensors, at stations by their count."""
     model, signals = tables.model, tables.signals
-    loads = np.stack([*weights(model, values), values.of("gravity")])[:, :size]
+    loads = np.stack([*weights(model, values), values.gravity])[:, :size]
     at = tables.static_counts
     unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count

@@ -186,12 +186,12 @@ def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) ->
         return np.zeros(values.size)
     body = model.bodies[model.carriages[spring.carriage].body].modal
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
-    stiffness = values.of(f"{spring.key}.stiffness")
+    stiffness = values.stiffness(spring)
     if spring.held is not None:
         own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
         return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
-    contact = mobility / (1.0 + values.of(f"{spring.key}.wheel_mass") * mobility)
-    return np.asarray(stiffness * (1.0 / values.of(f"{spring.key}.mass") + contact))
+    contact = mobility / (1.0 + values.wheel_mass(model.carriages[spring.carriage].name) * mobility)
+    return np.asarray(stiffness * (1.0 / values.sprung_mass(spring) + contact))
 
 
 def check_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:

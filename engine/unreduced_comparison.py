@@ -127,7 +127,7 @@ def _static(tables: SceneTables, values: LaneValues, counts: Counts) -> Array:
     """(H, J) static readings of the march's own model."""
     unit = tables.static_at(counts)
     loads = weights(tables.model, values)[:, 0]
-    return np.asarray(unit.gravity * values.of("gravity")[0] + unit.force @ loads)
+    return np.asarray(unit.gravity * values.gravity[0] + unit.force @ loads)
 
 
 def _standing(whole: Unreduced, tables: SceneTables, counts: Counts) -> Along:

@@ -146,7 +146,7 @@ class MarchGroup(Group):
         unknown = np.full((len(results), variants.size), np.nan)
         if choice is None:
             return Found(now, used(self.tables, variants.size), unknown, unknown[0])
-        tighter = values.of("solver.tolerance") / self.scene.study.solver.tolerance
+        tighter = values.tighter
         held = choice.held(variants, tighter)
         if not np.isfinite(tolerances(results)).any():
             held = np.full(variants.size, -np.inf)  # what is only told decides, and misses nothing
@@ -188,7 +188,7 @@ class ConvergingGroup(Group):
         asked, results = self.grid.asked, results_of(self.grid.asked)
         levels = as_fixed(self.grid)
         own = converge(self.grid, values, levels, ANSWER_PART, halted=halted)
-        tighter = values.of("solver.tolerance") / asked.study.solver.tolerance
+        tighter = values.tighter
         if is_free(self.grid):
             return Found(own.outcome, own.used, own.error, worst_held(own.error, results, tighter))
         truth = converge(self.grid, values, in_full(self.grid), TRUTH_PART, halted=halted)

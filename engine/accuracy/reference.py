@@ -130,7 +130,7 @@ def converge(
     levels more that are not dear; ``share`` does the marches of a level. Raises Halted."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
-    tighter = part * values.of("solver.tolerance") / grid.asked.study.solver.tolerance
+    tighter = part * values.tighter
     march = partial(_march, grid, levels, halted=halted, share=share)
     now, spent = march(values, 0)
     found = Converged(

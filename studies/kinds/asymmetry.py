@@ -100,10 +100,11 @@ class AsymmetryReduction:
 
     def differences(self, compared: Compared) -> dict[str, Array]:
         """Lag over the length of the cruise; odd and even parts, which are parts of the static range."""
-        motion = f"carriage.{next(iter(compared.values.study.carriage))}.motion"
-        start, end, turn = (compared.values.of(f"{motion}.{key}") for key in ("start", "end", "turn"))
-        cruise = np.abs(end - start) * (1.0 - 2.0 * turn)
-        lag = compared.gap("lag") / cruise[:, None]
+        from engine.motions import OutAndBack
+
+        motion = next(iter(compared.values.study.carriage.values())).motion
+        assert isinstance(motion, OutAndBack)
+        lag = compared.gap("lag") / (abs(motion.end - motion.start) * (1.0 - 2.0 * motion.turn))
         rest = {name: compared.gap(name) for name in ("loop_area", "odd_rms", "even_excess")}
         return {"lag": lag} | rest
 

@@ -99,7 +99,7 @@ def test_differences_are_over_the_largest_static_value() -> None:
     one, other = marched(grid, 8), marched(grid, 64)
     found = differences(grid.asked, grid.scene, grid.values, one, other)
     names = [result.name for result in results_of(grid.asked)]
-    static = grid.values.of("carriage.car.mass") * 9.81 / 48.0
+    static = grid.values.own_mass("car") * 9.81 / 48.0
     for name in ("midspan_max", "midspan_min", "midspan_rms"):
         gap = np.abs(one.numbers[name] - other.numbers[name]) / static
         assert np.all(found[names.index(name)] >= gap * (1.0 - 1e-4)) and np.all(gap > 0.0)

@@ -165,7 +165,7 @@ def test_one_bad_lane_leaves_its_neighbours_alone(
     table = engine.march.lane_table
 
     def poisoned(model: SceneModel, lane_values: LaneValues) -> LaneTable:
-        bad = np.isclose(lane_values.of("carriage.car.mass"), clean.weight.values[20])
+        bad = np.isclose(lane_values.own_mass("car"), clean.weight.values[20])
         return poison(table(model, lane_values), to_blocks(bad))
 
     monkeypatch.setattr(engine.march, "lane_table", poisoned)
