@@ -105,8 +105,9 @@ class AsymmetryReduction:
         motion = next(iter(compared.values.study.carriage.values())).motion
         assert isinstance(motion, OutAndBack)
         lag = compared.gap("lag") / (abs(motion.end - motion.start) * (1.0 - 2.0 * motion.turn))
-        rest = {name: compared.gap(name) for name in ("loop_area", "odd_rms", "even_excess")}
-        return {"lag": lag} | rest
+        least = compared.of_readings(np.zeros_like(compared.scale))
+        rms = {name: np.maximum(compared.gap(name), least) for name in ("odd_rms", "even_excess")}
+        return {"lag": lag, "loop_area": compared.gap("loop_area")} | rms
 
 
 class Asymmetry:

@@ -11,6 +11,8 @@ import pytest
 
 import studies
 from engine.execution import run
+from engine.lanes import LaneValues
+from engine.reduction import Compared
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
 from studies import answers
@@ -182,6 +184,19 @@ def test_stations_of_an_asymmetry_are_enough_for_tight_tolerances() -> None:
     fine = indices(6400)
     assert np.abs(indices(own.stations) - fine).max() < 2e-5
     assert np.abs(indices(400) - fine).max() > 1e-4
+
+
+def test_odd_and_even_parts_are_told_no_less_than_half_of_what_histories_differ_by() -> None:
+    """Two roots of mean squares are the same by chance; the lag counts over the cruise."""
+    given = study(beam(), force(1.0, shuttle(0.1, 0.9, 1.0, 0.25, 1)), kind="asymmetry", sensor={"below": under("car")})
+    names = ("lag", "loop_area", "odd_rms", "even_excess")
+    one, other = ({name: np.full((1, 1), value) for name in names} for value in (0.1, 0.3))
+    found = [
+        AsymmetryReduction().differences(Compared(one, two, np.full((1, 1), 2.0), apart, LaneValues(given, {}, 1)))
+        for two, apart in ((one, np.full((1, 1), 0.8)), (other, np.zeros((1, 1))))
+    ]
+    assert [float(found[0][name].item()) for name in names] == pytest.approx([0.0, 0.0, 0.2, 0.2])
+    assert [float(found[1][name].item()) for name in names] == pytest.approx([0.2 / (0.8 * 0.5), 0.2, 0.2, 0.2])
 
 
 def test_loaded_frequency_is_the_closed_form_of_a_shuttle() -> None:
