@@ -29,8 +29,8 @@ Counts = NDArray[np.int64]
 
 SEED = 20261122  # of the pilots; audits have another
 PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times
-#: Variants for each pilot, and the fewest pilots: by 128 pilots 2,000 variants took 1.25 times the work that they took by
-#: 256, the pilots half the time; by 96 one of 20 missed the tolerance. One in 16 missed a resonance of `double-peak`.
+#: Variants for each pilot, and the fewest pilots: by 128 pilots 2,000 variants took 1.25 times the work that they took
+#: by 256, the pilots half the time; by 96 one of 20 missed its tolerance. One in 16 missed resonances of `double-peak`.
 SHARE_OF_PILOTS, FEWEST_PILOTS = 12, 128
 NEIGHBOURS = 6  # 4 to 8 took alike in two of three studies; of `double-peak` 4 % missed their tolerance with 4
 #: Of the errors told for pilots that were left out are no smaller than the true ones: 0.993 doubled the work of
