@@ -255,9 +255,9 @@ class Climb:
             against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
         held = worst_held(against, results)
         self.marched[column, rung] = True
-        self.work[column] += lanes.size * model.body_modes * tables.steps  # one column is climbed by one thread
         self.held[column, rung:, lanes] = held[:, None]
         with self._finding:
+            self.work[column] += lanes.size * model.body_modes * tables.steps
             first = sum(pilot.size for pilot, _ in self.found)
             self.found.append((lanes, error.T))
         self.march[column, rung:, lanes] = first + np.arange(lanes.size)[:, None]
