@@ -43,12 +43,13 @@ def run_chunk(
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
-    """(R, V) the errors told; of places no less than a step is long."""
+    """(R, V) the errors told; of places no less than a step is long, and no more than the track."""
     error = np.where(np.isfinite(found.error), found.error, np.nan)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):
         if result.name.endswith("_position"):
-            error[number] = np.maximum(error[number], np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0))
+            least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
+            error[number] = np.minimum(np.maximum(error[number], least), 1.0)
     return error
 
 

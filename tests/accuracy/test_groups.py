@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from engine.accuracy.groups import ConvergingGroup, MarchGroup
+from engine.accuracy.groups import ConvergingGroup, Found, MarchGroup
+from engine.accuracy.results import results_of
+from engine.chunk import told_errors
 from engine.dataset import Collector
 from engine.execution import execute, run
 from engine.plan import make_plan
@@ -51,6 +53,16 @@ def test_errors_are_told_of_every_result() -> None:
     assert held == ["midspan_max", "midspan_min", "midspan_rms"]
     worst = found.estimated_error.sel(result=held).max("result")
     np.testing.assert_allclose(found.error_estimate.values, worst.values, rtol=1e-6)
+
+
+def test_places_are_off_by_a_step_at_least_and_by_the_track_at_most() -> None:
+    """Whatever the margins of a choice say; other errors are as they are."""
+    results = results_of(make_plan(passages(2, 2)).asked)
+    error = np.array([[75.0, 0.0, 0.0]] * len(results))
+    used = {"steps_used": np.array([100, 100, 0])}
+    found = told_errors(Found(None, used, error, error[0]), results)  # type: ignore[arg-type]
+    for result, own in zip(results, found, strict=True):
+        assert own.tolist() == ([1.0, 0.01, 0.0] if result.name.endswith("_position") else [75.0, 0.0, 0.0])
 
 
 def test_what_is_held_and_missed_is_said() -> None:
