@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from engine.accuracy.choice import MOST_SCENES, PILOTS
+from engine.accuracy.choice import MOST_SCENES, PILOTS, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.execution import run_jobs, warm_up
 from engine.kernels.layout import LANES
@@ -87,8 +87,9 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
 
 def _without_pilots(plan: Plan, looked: Looked) -> Forecast:
     """A study whose pilots take longer than there is time."""
-    less = f"a second was not enough for pilots: a run measures {PILOTS}, and takes what they show to be enough"
-    climbs = CLIMB * max(min(len(plan.grids), MOST_SCENES), PILOTS // 64)
+    pilots = usual_pilots(plan.size)
+    less = f"a second was not enough for pilots: a run measures {pilots}, and takes what they show to be enough"
+    climbs = CLIMB * max(min(len(plan.grids), MOST_SCENES), pilots // 64)
     if not looked.parts:
         return Forecast(plan, "", (), climbs * SECONDS, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
@@ -111,9 +112,10 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float) -> Forecast | 
     if found is None:
         return None
     trial, pilots, took = found
-    more = "" if pilots == PILOTS else f"; a run measures {PILOTS} and knows better"
-    title = f"What variants are computed with, by the measured errors of {pilots} pilots{more}"
-    seconds = took * (PILOTS / pilots) ** 0.5 + trial.seconds * _pace(trial) / threads
+    usual = usual_pilots(plan.size)
+    more = "" if pilots >= usual else f"; a run measures {usual} and knows better"
+    title = f"What variants are computed with, by the measured errors of {min(pilots, usual)} pilots{more}"
+    seconds = took * max(1.0, usual / pilots) ** 0.5 + trial.seconds * _pace(trial) / threads
     return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)
 
 

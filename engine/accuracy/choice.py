@@ -160,10 +160,19 @@ def _holds(results: tuple[Result, ...]) -> bool:
     return bool(np.isfinite([result.tolerance for result in results]).any())
 
 
+def usual_pilots(size: int) -> int:
+    """How many pilots are worth it for so many variants.
+
+    >>> usual_pilots(500), usual_pilots(2400), usual_pilots(1_000_000)
+    (128, 200, 256)
+    """
+    return min(PILOTS, max(FEWEST_PILOTS, size // SHARE_OF_PILOTS))
+
+
 def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:
     """Flat numbers of pilots, as many as are worth it and at most so many, drawn at random: of a few scenes where there
     are many."""
-    count = min(most, max(FEWEST_PILOTS, cases.size // SHARE_OF_PILOTS))
+    count = min(most, usual_pilots(cases.size))
     random = np.random.default_rng(SEED)
     chosen = random.permutation(len(members))[: max(1, min(MOST_SCENES, count // LEAST_IN_SCENE))]
     pool = np.concatenate([members[number] for number in np.sort(chosen)])
