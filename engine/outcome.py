@@ -162,7 +162,7 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
     found: Flat = {}
     for side in tables.kinks:
         reading = np.tensordot(side.weights, marched.history[np.searchsorted(counts, side.counts), side.sensor], 1)
-        _raise(marched.marks[side.sensor], reading, side.at)
+        _include(marched.marks[side.sensor], reading, side.at)
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         marks = marched.marks[j]
         seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
@@ -174,7 +174,7 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
     return found
 
 
-def _raise(marks: Array, reading: Array, at: float) -> None:
+def _include(marks: Array, reading: Array, at: float) -> None:
     """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
     for value, place, beyond in ((LARGEST, LARGEST_AT, np.greater), (SMALLEST, SMALLEST_AT, np.less)):
         more = beyond(reading, marks[value])

@@ -183,7 +183,7 @@ class Plan:
         least = TASK_SECONDS if self.converges else LEAST_TASK_SECONDS  # each chunk has tables of its own there
         task = float(np.clip(self.seconds / TASKS, least, TASK_SECONDS))
         lanes = min(task / max(group.seconds_per_variant, 1e-12), CHUNK_BYTES / group.chunk_bytes)
-        if self.converges:  # two threads share the only scene
+        if self.converges:  # two threads share a scene
             lanes = min(lanes, group.variants.size // 2 + LANES)
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
 

@@ -9,9 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -92,11 +90,9 @@ class _Run(NamedTuple):
 
 def _marched(kind: Kind, run: _Run) -> Outcome:
     """A study of one scene and its sweep: all variants of its plan, in parts."""
+    from engine.dataset import model_groups
     from engine.plan import make_plan
     from engine.remarks import remarks
-
-    # xarray takes half a second to import, beside kernels that leave the interpreter to it
-    Thread(target=import_module, args=("engine.dataset",), daemon=True).start()
 
     check_unreduced(run.study)
     plan = make_plan(run.study, reduction=kind.reduction(run.study), results=kind.name)
@@ -111,7 +107,7 @@ def _marched(kind: Kind, run: _Run) -> Outcome:
         run.stop.check()
         root = _finished_dataset(plan, store)
         audit = audit_group(plan, root, Work(run.options.threads, run.stop))
-        models = with_first_frequency(_model_groups(plan), Results(root, run.study))
+        models = with_first_frequency(model_groups(plan.base), Results(root, run.study))
         groups = models | unreduced_group(plan, root, run.stop.check) | audit
         seconds = _write(run, root, store, groups)
     return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing, audit.get(GROUP))
@@ -238,12 +234,6 @@ def _march(plan: Plan, store: PartStore, done: np.ndarray, run: _Run) -> None:
     except Interrupted:
         stop.check()
         raise
-
-
-def _model_groups(plan: Plan) -> dict[str, xr.Dataset]:
-    from engine.dataset import model_groups
-
-    return model_groups(plan.base)
 
 
 def _finished_dataset(plan: Plan, store: PartStore) -> xr.Dataset:

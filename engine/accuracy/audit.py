@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, Group
 from engine.accuracy.ladder import REFERENCE_PART
-from engine.accuracy.reference import Converged, Halted, Share, converge, in_full, in_turn, usual_work
+from engine.accuracy.reference import (
+    Converged,
+    Halted,
+    Share,
+    across_and_within,
+    converge,
+    in_full,
+    in_turn,
+    usual_work,
+)
 from engine.accuracy.results import differences, results_of
 from engine.chunk import told_errors
 from engine.kernels.layout import LANES
@@ -28,7 +37,7 @@ Counts = NDArray[np.int64]
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-TABLES = 24  # variants that take as long as the tables of a march: 4 modes x 100 steps of both on a bench
+TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 to 49 with 32 and 16 modes
 
 
 class Audit(NamedTuple):
@@ -79,7 +88,7 @@ def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) 
     """Compute some variants again, by jobs that ``share`` does. Raises Halted."""
     parts = [variants[np.isin(variants, members)] for members in plan.members]
     of_scenes = [(grid, own) for grid, own in zip(plan.grids, parts, strict=True) if own.size]
-    within, across = (share, in_turn) if len(of_scenes) == 1 else (in_turn, share)
+    across, within = across_and_within(share, len(of_scenes))
     found: list[Audit] = []
 
     def of_scene(grid: SceneGrid, own: Counts) -> None:

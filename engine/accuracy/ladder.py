@@ -34,12 +34,14 @@ CUTS = tuple(sorted({2**k for k in range(16)} | {3 * 2**k for k in range(15)})) 
 #: Steps at which a column's modes are judged, per first period and in one of the grid's: by Fox-Goodwin (1e-8 of phase
 #: a period), and by schemes of second order (1e-5). With half of them `double-peak` took 1.7 times the work.
 FINE = {"fox-goodwin": (128.0, 16.0), "": (512.0, 32.0)}
-# Of the next six, what is said was measured on `asymmetry`, `double-peak` and 10,000 passages.
-HOPELESS = 0.9  # of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 chose alike
+# What is said of the next six was measured on `asymmetry`, `double-peak` and 10,000 passages: the work that these took.
+HOPELESS = (
+    0.9  # of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 took 0.9 to 1.1 times
+)
 FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer has held 1e-2; 1 to 6 chose alike
 FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1.05 to 1.5 chose alike
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
-JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 chose alike
+JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
 ENOUGH = 0.2  # of the tolerance, where pilots climb no further: with 0.4 some variants missed it, 0.1 gained nothing
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
