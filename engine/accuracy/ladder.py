@@ -60,7 +60,7 @@ class Measured:
     it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
     largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
     the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
-    over a passage or cycle of all their marches."""
+    over a passage or cycle of all their marches; free: whether the study fixes nothing that the references change."""
 
     error: Array
     pilot: Counts
@@ -69,6 +69,7 @@ class Measured:
     reference: Array
     marched: NDArray[np.bool_]
     work: float
+    free: bool
 
 
 def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
@@ -147,7 +148,9 @@ class Climb:
         """What the jobs found."""
         work = float(self.work.sum() + self.truth.spent.sum())
         pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
-        return Measured(error, pilot, self.march, self.held, self.truth.error, self.marched, work)
+        return Measured(
+            error, pilot, self.march, self.held, self.truth.error, self.marched, work, self.aim is self.truth
+        )
 
     def _judge(self, name: str) -> None:
         """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave

@@ -136,7 +136,6 @@ def converge(
     levels more that are not dear; ``share`` does the marches of a level. Raises Halted."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
-    tighter = part * values.tighter
     march = partial(_march, grid, levels, halted=halted, share=share)
     now, spent = march(values, 0)
     found = Converged(
@@ -159,9 +158,9 @@ def converge(
         left_over = _left_over(apart, change[:, active])
         found = _updated(found, active, now, spent, left_over)
         change[:, active] = apart
-        off = worst_held(left_over, decisive, tighter[active])
+        off = worst_held(left_over, decisive, own.tighter)
         dear = _is_dear(grid, own, levels, level + 1)
-        settled = (off <= 1.0) | ((off * part <= DOUBTED) & dear)
+        settled = (off <= part) | ((off <= DOUBTED) & dear)
         found.settled[active] = settled
         found.spent[active] += spent["work"]
         done = settled & ((left[active] == 0) | dear)
