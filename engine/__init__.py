@@ -12,16 +12,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from engine.execution import run
-    from engine.plan import Plan, make_plan
-    from engine.scene import Study, load
+    from engine.batch.execution import run
+    from engine.batch.plan import Plan, make_plan
+    from engine.scene.study import Study, load
 
 _HOMES = {
-    "Study": "engine.scene",
-    "load": "engine.scene",
-    "run": "engine.execution",
-    "Plan": "engine.plan",
-    "make_plan": "engine.plan",
+    "Study": "engine.scene.study",
+    "load": "engine.scene.study",
+    "run": "engine.batch.execution",
+    "Plan": "engine.batch.plan",
+    "make_plan": "engine.batch.plan",
 }
 __all__ = ["Plan", "Study", "load", "make_plan", "run"]
 

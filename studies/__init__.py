@@ -7,6 +7,6 @@ True
 
 from __future__ import annotations
 
-from studies.study import Kind, kind_named, kind_names, run
+from studies.protocol.study import Kind, kind_named, kind_names, run
 
 __all__ = ["Kind", "kind_named", "kind_names", "run"]

@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from fnmatch import fnmatch
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -16,38 +15,34 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("results_schema", "engine", "studies")
 
-# The stages of the engine: a module imports modules of its own stage and of those before. Names or patterns of names,
-# of which the longest that fits a module tells.
-STAGES = {
-    "formulas": "kernels kernels.layout kernels.schemes",
-    "what users write": "document units checks spec splines law motions carriages sensors settings scene axes sweep "
-    "bodies bodies.body bodies.beam bodies.frame bodies.frame_geometry bodies.frame_rules bodies.reduced bodies.rigid "
-    "bodies.imported bodies.import_*",
-    "numbers only": "linear_algebra kernels.*",
-    "what a variant is computed with": "numerics",
-    "bodies as modes": "bodies.*",
-    "scenes as arrays": "timeline ties standing model ways grips statics track readings contacts signals lanes "
-    "influence coupled step_rules kinks tables envelopes histories reduction scenes",
-    "the march": "starting march quasistatic richardson ode transition comparison cycles",
-    "what a march reports": "outcome",
-    "errors that are measured": "accuracy accuracy.*",
-    "all work of a study": "plan",
-    "the run": "chunk remarks dataset execution accuracy.audit",
-    "against the body itself": "unreduced*",
-}
+# The rooms, from the ground floor up: a module imports modules of its own room and of those before it.
+ROOMS = (
+    *("results_schema", "results_schema.store"),
+    *("engine", "engine.study_file", "engine.kernels", "engine.kernels.stepping"),
+    *("engine.bodies.modal", "engine.bodies.beam", "engine.bodies.rigid", "engine.bodies.frame"),
+    *("engine.bodies.reduced", "engine.bodies.files", "engine.bodies.imported", "engine.bodies"),
+    *("engine.scene", "engine.model", "engine.observation", "engine.statics", "engine.march", "engine.accuracy"),
+    *("engine.batch", "engine.methods", "engine.unreduced"),
+    *("studies.results", "studies.protocol", "studies.findings", "studies.at_rest", "studies.precision"),
+    *("studies.maps", "studies.runs", "studies.pictures.common", "studies.pictures", "studies.kinds"),
+    *("studies.reporting", "studies.commands", "studies"),
+)
+# What every room may know of those above it: the public names of a package, by which users know it.
+PUBLIC = {"engine", "studies", "results_schema"}
+MOST_FILES = 15  # of a folder
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {
     "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",
 }  # fmt: skip
 # Packages that only these modules of ours may import.
 ONLY_IN = {
-    "dask": ("engine.execution",),
+    "dask": ("engine.batch.execution",),
     "numba": ("engine.kernels",),
     "netCDF4": ("results_schema",),
     "click": ("studies",),
-    "rich": ("studies.console",),
+    "rich": ("studies.commands.console",),
     "matplotlib": ("studies",),
     "jinja2": ("studies",),
-    "pint": ("engine.units",),
+    "pint": ("engine.study_file.units",),
     "threadpoolctl": ("engine.linear_algebra",),
 }
 
@@ -82,7 +77,10 @@ IMPORTS = {name: set(imports(tree)) for name, tree in MODULES.items()}
 
 def test_everything_is_found() -> None:
     assert len(MODULES) > 40
-    assert "engine.document" in IMPORTS["engine.scene"] and "results_schema.errors" in IMPORTS["engine.scene"]
+    assert (
+        "engine.study_file.document" in IMPORTS["engine.scene.study"]
+        and "results_schema.errors" in IMPORTS["engine.scene.study"]
+    )
 
 
 def test_packages_import_downwards() -> None:
@@ -99,29 +97,26 @@ def test_no_module_needs_itself(package: str) -> None:
     assert set(graph) <= set(order)
 
 
-def stage(name: str) -> int:
-    """The stage of a module of the engine; -1 where none fits."""
-    fits = [
-        (len(pattern), place)
-        for place, patterns in enumerate(STAGES.values())
-        for pattern in patterns.split()
-        if fnmatch(name, f"engine.{pattern}")
-    ]
-    return max(fits, default=(0, -1))[1]
+def room(name: str) -> str:
+    """The folder of a module."""
+    return name if f"{name}." in {f"{other.rpartition('.')[0]}." for other in MODULES} else name.rpartition(".")[0]
 
 
-def test_stages_of_the_engine() -> None:
-    found = {name for name in MODULES if name.startswith("engine.")}
-    assert {name for name in found if stage(name) < 0} == set(), "a new module needs a stage"
-    upwards = [
-        f"{name} imports {other}" for name in found for other in IMPORTS[name] & found if stage(other) > stage(name)
-    ]
-    assert upwards == []
+def test_every_room_is_known() -> None:
+    assert {room(name) for name in MODULES} == set(ROOMS)
 
 
-def test_no_stage_waits_for_a_module_that_has_gone() -> None:
-    patterns = [f"engine.{pattern}" for patterns in STAGES.values() for pattern in patterns.split()]
-    assert [pattern for pattern in patterns if not any(fnmatch(name, pattern) for name in MODULES)] == []
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_rooms_import_downwards(name: str) -> None:
+    own = ROOMS.index(room(name))
+    above = {other for other in IMPORTS[name] & set(MODULES) - PUBLIC if ROOMS.index(room(other)) > own}
+    assert above == set()
+
+
+@pytest.mark.parametrize("folder", ROOMS)
+def test_no_room_is_crowded(folder: str) -> None:
+    files = [path for path in (ROOT / folder.replace(".", "/")).glob("*.py") if path.name != "__init__.py"]
+    assert len(files) <= MOST_FILES
 
 
 def test_kernels_know_numbers_only() -> None:
@@ -138,7 +133,7 @@ def test_packages_stay_where_they_belong(package: str) -> None:
     assert [name for name in users if not f"{name}.".startswith(tuple(f"{p}." for p in ONLY_IN[package]))] == []
 
 
-@pytest.mark.parametrize("package", ["results_schema", "engine", "studies", "studies.cli"])
+@pytest.mark.parametrize("package", ["results_schema", "engine", "studies", "studies.commands.cli"])
 def test_importing_is_light(package: str) -> None:
     code = f"import sys, {package}; print(*{{name.partition('.')[0] for name in sys.modules}})"
     loaded = set(python("-c", code).split())

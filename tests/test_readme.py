@@ -7,9 +7,9 @@ import subprocess
 import sys
 from typing import Any
 
-from engine.plan import make_plan
-from engine.scene import load
-from studies.study import kind_of
+from engine.batch.plan import make_plan
+from engine.scene.study import load
+from studies.protocol.study import kind_of
 from tests.readme import README
 
 

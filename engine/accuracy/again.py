@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import as_fixed
-from engine.histories import CYCLE_STATIONS, WHOLE_STATIONS
-from engine.model import SceneModel
-from engine.outcome import Flat, number_of
-from engine.tables import SceneTables
+from engine.march.outcome import Flat, number_of
+from engine.march.tables import SceneTables
+from engine.model.scene_model import SceneModel
+from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
 from results_schema.status import Fidelity
 
 Counts = NDArray[np.int64]

@@ -19,9 +19,9 @@ from engine.accuracy.reference import Halted, Share, across_and_within
 from engine.accuracy.results import Result, results_of
 from engine.accuracy.telling import TELLING, Telling, others_of, telling_of
 from engine.kernels.choice import cheapest, nearest
-from engine.lanes import LaneValues
-from engine.outcome import Asked
-from engine.sweep import Cases
+from engine.march.outcome import Asked
+from engine.model.variant_values import LaneValues
+from engine.scene.sweep import Cases
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

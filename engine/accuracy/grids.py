@@ -9,17 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.envelopes import with_companions
 from engine.kernels.schemes import SCHEMES
-from engine.kinks import stops
-from engine.lanes import LaneValues
-from engine.model import SceneModel, with_numerics
-from engine.numerics import Numerics, open_bodies
-from engine.outcome import Asked
-from engine.sensors import MOST_PLACES
-from engine.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
-from engine.tables import SceneTables, StaticUnit
-from engine.timeline import Grid, build_grid, refined
+from engine.march.envelopes import with_companions
+from engine.march.outcome import Asked
+from engine.march.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
+from engine.march.tables import SceneTables, StaticUnit
+from engine.model.numerics import Numerics, open_bodies
+from engine.model.scene_model import SceneModel, with_numerics
+from engine.model.timeline import Grid, build_grid, refined
+from engine.model.variant_values import LaneValues
+from engine.observation.kinks import stops
+from engine.scene.sensors import MOST_PLACES
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

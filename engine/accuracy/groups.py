@@ -15,12 +15,12 @@ from engine.accuracy.grids import MOST_COMPARED, SceneGrid
 from engine.accuracy.reference import USUAL_LEVEL, Halted, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
 from engine.kernels.layout import MARKS
-from engine.lanes import LaneValues
-from engine.model import SceneModel
-from engine.numerics import Numerics
-from engine.outcome import Flat, Outcome, outcome, used
-from engine.tables import SceneTables
-from engine.timeline import MOST_STATIONS
+from engine.march.outcome import Flat, Outcome, outcome, used
+from engine.march.tables import SceneTables
+from engine.model.numerics import Numerics
+from engine.model.scene_model import SceneModel
+from engine.model.timeline import MOST_STATIONS
+from engine.model.variant_values import LaneValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

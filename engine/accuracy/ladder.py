@@ -18,11 +18,11 @@ from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, 
 from engine.accuracy.reference import Converged, Halted, Share, as_fixed, converge, in_full, is_free
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
-from engine.lanes import LaneValues
-from engine.model import SceneModel
-from engine.numerics import Numerics, open_bodies
-from engine.outcome import Asked, outcome
-from engine.step_rules import least_steps
+from engine.march.outcome import Asked, outcome
+from engine.march.step_rules import least_steps
+from engine.model.numerics import Numerics, open_bodies
+from engine.model.scene_model import SceneModel
+from engine.model.variant_values import LaneValues
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]

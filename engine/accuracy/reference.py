@@ -25,10 +25,10 @@ from engine.accuracy.grids import (
 )
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
-from engine.lanes import LaneValues
-from engine.numerics import Numerics, open_bodies
-from engine.outcome import Flat, Outcome, outcome, used
-from engine.step_rules import least_steps
+from engine.march.outcome import Flat, Outcome, outcome, used
+from engine.march.step_rules import least_steps
+from engine.model.numerics import Numerics, open_bodies
+from engine.model.variant_values import LaneValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -12,13 +12,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.contacts import contact_forces
-from engine.envelopes import envelope_names
-from engine.lanes import LaneValues, weights
-from engine.model import SceneModel
-from engine.outcome import Asked, Outcome
-from engine.reduction import HISTORY_PART, Compared
-from engine.scene import Study
+from engine.march.envelopes import envelope_names
+from engine.march.outcome import Asked, Outcome
+from engine.model.scene_model import SceneModel
+from engine.model.variant_values import LaneValues, weights
+from engine.observation.contact_forces import contact_forces
+from engine.observation.reduction import HISTORY_PART, Compared
+from engine.scene.study import Study
 from results_schema.status import Status
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engine.accuracy.ladder import REFERENCE_PART, Measured
 from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.choice import nearest
-from engine.outcome import Asked
+from engine.march.outcome import Asked
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int32]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from engine.bodies.beam import Beam
-from engine.bodies.body import Body
-from engine.bodies.frame import Frame
-from engine.bodies.imported import Ansys, Matrices, Nastran
-from engine.bodies.reduced import Reduced
-from engine.bodies.rigid import Rigid
-from engine.spec import KindOf, Spec
+from engine.bodies.beam.beam import Beam
+from engine.bodies.frame.frame import Frame
+from engine.bodies.imported.imported import Ansys, Matrices, Nastran
+from engine.bodies.modal.description import Body
+from engine.bodies.reduced.reduced import Reduced
+from engine.bodies.rigid.rigid import Rigid
+from engine.study_file.spec import KindOf, Spec
 
 BODIES: Mapping[str, type[Spec]] = {
     "beam": Beam,

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from engine.bodies.beam import Beam
-from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
-from engine.bodies.body import AUTO_MODES, Body
-from engine.bodies.frame import Frame
-from engine.bodies.frame_body import frame_body
-from engine.bodies.imported import Ansys, Imported, Matrices, Nastran
-from engine.bodies.imported_body import imported_body
-from engine.bodies.modal import ModalBody
-from engine.bodies.reduced import Reduced
-from engine.bodies.reduced_body import load_body
-from engine.bodies.rigid import Rigid
-from engine.bodies.rigid_body import rigid_body
+from engine.bodies.beam.beam import Beam
+from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.frame.body import frame_body
+from engine.bodies.frame.frame import Frame
+from engine.bodies.imported.body import imported_body
+from engine.bodies.imported.imported import Ansys, Imported, Matrices, Nastran
+from engine.bodies.modal.description import AUTO_MODES, Body
+from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.reduced.body import load_body
+from engine.bodies.reduced.reduced import Reduced
+from engine.bodies.rigid.body import rigid_body
+from engine.bodies.rigid.rigid import Rigid
 from results_schema.errors import BadInput
 
 MOST_KEPT = 64  # bodies that are not built again

@@ -30,9 +30,9 @@ _LLVM_OPTIONS = ("--unroll-full-max-count=8",)
 
 def kernel_hash() -> str:
     """SHA-256 over the kernels' sources, numba's and LLVM's versions and the processor: what the bits depend on."""
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    digest, folder = hashlib.sha256(), Path(__file__).parent
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")
     machine = (numba.__version__, llvm.llvm_version_info, platform.machine(), llvm.get_host_cpu_name(), _LLVM_OPTIONS)
     digest.update(repr(machine).encode())
     return digest.hexdigest()

@@ -217,6 +217,6 @@ SCHEMES: Mapping[str, Callable[[Mapping[str, float]], Scheme]] = {
     "newmark": lambda given: NewmarkScheme("newmark", given["beta"], given["gamma"], 2 if given["gamma"] == 0.5 else 1),
     "hht-alpha": lambda given: hht_alpha(given["alpha"]),
     "generalized-alpha": lambda given: generalized_alpha(given["rho_inf"]),
-    # average acceleration with h and 2h: the march is the same, `engine.richardson` makes the pair
+    # average acceleration with h and 2h: the march is the same, `engine.march.richardson` makes the pair
     "richardson": lambda given: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2),
 }

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
-from studies import indices, theory
-from studies.results import VARIANT, Results, extreme
-from studies.telling import exceeds, first_carriage, in_words, told_statuses
-from studies.words import counted, listed, percent, quantity
+from studies.findings import indices, theory
+from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
+from studies.results.formatting import counted, listed, percent, quantity
+from studies.results.results import VARIANT, Results, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.reduction import Compared, Cycle
-    from engine.scene import Study
-    from studies.figures import Figure
+    from engine.observation.reduction import Compared, Cycle
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ class AsymmetryReduction:
 
     def __call__(self, cycle: Cycle) -> dict[str, indices.Array]:
         """The indices, each (V, J)."""
-        from engine.motions import OutAndBack
+        from engine.scene.motions import OutAndBack
 
         motion = cycle.motion
         assert isinstance(motion, OutAndBack)
@@ -100,7 +100,7 @@ class AsymmetryReduction:
 
     def differences(self, compared: Compared) -> dict[str, Array]:
         """Lag over the length of the cruise; odd and even parts, which are parts of the static range."""
-        from engine.motions import OutAndBack
+        from engine.scene.motions import OutAndBack
 
         motion = next(iter(compared.values.study.carriage.values())).motion
         assert isinstance(motion, OutAndBack)
@@ -119,7 +119,7 @@ class Asymmetry:
 
     def check(self, study: Study) -> None:
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
-        from engine.motions import OutAndBack
+        from engine.scene.motions import OutAndBack
 
         name, carriage = first_carriage(study)
         if not isinstance(carriage.motion, OutAndBack):
@@ -167,7 +167,7 @@ KIND = Asymmetry()
 
 def _check_cruise(study: Study, carriage: str) -> None:
     """Every variant cruises over half of its stroke or more; a turn blends its part of the stroke at either end."""
-    from engine.sweep import expand
+    from engine.scene.sweep import expand
 
     key = f"carriage.{carriage}.motion.turn"
     swept = [axis.values for axis in expand(study).axes if key in axis.paths]

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import AXES, MARCH, Variable, declare
-from studies import indices, theory
-from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.peaks import PEAKS, peaks
-from studies.results import PACES, Axis, Index, Results, chosen, extreme
-from studies.telling import check_sensors, first_carriage, in_words, told_statuses
-from studies.words import MINUS, counted, listed, number, percent
+from studies.findings import indices, theory
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.findings.peaks import PEAKS, peaks
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
+from studies.results.formatting import MINUS, counted, listed, number, percent
+from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.reduction import Compared, Cycle
-    from engine.scene import Study
-    from studies.figures import Figure
+    from engine.observation.reduction import Compared, Cycle
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
 
 Array = NDArray[np.float64]
 

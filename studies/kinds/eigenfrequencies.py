@@ -9,27 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from engine.spec import Spec
+from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
 from results_schema.variables import Variable, declare
-from studies.at_rest import pieces_of
-from studies.labelling import BODY_PLACES, COORDINATES, gathered
-from studies.measuring import Piece, question_of
-from studies.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.resting import FREQUENCY_WANTED, enough_modes, frequency_errors
-from studies.results import Results, extreme
-from studies.telling import first_carriage, in_words
-from studies.words import counted, listed, number, percent, quantity
+from studies.at_rest.at_rest import pieces_of
+from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
+from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
+from studies.at_rest.resting import FREQUENCY_WANTED, enough_modes, frequency_errors
+from studies.protocol.measuring import Piece, question_of
+from studies.results.findings_common import first_carriage, in_words
+from studies.results.formatting import counted, listed, number, percent, quantity
+from studies.results.results import Results, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.lanes import LaneValues
-    from engine.model import SceneModel
-    from engine.scene import Study
-    from engine.ways import Way
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import Way
+    from engine.model.variant_values import LaneValues
+    from engine.scene.study import Study
     from results_schema.status import Fidelity
-    from studies.figures import Figure
+    from studies.pictures.common.figures import Figure
 
 Array = NDArray[np.float64]
 
@@ -148,7 +148,7 @@ KIND = Eigenfrequencies()
 
 
 class _Coupled:
-    """What is computed of a scene at rest: `studies.at_rest.AtRest`."""
+    """What is computed of a scene at rest: `studies.at_rest.at_rest.AtRest`."""
 
     name = "eigenfrequencies"
 
@@ -156,13 +156,13 @@ class _Coupled:
         self.count = count
 
     def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.coupled import coupled_frequencies
+        from engine.statics.coupled_modes import coupled_frequencies
 
         return {"frequency": coupled_frequencies(model, values, along, self.count) / (2.0 * np.pi)}
 
     def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.coupled import coupled_modes
-        from engine.lanes import LaneValues
+        from engine.model.variant_values import LaneValues
+        from engine.statics.coupled_modes import coupled_modes
 
         found = coupled_modes(model, LaneValues(model.study, {}, 1), along, self.count)
         lines = []
@@ -172,8 +172,8 @@ class _Coupled:
         return {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
-        from engine.unreduced import unreduced_model
-        from engine.unreduced_statics import unreduced_frequencies
+        from engine.unreduced.scene import unreduced_model
+        from engine.unreduced.statics import unreduced_frequencies
 
         found = unreduced_frequencies(unreduced_model(study), all_positions(model, positions), self.count)
         return {"frequency": found}

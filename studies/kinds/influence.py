@@ -8,27 +8,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.spec import Spec
+from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import Variable, declare
-from studies.at_rest import check_held, pieces_of
-from studies.labelling import BODY_PLACES, COORDINATES, gathered
-from studies.measuring import Piece, question_of
-from studies.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.resting import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
-from studies.results import Index, Results, extreme
-from studies.telling import check_sensors, first_carriage, in_words, told_statuses
-from studies.words import counted, percent, quantity
+from studies.at_rest.at_rest import check_held, pieces_of
+from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
+from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
+from studies.at_rest.resting import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
+from studies.protocol.measuring import Piece, question_of
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
+from studies.results.formatting import counted, percent, quantity
+from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.lanes import LaneValues
-    from engine.model import SceneModel
-    from engine.scene import Study
-    from engine.ways import Way
-    from studies.figures import Figure
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import Way
+    from engine.model.variant_values import LaneValues
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
 
 Array = NDArray[np.float64]
 
@@ -165,13 +165,13 @@ KIND = Influence()
 
 
 class _Static:
-    """What is computed of a scene at rest: `studies.at_rest.AtRest`."""
+    """What is computed of a scene at rest: `studies.at_rest.at_rest.AtRest`."""
 
     name = "influence"
 
     def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.contacts import contact_forces
-        from engine.influence import static_values
+        from engine.observation.contact_forces import contact_forces
+        from engine.statics.static_response import static_values
 
         found = static_values(model, values, along)
         named: dict[str, NDArray[Any]] = {}
@@ -185,8 +185,8 @@ class _Static:
         return {**named, "contact_force": found.contacts}
 
     def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.influence import static_shapes
-        from engine.lanes import LaneValues
+        from engine.model.variant_values import LaneValues
+        from engine.statics.static_response import static_shapes
 
         values = LaneValues(model.study, {}, 1)
         lines = [
@@ -196,9 +196,9 @@ class _Static:
         return {"deflection": np.stack(lines)}
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
-        from engine.influence import contact_names
-        from engine.unreduced import unreduced_model
-        from engine.unreduced_statics import unreduced_statics
+        from engine.statics.static_response import contact_names
+        from engine.unreduced.scene import unreduced_model
+        from engine.unreduced.statics import unreduced_statics
 
         full = unreduced_model(study)
         sensors, forces = unreduced_statics(full, all_positions(model, positions))
@@ -216,7 +216,7 @@ class _Static:
         return Fidelity.STATIC
 
     def inner(self, study: Study, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
-        from engine.influence import contact_names
+        from engine.statics.static_response import contact_names
 
         return {"contact_force": ("contact", np.array(contact_names(model)))}
 

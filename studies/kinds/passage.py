@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.variables import MARCH, declare
-from studies.amplification import DYNAMIC_AMPLIFICATION, with_amplification
-from studies.results import VARIANT, Axis, Index, Results, chosen, extreme
-from studies.telling import check_sensors, first_carriage, in_words, told_statuses
-from studies.words import counted, listed, number, quantity
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
+from studies.results.formatting import counted, listed, number, quantity
+from studies.results.results import VARIANT, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.scene import Study
-    from studies.figures import Figure
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
 
 Array = NDArray[np.float64]
 

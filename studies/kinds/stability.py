@@ -11,18 +11,18 @@ import numpy as np
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import axes, declare
-from studies.maps.ground import Ground
+from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked
 from studies.maps.table import MAPS
-from studies.measuring import Piece, question_of, usual
+from studies.protocol.measuring import Piece, question_of, usual
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.carriages import Carriage
-    from engine.scene import Study
-    from studies.figures import Figure
-    from studies.results import Results
+    from engine.scene.carriages import Carriage
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
+    from studies.results.results import Results
 
 for _map in MAPS.values():
     declare("stability", *(axis for axis in _map.axes if axis.name not in axes()))

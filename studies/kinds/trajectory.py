@@ -8,15 +8,15 @@ import numpy as np
 
 from results_schema.errors import BadInput
 from results_schema.variables import MARCH, Variable, declare
-from studies.results import Results
-from studies.telling import check_sensors, first_carriage, told_statuses
-from studies.words import counted, quantity
+from studies.results.findings_common import check_sensors, first_carriage, told_statuses
+from studies.results.formatting import counted, quantity
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.scene import Study
-    from studies.figures import Figure
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
 
 MOST_SENSORS = 4
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
-from engine.document import shortened
-from engine.spec import Spec, one_of
-from engine.units import fault
+from engine.study_file.document import shortened
+from engine.study_file.spec import Spec, one_of
+from engine.study_file.units import fault
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
-from studies.measuring import Piece, Work, described, question_of, usual
-from studies.precision_checks import slug_of
-from studies.precision_variables import (
+from studies.precision.checks import slug_of
+from studies.precision.variables import (
     AUTOMATIC,
     COMPARISON_ONLY,
     COORDINATES,
@@ -35,15 +34,16 @@ from studies.precision_variables import (
     TOTAL_REFERENCE_ERROR,
     TOTAL_SECONDS,
 )
-from studies.results import Results
-from studies.telling import check_sensors, first_carriage
+from studies.protocol.measuring import Piece, Work, described, question_of, usual
+from studies.results.findings_common import check_sensors, first_carriage
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.scene import Study
-    from studies.figures import Figure
-    from studies.ladders import Ladder
+    from engine.scene.study import Study
+    from studies.pictures.common.figures import Figure
+    from studies.precision.ladders import Ladder
 
 STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
 SCHEMES = (
@@ -117,9 +117,9 @@ class WorkPrecision:
 
     def check(self, study: Study) -> None:
         """One mass on one smooth way in every scene, and sensors with a static value."""
-        from engine.ode import check_smooth
-        from studies import precision_checks as checks
-        from studies.precision import scene_model
+        from engine.methods.ode import check_smooth
+        from studies.precision import checks
+        from studies.precision.precision import scene_model
 
         asked = question_of(study, Question)
         first_carriage(study)
@@ -156,7 +156,7 @@ class WorkPrecision:
         return _gathered(pieces, question_of(study, Question))
 
     def findings(self, results: Results) -> list[str]:
-        from studies import advice
+        from studies.precision import findings as advice
 
         return advice.findings(results.dataset, question_of(results.study, Question).wanted)
 
@@ -171,14 +171,14 @@ KIND = WorkPrecision()
 
 def _parts() -> Mapping[str, tuple[str, float]]:
     """The parts of a scene's work on this machine."""
-    from studies.jax_march import is_there
+    from studies.precision.jax_march import is_there
 
     return {**_PARTS, **({"jax": ("average acceleration by jax.vmap", 10.0)} if is_there() else {})}
 
 
 def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, Any], work: Work) -> xr.Dataset:
     """One piece."""
-    from studies import ladders
+    from studies.precision import ladders
 
     ladder = _ladder(asked)
     if part == "solvers":
@@ -188,14 +188,14 @@ def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, A
 
 
 def _ladder(asked: Question) -> Ladder:
-    from studies.ladders import Ladder
+    from studies.precision.ladders import Ladder
 
     return Ladder(asked.schemes, asked.step_counts, asked.mode_counts, asked.reference_modes)
 
 
 def _automatic_pieces(study: Study, asked: Question, scene: str) -> Iterator[Piece]:
     """The program's own choice for a scene at each tolerance, where it has one."""
-    from studies.ladders import automatic, leaves_modes_open
+    from studies.precision.ladders import automatic, leaves_modes_open
 
     overrides = asked.scenes[scene]
     if not leaves_modes_open(study.with_values(overrides)):
@@ -210,7 +210,7 @@ def _automatic_name(scene: str, tolerance: float) -> str:
     return f"automatic-{slug_of(str(tolerance))}-{slug_of(scene)}"
 
 
-#: The parts of a scene's work, each a function of `studies.ladders`: words, expected seconds.
+#: The parts of a scene's work, each a function of `studies.precision.ladders`: words, expected seconds.
 _PARTS: Mapping[str, tuple[str, float]] = {
     "steps": ("every scheme over the steps", 6.0),
     "solvers": ("SciPy's solvers on the same equations", 3.0),
@@ -221,8 +221,8 @@ _PARTS: Mapping[str, tuple[str, float]] = {
 def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     import xarray as xr
 
-    from studies.precision import COMPARED, MARCHED, QUANTITIES
-    from studies.trade import fitted_order, formal_order, fronts
+    from studies.precision.pareto import fitted_order, formal_order, fronts
+    from studies.precision.precision import COMPARED, MARCHED, QUANTITIES
 
     steps, solvers, modes = (
         [pieces[f"{part}-{slug_of(name)}"] for name in asked.scenes] for part in ("steps", "solvers", "modes")
@@ -292,7 +292,7 @@ def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, A
 
 def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
     from results_schema.variables import axes
-    from studies.ladders import SOLVERS
+    from studies.precision.ladders import SOLVERS
 
     named = [f"{method} {tolerance:g}" for method, tolerances in SOLVERS.items() for tolerance in tolerances]
     values = {

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import Ground, MapScene
+from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.maps.methods import hht
-from studies.words import counted, number, percent
+from studies.results.formatting import counted, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def rule_steps(scene: MapScene, speed: Array) -> Array:
     """(n,) steps per passage of the rule for speeds (n,) over omega_1 L/pi."""
-    from engine.step_rules import alias_steps
+    from engine.march.step_rules import alias_steps
 
     return alias_steps(scene.model, scene.model.leading_body.modal.length / (speed * scene.speed_unit))
 

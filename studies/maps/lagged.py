@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import GROWS, Ground, MapScene, threshold
+from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
-from studies.words import listed, number
+from studies.results.formatting import listed, number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def lagged_growth(scene: MapScene, mass: Array, relative: float) -> Array:
     """(n,) growth per step for masses (n,) over the body's, omega_1 h = relative."""
-    from engine.comparison import lagged_inertia
+    from engine.methods.comparison import lagged_inertia
 
     step = np.full_like(mass, relative / scene.model.first_omega)
     return scene.step_growth(scene.values(mass), step, scheme=lagged_inertia())

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Field, Strict
 
-from engine.spec import Spec
-from engine.units import fault
+from engine.study_file.spec import Spec
+from engine.study_file.units import fault
 from results_schema.variables import Variable, axes
-from studies.measuring import Work, described
+from studies.protocol.measuring import Work, described
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.maps.ground import Ground
+    from studies.maps.map_scene import Ground
 
 
 def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:

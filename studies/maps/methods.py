@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.maps import amplification
-from studies.maps.ground import AVERAGE
+from studies.maps.map_scene import AVERAGE
 
 if TYPE_CHECKING:
-    from engine.comparison import ComparisonScheme
+    from engine.methods.comparison import ComparisonScheme
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Method:
     @property
     def scheme(self) -> ComparisonScheme | None:
         """The comparison scheme; None for one of the march."""
-        from engine.comparison import COMPARISON
+        from engine.methods.comparison import COMPARISON
 
         return COMPARISON[self.compared] if self.compared else None
 

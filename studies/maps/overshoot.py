@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import Ground, MapScene
+from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
 from studies.maps.methods import LABELS, METHODS, Method
-from studies.words import listed, number
+from studies.results.formatting import listed, number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def overshoot(scene: MapScene, method: Method, x: Array) -> Array:
     """(2, n) largest displacement over the first, and velocity over omega times it, at omega h = x (n,)."""
-    from engine.transition import held_transitions
+    from engine.methods.transition import held_transitions
 
     frozen, values = scene.frozen(scheme=method.scheme), scene.oscillators(x.size)
     step = x / scene.model.first_omega

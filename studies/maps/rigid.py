@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import Ground
+from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.maps.methods import METHODS, Method, generalized, hht
-from studies.words import listed, number, percent
+from studies.results.formatting import listed, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def _inertial(ground: Ground, work: Work) -> Array:
 
 def _tied(ground: Ground, method: Method) -> Array:
     """The same by a tie at position level."""
-    from engine.comparison import march_comparison, rigid_tie
+    from engine.methods.comparison import march_comparison, rigid_tie
 
     scene = ground.passage(MODES, method.table)
     tables, lanes = scene.laid_out(STEPS, scene.values(np.array([ground.mass_ratio]), np.array([ground.speed_ratio])))

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import GROWS, Ground, MapScene, threshold
+from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
 from studies.maps.methods import LABELS, METHODS, Method
-from studies.words import listed, number
+from studies.results.formatting import listed, number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 

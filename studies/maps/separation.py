@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.maps.ground import Ground, MapScene
+from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
-from studies.words import counted, listed, number, percent
+from studies.results.formatting import counted, listed, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.measuring import Work
+    from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
 

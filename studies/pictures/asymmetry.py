@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from engine.motions import OutAndBack
-from studies import theory
-from studies.figures import (
+from engine.scene.motions import OutAndBack
+from studies.findings import theory
+from studies.pictures.common.figures import (
     BESIDE,
     BLUE,
     HAIR,
@@ -26,10 +26,20 @@ from studies.figures import (
     logarithmic,
     zero_line,
 )
-from studies.pictures.traces import odd_part, over_position, picked, there_and_back
-from studies.results import Index, Results, chosen
-from studies.views import DAMPING, MASSES, SPEEDS, Curve, View, along_axis, draw_curves, draw_map, view
-from studies.words import percent, scale_for
+from studies.pictures.common.sweep_view import (
+    DAMPING,
+    MASSES,
+    SPEEDS,
+    Curve,
+    View,
+    along_axis,
+    draw_curves,
+    draw_map,
+    view,
+)
+from studies.pictures.common.traces import odd_part, over_position, picked, there_and_back
+from studies.results.formatting import percent, scale_for
+from studies.results.results import Index, Results, chosen
 
 MOST_SENSORS = 3
 THRESHOLDS = (0.01, 0.05)

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator
 from numpy.typing import NDArray
 
-from engine.carriages import BodyCarriage
-from studies.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, printed
-from studies.results import Results, spread
-from studies.views import MASSES, SPEEDS, Curve, View, view
-from studies.words import quantity
+from engine.scene.carriages import BodyCarriage
+from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, printed
+from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
+from studies.results.formatting import quantity
+from studies.results.results import Results, spread
 
 Array = NDArray[np.float64]
 

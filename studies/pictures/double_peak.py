@@ -11,9 +11,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from engine.motions import Sinusoidal
-from studies import theory
-from studies.figures import (
+from engine.scene.motions import Sinusoidal
+from studies.findings import theory
+from studies.pictures.common.figures import (
     BLUE,
     HAIR,
     INK,
@@ -26,10 +26,10 @@ from studies.figures import (
     logarithmic,
     shades,
 )
-from studies.pictures.traces import picked
-from studies.results import Index, Results, chosen
-from studies.views import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
-from studies.words import scale_for
+from studies.pictures.common.sweep_view import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
+from studies.pictures.common.traces import picked
+from studies.results.formatting import scale_for
+from studies.results.results import Index, Results, chosen
 
 Array = NDArray[np.float64]
 

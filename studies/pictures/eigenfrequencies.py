@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from studies.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
+from studies.at_rest.resting import FREQUENCY_WANTED, frequency_errors
 from studies.pictures.at_rest import (
     Errors,
     carriage_marks,
@@ -19,10 +19,10 @@ from studies.pictures.at_rest import (
     sweep_curves,
     swept,
 )
-from studies.resting import FREQUENCY_WANTED, frequency_errors
-from studies.results import Results
-from studies.views import View
-from studies.words import number, quantity
+from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
+from studies.pictures.common.sweep_view import View
+from studies.results.formatting import number, quantity
+from studies.results.results import Results
 
 Array = NDArray[np.float64]
 

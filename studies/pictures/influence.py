@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from studies.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
+from studies.at_rest.resting import READING_WANTED, contacts_vary, reading_errors
 from studies.pictures.at_rest import (
     Errors,
     carriage_marks,
@@ -19,10 +19,10 @@ from studies.pictures.at_rest import (
     sweep_curves,
     swept,
 )
-from studies.resting import READING_WANTED, contacts_vary, reading_errors
-from studies.results import Results, chosen, spread
-from studies.views import Curve
-from studies.words import quantity, scale_for
+from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
+from studies.pictures.common.sweep_view import Curve
+from studies.results.formatting import quantity, scale_for
+from studies.results.results import Results, chosen, spread
 
 Array = NDArray[np.float64]
 

@@ -10,13 +10,23 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from engine.carriages import BodyCarriage
-from studies.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
-from studies.pictures.traces import over_position, picked
-from studies.results import Index, Results, chosen, extreme
-from studies.theory import body_mass
-from studies.views import DAMPING, MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
-from studies.words import scale_for
+from engine.scene.carriages import BodyCarriage
+from studies.findings.theory import body_mass
+from studies.pictures.common.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
+from studies.pictures.common.sweep_view import (
+    DAMPING,
+    MASSES,
+    SPEEDS,
+    View,
+    along_axis,
+    depends_on,
+    draw_curves,
+    draw_map,
+    view,
+)
+from studies.pictures.common.traces import over_position, picked
+from studies.results.formatting import scale_for
+from studies.results.results import Index, Results, chosen, extreme
 
 Array = NDArray[np.float64]
 

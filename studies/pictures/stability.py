@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from studies.figures import (
+from studies.pictures.common.figures import (
     BLUE,
     DISTINCT,
     HAIR,
@@ -27,7 +27,7 @@ from studies.figures import (
     shades,
 )
 from studies.pictures.stability_more import OVERSHOOT, RIGID_TIE, SEPARATION, Drawn
-from studies.words import counted, number
+from studies.results.formatting import counted, number
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.figures import (
+from studies.maps.rigid import INERTIAL, STEPS
+from studies.pictures.common.figures import (
     BLUE,
     DISTINCT,
     HAIR,
@@ -21,7 +22,6 @@ from studies.figures import (
     shades,
     zero_line,
 )
-from studies.maps.rigid import INERTIAL, STEPS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.figures import Figure, draw, legend_of_all, shades
-from studies.results import Index, Results, chosen
-from studies.words import scale_for
+from studies.pictures.common.figures import Figure, draw, legend_of_all, shades
+from studies.results.formatting import scale_for
+from studies.results.results import Index, Results, chosen
 
 MOST_ROWS = 4
 MOST_CURVES = 5

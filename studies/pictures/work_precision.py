@@ -12,9 +12,20 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from studies.advice import QUANTITY_WORDS, scheme_words, short_time
-from studies.figures import DISTINCT, HAIR, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic, shades
-from studies.trade import automatic_choices, choices
+from studies.pictures.common.figures import (
+    DISTINCT,
+    HAIR,
+    INK,
+    MUTED,
+    VERMILION,
+    Figure,
+    draw,
+    legend_beside,
+    logarithmic,
+    shades,
+)
+from studies.precision.findings import QUANTITY_WORDS, scheme_words, short_time
+from studies.precision.pareto import automatic_choices, choices
 
 if TYPE_CHECKING:
     import xarray as xr

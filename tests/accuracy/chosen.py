@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from engine.accuracy.choice import Choice
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import differences, results_of
-from engine.dataset import Collector
-from engine.execution import execute, run_jobs
-from engine.outcome import Flat
-from engine.plan import Plan, make_plan
-from engine.scene import Study
+from engine.batch.dataset import Collector
+from engine.batch.execution import execute, run_jobs
+from engine.batch.plan import Plan, make_plan
+from engine.march.outcome import Flat
+from engine.scene.study import Study
 from tests.accuracy.passages import SPEED, WEIGHT, ZETA, axis, passages
 from tests.engine.build import Table, beam, fixed
 
@@ -67,8 +67,8 @@ PILOTS = 48  # fewer than usual, so that sweeps of some hundred variants are qui
 def few_at_most(count: int = 20) -> Iterator[None]:
     """Sweeps of more variants are chosen for."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("engine.plan.FEW", count)
-        patch.setattr("engine.plan.FEW_IN_SCENE", 1)
+        patch.setattr("engine.batch.plan.FEW", count)
+        patch.setattr("engine.batch.plan.FEW_IN_SCENE", 1)
         yield
 
 

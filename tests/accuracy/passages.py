@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from engine.accuracy.grids import SceneGrid
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, mass, study
 
 OPEN = beam(modes="auto", damping_ratio=0.02)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.accuracy.audit import audit, audit_size, joined, sampled
 from engine.accuracy.results import results_of
-from engine.plan import Plan, make_plan
+from engine.batch.audit import audit, audit_size, joined, sampled
+from engine.batch.plan import Plan, make_plan
 from tests.accuracy.chosen import STUDIES, chosen_plan, observed, run_of
 from tests.accuracy.passages import WEIGHT, axis, passages
 from tests.engine.build import beam, mass, study, swing
@@ -45,15 +45,15 @@ def test_no_pilot_is_audited() -> None:
 
 
 def test_a_hundredth_is_audited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.accuracy.audit.FREE_SECONDS", np.inf)
+    monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", np.inf)
     assert [audit_size(masses(count)) for count in (3, 100, 4000, 100_000)] == [3, 16, 40, 256]
 
 
 def test_half_as_many_until_that_takes_no_longer_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.accuracy.audit.MOST_TIME", 0.0)
+    monkeypatch.setattr("engine.batch.audit.MOST_TIME", 0.0)
     sizes = []
     for seconds in (1e3, 1e-2, 1e-3, 1e-9):
-        monkeypatch.setattr("engine.accuracy.audit.FREE_SECONDS", seconds)
+        monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", seconds)
         sizes.append(audit_size(masses(4000)))
     assert sizes == sorted(sizes, reverse=True) and sizes[0] == 40 and sizes[-1] == 0
     assert set(sizes) <= {40, 20, 10, 5, 2, 1, 0}

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, NEIGHBOURS, PILOTS, coordinates, pilots_of
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import results_of
+from engine.batch.plan import make_plan
 from engine.kernels.choice import ALIKE, cheapest, nearest
-from engine.plan import make_plan
 from results_schema.status import Status
 from tests.accuracy.chosen import LENGTHS, SPEEDS, STUDIES, TOLERANCE, WEIGHTS, executed, observed, run_of
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
-from engine.step_rules import least_steps
+from engine.march.step_rules import least_steps
 from tests.accuracy.passages import OPEN, only_grid, passages
 from tests.engine.build import beam, cruise, fixed, mass, oscillator, shuttle, swing
 

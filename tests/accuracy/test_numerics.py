@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from engine.bodies.body import MAX_MODES, Body
 from engine.bodies.build import build_body
-from engine.bodies.reduced_body import save_body
-from engine.model import build_model, with_numerics
-from engine.numerics import Numerics, open_bodies
-from engine.scene import Study
+from engine.bodies.modal.description import MAX_MODES, Body
+from engine.bodies.reduced.body import save_body
+from engine.model.numerics import Numerics, open_bodies
+from engine.model.scene_model import build_model, with_numerics
+from engine.scene.study import Study
 from tests.accuracy.passages import passages
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files

@@ -11,8 +11,8 @@ import pytest
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
-from engine.lanes import LaneValues
-from engine.scene import Study
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
 from results_schema.status import Status
 from tests.accuracy.passages import OPEN, WEIGHT, ZETA, only_grid, passages
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing

@@ -10,9 +10,9 @@ import pytest
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
-from engine.outcome import Outcome, outcome
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.march.outcome import Outcome, outcome
+from engine.scene.study import Study
 from results_schema.status import Status
 from tests.accuracy.passages import only_grid, passages
 from tests.engine.build import beam, fixed, under

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from engine.accuracy.ladder import Measured
 from engine.accuracy.results import results_of
 from engine.accuracy.telling import all_but, others_of, telling_of
-from engine.outcome import Asked
+from engine.march.outcome import Asked
 from tests.accuracy.chosen import run_of
 
 Array = NDArray[np.float64]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from engine.bodies.beam_modes import BeamProperties, uniform_beam
-from engine.bodies.frame import Frame
-from engine.bodies.frame_body import frame_body
-from engine.bodies.modal import ModalBody
+from engine.bodies.beam.modes import BeamProperties, uniform_beam
+from engine.bodies.frame.body import frame_body
+from engine.bodies.frame.frame import Frame
+from engine.bodies.modal.modal_body import ModalBody
 
 LENGTH, AREA, SECOND_MOMENT, MODULUS, DENSITY = 15.0, 0.01, 8.33e-6, 2.1e11, 7850.0
 RAIL: dict[str, Any] = {

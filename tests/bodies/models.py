@@ -11,13 +11,13 @@ import pytest
 from scipy.io import mmwrite
 from scipy.sparse import csc_matrix, save_npz
 
-from engine.bodies.frame import DIRECTIONS, Frame
-from engine.bodies.frame_assembly import Assembly, assemble
-from engine.bodies.import_child import READERS
-from engine.bodies.import_files import Request
-from engine.bodies.import_model import FileModel
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.bodies.files.child import READERS
+from engine.bodies.files.model import FileModel
+from engine.bodies.files.reader import Request
+from engine.bodies.frame.assembly import Assembly, assemble
+from engine.bodies.frame.frame import DIRECTIONS, Frame
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH
 

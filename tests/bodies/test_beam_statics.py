@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
-from engine.bodies.beam_statics import BeamStatics, beam_statics
-from engine.bodies.modal import Array, ModalBody
+from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.beam.statics import BeamStatics, beam_statics
+from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.waves import Support, hermite_model
 from tests.reference import closed_forms

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from engine.bodies.build import build_body
-from engine.bodies.craig_bampton import reduce_model
-from engine.bodies.flexibility import factorised
-from engine.bodies.frame import Frame
-from engine.bodies.frame_assembly import Assembly, assemble, rigid_motions
-from engine.bodies.frame_body import interface_freedoms
+from engine.bodies.frame.assembly import Assembly, assemble, rigid_motions
+from engine.bodies.frame.body import interface_freedoms
+from engine.bodies.frame.frame import Frame
+from engine.bodies.modal.craig_bampton import reduce_model
+from engine.bodies.modal.flexibility import factorised
 from results_schema.errors import BadInput
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, RAIL, beam, body, straight
 

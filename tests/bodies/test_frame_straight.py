@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.bodies.flexibility import factorised
-from engine.bodies.frame import Frame
-from engine.bodies.frame_assembly import assemble
-from engine.bodies.frame_track import track_of
-from engine.bodies.modal import Array
+from engine.bodies.frame.assembly import assemble
+from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.track import track_of
+from engine.bodies.modal.flexibility import factorised
+from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
 from tests.bodies.frames import (
     AREA,

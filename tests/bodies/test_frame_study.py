@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import engine
-import engine.plan
+import engine.batch.plan
 from engine.bodies.build import build_body
-from engine.bodies.frame import Frame
-from engine.document import write_document
-from engine.scene import Study, load
-from engine.sweep import expand
+from engine.bodies.frame.frame import Frame
+from engine.scene.study import Study, load
+from engine.scene.sweep import expand
+from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 from tests.bodies.frames import AREA, DENSITY, LENGTH, MODULUS, SECOND_MOMENT, straight
 from tests.scene.mutations import Mutation, mutations, survives
@@ -337,7 +337,7 @@ def test_dampers_at_nodes_are_those_of_the_beam() -> None:
         data = passage(table, 600.0, 8.0).data
         sweep = {"damping": {"of": f"body.bed.{key}", "values": [0.0, 500.0, 4000.0]}}
         study = Study(**(data | {"sweep": sweep, "solver": data["solver"] | {"steps": 4000}}))
-        assert len(engine.plan.make_plan(study).groups) == 1
+        assert len(engine.batch.plan.make_plan(study).groups) == 1
         found.append(engine.run(study))
     for name in ("midspan_max", "midspan_min", "below_max", "below_min"):
         one, other = (dataset[name].values for dataset in found)

@@ -14,8 +14,8 @@ from scipy.sparse.linalg import spsolve
 
 import engine
 from engine.bodies.build import build_body
-from engine.bodies.imported import Ansys
-from engine.bodies.modal import ModalBody
+from engine.bodies.imported.imported import Ansys
+from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.models import in_process, optional
 
@@ -38,7 +38,7 @@ PUBLISHED = (1283.200, 1283.200, 5781.975, 6919.399)  # Hz
 def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """Files are read here, as a process for each takes seconds; but in the tests of OWN_PROCESS."""
     if request.function not in OWN_PROCESS:
-        monkeypatch.setattr("engine.bodies.imported.read_files", in_process)
+        monkeypatch.setattr("engine.bodies.imported.imported.read_files", in_process)
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ import pytest
 from scipy.io import mmwrite
 from scipy.sparse import csc_matrix, save_npz
 
-from engine.bodies import imported
-from engine.bodies.imported import Matrices
-from engine.document import write_document
-from engine.plan import make_plan
-from engine.scene import load
+from engine.batch.plan import make_plan
+from engine.bodies.imported import imported
+from engine.bodies.imported.imported import Matrices
+from engine.scene.study import load
+from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, PINNED, straight
 from tests.bodies.models import CRUISE, Files, in_process, refusal, study

@@ -11,13 +11,13 @@ import pytest
 from pydantic import ValidationError
 from scipy.io import mmwrite
 
-from engine.bodies import imported
-from engine.bodies.import_ansys import scan_nodes
-from engine.bodies.import_cards import cards_of, check_matrices, check_nodes, rows_of, scalars
-from engine.bodies.import_files import Request, read_files
-from engine.bodies.import_text import lines_of
-from engine.bodies.imported import Matrices
-from engine.bodies.imported_body import imported_body
+from engine.bodies.files.ansys import scan_nodes
+from engine.bodies.files.cards import cards_of, check_matrices, check_nodes, rows_of, scalars
+from engine.bodies.files.reader import Request, read_files
+from engine.bodies.files.text import lines_of
+from engine.bodies.imported import imported
+from engine.bodies.imported.body import imported_body
+from engine.bodies.imported.imported import Matrices
 from results_schema.errors import BadInput
 from tests.bodies.frames import PINNED, straight
 from tests.bodies.models import BULK, CDB, Files, damaged, in_process

@@ -13,16 +13,16 @@ from scipy.sparse import block_diag, csc_array, csc_matrix, save_npz
 from scipy.sparse.linalg import spsolve
 
 import engine
-from engine.bodies import imported
+from engine.batch.plan import make_plan
 from engine.bodies.build import build_body
-from engine.bodies.imported import Matrices
-from engine.bodies.modal import ModalBody
-from engine.document import write_document
-from engine.plan import make_plan
-from engine.scene import Study, load
+from engine.bodies.imported import imported
+from engine.bodies.imported.imported import Matrices
+from engine.bodies.modal.modal_body import ModalBody
+from engine.scene.study import Study, load
+from engine.study_file.document import write_document
 from results_schema.errors import BadInput
-from studies.identity import run_key
-from studies.preview import preview
+from studies.commands.preview import preview
+from studies.runs.identity import run_key
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, PINNED, body, straight
 from tests.bodies.models import Files, in_process, refusal, study
 

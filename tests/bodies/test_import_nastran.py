@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from scipy.linalg import eigh
 
 from engine.bodies.build import build_body
-from engine.bodies.imported import Nastran
-from engine.bodies.modal import ModalBody
+from engine.bodies.imported.imported import Nastran
+from engine.bodies.modal.modal_body import ModalBody
 from tests.bodies.frames import CLAMPED_FREE, body, straight
 from tests.bodies.models import Files, in_process, optional, write_cards
 
@@ -31,7 +31,7 @@ MASS, CENTRE = 1.5904, 600.0 - 415.360203
 def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """Files are read here, as a process for each takes seconds; but in the tests of OWN_PROCESS."""
     if request.function not in OWN_PROCESS:
-        monkeypatch.setattr("engine.bodies.imported.read_files", in_process)
+        monkeypatch.setattr("engine.bodies.imported.imported.read_files", in_process)
 
 
 def modal(matrices: Path, nodes: Path, track: list[int], **more: Any) -> ModalBody:

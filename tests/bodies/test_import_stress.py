@@ -11,10 +11,10 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, save_npz
 
 import engine
-from engine.bodies import imported
 from engine.bodies.build import build_body
-from engine.bodies.imported import Matrices, Nastran
-from engine.bodies.modal import ModalBody
+from engine.bodies.imported import imported
+from engine.bodies.imported.imported import Matrices, Nastran
+from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, MODULUS, PINNED, RAIL, body, straight
 from tests.bodies.models import Files, in_process, optional, study

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import engine
-from engine.bodies.modal import ModalBody
-from engine.bodies.reduced_body import load_body, save_body
-from engine.document import write_document
-from engine.scene import load
-from results_schema import bodies
+from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.reduced.body import load_body, save_body
+from engine.scene.study import load
+from engine.study_file.document import write_document
 from results_schema.errors import ArchiveError, BadInput
-from studies.identity import run_key
+from results_schema.store import bodies
+from studies.runs.identity import run_key
 from tests.bodies.frames import LENGTH, beam, body, straight
 from tests.bodies.test_frame_reduction import portal
 from tests.bodies.test_frame_study import STUDY

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 import engine
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid
 from engine.accuracy.results import differences, results_of, worst_held
-from engine.lanes import LaneValues
+from engine.batch.plan import Plan, make_plan
 from engine.linear_algebra import one_thread
-from engine.numerics import Numerics
-from engine.outcome import Outcome, outcome
-from engine.plan import Plan, make_plan
-from engine.scene import Study
-from engine.step_rules import least_steps
-from studies.study import kind_of
+from engine.march.outcome import Outcome, outcome
+from engine.march.step_rules import least_steps
+from engine.model.numerics import Numerics
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
+from studies.protocol.study import kind_of
 from tests.calibration.scenes import draw
 
 Array = NDArray[np.float64]

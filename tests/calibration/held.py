@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.audit import SEED, audit
 from engine.accuracy.results import results_of
+from engine.batch.audit import SEED, audit
+from engine.batch.plan import make_plan
 from engine.linear_algebra import one_thread
-from engine.plan import make_plan
-from studies.study import kind_of
+from studies.protocol.study import kind_of
 from tests.calibration.scenes import draw, reads_moment
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.scene import Study
-from engine.scenes import base_scene
+from engine.model.distinct_models import base_scene
+from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 
 Array = NDArray[np.float64]

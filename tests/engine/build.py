@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from engine.scene import Study
+from engine.scene.study import Study
 
 Table = dict[str, Any]
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.bodies.build import build_body
-from engine.motions import Cruise
-from engine.scene import Study
+from engine.scene.motions import Cruise
+from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 Touching = dict[tuple[str, int], bool]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.reduction import Compared, Cycle
-from engine.scene import Study
+from engine.observation.reduction import Compared, Cycle
+from engine.scene.study import Study
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.scene import Study
+from engine.scene.study import Study
 from tests.engine.twin import Twin
 from tests.naive.scene import Array
 

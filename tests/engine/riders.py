@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.scene import Study
+from engine.scene.study import Study
 from tests.engine.build import Table, beam, fixed, shuttle, study, under
 
 RIGID: Table = {"kind": "rigid", "length": 0.4, "mass": 0.5, "inertia": 0.01}

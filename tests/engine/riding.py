@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
-from engine.bodies.modal import ModalBody
-from engine.scene import Study
+from engine.bodies.modal.modal_body import ModalBody
+from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 

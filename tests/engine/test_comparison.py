@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.comparison import (
+from engine.kernels.layout import LARGEST, LARGEST_AT, SMALLEST, Newmark, State
+from engine.kernels.schemes import generalized_alpha
+from engine.march.march import march
+from engine.march.tables import SceneTables
+from engine.methods.comparison import (
     COMPARISON,
     Compared,
     ComparisonScheme,
@@ -19,13 +23,9 @@ from engine.comparison import (
     rigid_tie,
     wilson_theta,
 )
-from engine.kernels.layout import LARGEST, LARGEST_AT, SMALLEST, Newmark, State
-from engine.kernels.schemes import generalized_alpha
-from engine.lanes import LaneValues, lane_table, padded
-from engine.march import march
-from engine.model import build_model
-from engine.scene import Study
-from engine.tables import SceneTables
+from engine.model.scene_model import build_model
+from engine.model.variant_values import LaneValues, lane_table, padded
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, shuttle, study, swing
 from tests.engine.twin import bed_of, damping_of, load_of

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from engine.comparison import (
+from engine.kernels.layout import Newmark, State
+from engine.methods.comparison import (
     COMPARISON,
     ComparisonScheme,
     frozen_track,
@@ -16,9 +17,8 @@ from engine.comparison import (
     picard_relaxed,
     propagate_comparison,
 )
-from engine.kernels.layout import Newmark, State
-from engine.lanes import LaneValues, from_blocks, lane_table, padded, to_blocks
-from engine.model import SceneModel, build_model
+from engine.model.scene_model import SceneModel, build_model
+from engine.model.variant_values import LaneValues, from_blocks, lane_table, padded, to_blocks
 from tests.engine.build import beam, cruise, force, mass, study
 from tests.naive.scene import Array
 

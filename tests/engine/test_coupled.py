@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from engine.coupled import coupled_frequencies, coupled_modes
-from engine.lanes import LaneValues
-from engine.scene import Study
-from engine.scenes import base_scene
-from engine.ways import frozen
+from engine.model.distinct_models import base_scene
+from engine.model.station_path import frozen
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
+from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
 from tests.engine.riders import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.execution import run
-from engine.histories import counts_reduced
-from engine.plan import make_plan
-from engine.timeline import Rider, build_timeline
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.model.timeline import Rider, build_timeline
+from engine.observation.histories import counts_reduced
 from tests.engine.build import beam, cruise, force, study, swing
 from tests.engine.keeping import Kept
 

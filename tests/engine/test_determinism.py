@@ -17,13 +17,13 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-import engine.march
-from engine.dataset import Collector, build
-from engine.execution import execute, run
-from engine.lanes import LaneTable, LaneValues, to_blocks
-from engine.model import SceneModel
-from engine.plan import Plan, make_plan
-from engine.scene import Study
+import engine.march.march
+from engine.batch.dataset import Collector, build
+from engine.batch.execution import execute, run
+from engine.batch.plan import Plan, make_plan
+from engine.model.scene_model import SceneModel
+from engine.model.variant_values import LaneTable, LaneValues, to_blocks
+from engine.scene.study import Study
 from results_schema.errors import BadInput, Interrupted
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
 from tests.reference import closed_forms, values
@@ -162,13 +162,13 @@ def test_one_bad_lane_leaves_its_neighbours_alone(
     sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 37}}
     given = study(beam(), riding, sweep=sweep, output={"histories": "all"}, solver={"steps": 300})
     clean = run(given)
-    table = engine.march.lane_table
+    table = engine.march.march.lane_table
 
     def poisoned(model: SceneModel, lane_values: LaneValues) -> LaneTable:
         bad = np.isclose(lane_values.own_mass("car"), clean.weight.values[20])
         return poison(table(model, lane_values), to_blocks(bad))
 
-    monkeypatch.setattr(engine.march, "lane_table", poisoned)
+    monkeypatch.setattr(engine.march.march, "lane_table", poisoned)
     found = run(given, threads=2)
     compared = 0
     for name, variable in clean.data_vars.items():
@@ -306,7 +306,7 @@ def test_what_a_chunk_raises_reaches_the_caller(monkeypatch: pytest.MonkeyPatch)
     def broken(*anything: Any) -> None:
         raise Broken
 
-    monkeypatch.setattr("engine.chunk.run_chunk", broken)
+    monkeypatch.setattr("engine.batch.chunk.run_chunk", broken)
     with pytest.raises(Broken):
         execute(plan, Recorder(), chunk=5, threads=2)
 

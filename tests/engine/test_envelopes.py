@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import engine.envelopes
+import engine.march.envelopes
+from engine.batch.dataset import Collector
+from engine.batch.execution import execute, run
+from engine.batch.plan import Plan, make_plan
 from engine.bodies.build import build_body
-from engine.bodies.frame import Frame
-from engine.dataset import Collector
-from engine.execution import execute, run
-from engine.plan import Plan, make_plan
-from engine.scene import Study
+from engine.bodies.frame.frame import Frame
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import straight
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
@@ -223,10 +223,10 @@ def test_same_bits_for_any_chunks_threads_and_groups(monkeypatch: pytest.MonkeyP
     whole = digest(make_plan(given), None, 2)
     assert "shape_envelope_max" in whole
     assert digest(make_plan(given), 17, 1) == whole
-    monkeypatch.setattr(engine.envelopes, "MOST_READINGS", 1)
+    monkeypatch.setattr(engine.march.envelopes, "MOST_READINGS", 1)
     cut = make_plan(given)
     assert [len(part.places) for part in cut.groups[0].tables.companions] == [4, 4, 4, 2]
-    monkeypatch.setattr("engine.outcome.MOST_KEPT", 1)
+    monkeypatch.setattr("engine.march.outcome.MOST_KEPT", 1)
     assert digest(cut, 64, 2) == whole
 
 

@@ -8,10 +8,10 @@ import sys
 import pytest
 
 from engine.accuracy.ladder import ladder_of
-from engine.plan import EVERY_MARCH, make_plan
-from engine.scene import load
+from engine.batch.plan import EVERY_MARCH, make_plan
+from engine.scene.study import load
 from results_schema.errors import BadInput
-from studies.study import kind_of
+from studies.protocol.study import kind_of
 
 TEXT = """
 schema_version = 1

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 import engine
-from engine.influence import StaticReadings, contact_names, static_shapes, static_values
-from engine.lanes import LaneValues
-from engine.scene import Study
-from engine.scenes import base_scene
-from engine.ways import frozen
+from engine.model.distinct_models import base_scene
+from engine.model.station_path import frozen
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
+from engine.statics.static_response import StaticReadings, contact_names, static_shapes, static_values
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
 from tests.engine.riders import FLEXIBLE, THREE, TWO, UNEVEN, riding
 

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import engine.march
-from engine.execution import run
+import engine.march.march
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
 from engine.kernels import jit
-from engine.kernels.march import march_many
-from engine.outcome import outcome
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.kernels.stepping.march import march_many
+from engine.march.outcome import outcome
+from engine.scene.study import Study
 from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, shuttle, study, under
 
 ROOT = Path(__file__).parents[2]
@@ -61,12 +61,12 @@ SCRIPT = """
 import json, sys
 import numpy as np
 sys.path.insert(0, sys.argv[1])
-import engine.march
+import engine.march.march
 from tests.engine.test_kernels import numbers_of, small
 print(json.dumps({name: numbers_of(small(name)) for name in sys.argv[3:]}))
 if sys.argv[2] == "break":  # histories go to a row that is not there
-    sampled = engine.march.rows_sampled
-    engine.march.rows_sampled = lambda *given: np.where(sampled(*given) >= 0, 10**9, -1)
+    sampled = engine.march.march.rows_sampled
+    engine.march.march.rows_sampled = lambda *given: np.where(sampled(*given) >= 0, 10**9, -1)
     try:
         numbers_of(small("one"))
     except IndexError:
@@ -282,7 +282,7 @@ def test_rows_of_lanes(tmp_path: Path, plain: str) -> None:
 @pytest.mark.parametrize("name", ["one", "quiet", "turning"])
 def test_one_tie_is_many_with_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = numbers_of(small(name))
-    monkeypatch.setattr(engine.march, "march_one", march_many)
+    monkeypatch.setattr(engine.march.march, "march_one", march_many)
     found = numbers_of(small(name))
     compared = 0
     for key, values in expected.items():
@@ -298,7 +298,7 @@ def test_one_tie_is_many_with_one(name: str, monkeypatch: pytest.MonkeyPatch) ->
 def test_policy() -> None:
     """Contract-only fastmath, no parallel loops, and no name of a kernel that the policy does not know; the compiler is
     named where the policy and where the rows of lanes are made."""
-    for source in sorted(Path(jit.__file__).parent.glob("*.py")):
+    for source in sorted(Path(jit.__file__).parent.rglob("*.py")):
         text = source.read_text()
         assert "prange" not in text
         assert "parallel=True" not in text

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.execution import run
-from engine.outcome import outcome
-from engine.plan import make_plan
-from engine.tables import SceneTables
-from engine.timeline import Rider
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.march.outcome import outcome
+from engine.march.tables import SceneTables
+from engine.model.timeline import Rider
 from studies import kind_named
 from tests.engine.build import beam, cruise, fixed, force, shuttle, study
 

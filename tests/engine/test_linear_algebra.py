@@ -15,7 +15,7 @@ from engine.linear_algebra import one_thread
 AFTER_A_RUN = """
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
-import engine.execution
+import engine.batch.execution
 from engine.bodies import unit_modes
 from tests.engine.build import beam, cruise, mass, study
 
@@ -23,12 +23,12 @@ def threads():
     return {part["num_threads"] for part in threadpool_info() if part["user_api"] == "blas"}
 
 seen = []
-decompose, march = unit_modes._jacobi_svd, engine.execution._task
+decompose, march = unit_modes._jacobi_svd, engine.batch.execution._task
 unit_modes._jacobi_svd = lambda matrix: seen.append(threads()) or decompose(matrix)
-engine.execution._task = lambda *given: seen.append(threads()) or march(*given)
+engine.batch.execution._task = lambda *given: seen.append(threads()) or march(*given)
 given = study(beam(modes=3, supports="clamped-clamped"), mass(0.3, cruise(0.0, 1.0, 1.0)), solver={"steps": 40})
 with threadpool_limits(3, user_api="blas"):
-    engine.execution.run(given, threads=2)
+    engine.batch.execution.run(given, threads=2)
     assert threads() == {3}, threads()
 assert len(seen) >= 2 and all(part == {1} for part in seen), seen
 """

@@ -11,13 +11,13 @@ import pytest
 from scipy.integrate import quad
 
 import engine
+from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, SECONDS, SQUARES
-from engine.lanes import LaneValues
-from engine.march import march
-from engine.model import build_model
-from engine.plan import make_plan
-from engine.scene import Study
-from engine.tables import SceneTables
+from engine.march.march import march
+from engine.march.tables import SceneTables
+from engine.model.scene_model import build_model
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, under
 from tests.reference import closed_forms
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from engine.execution import run
-from engine.plan import make_plan
-from engine.scene import Study
-from engine.step_rules import MOST_STEPS, alias_steps
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.march.step_rules import MOST_STEPS, alias_steps
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study
 

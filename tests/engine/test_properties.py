@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.execution import run
-from engine.march import March, prepare
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.march.march import March, prepare
+from engine.scene.study import Study
 from tests.engine import twin
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.reading import Reading

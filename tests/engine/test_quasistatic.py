@@ -9,7 +9,7 @@ import pytest
 
 import engine
 import studies
-from engine.plan import make_plan
+from engine.batch.plan import make_plan
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.execution import run
+from engine.batch.execution import run
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.naive import indices
 from tests.reference import closed_forms, values
@@ -94,8 +94,8 @@ def test_moving_force() -> None:
 
 def test_dynamic_amplification_has_the_exact_static_value() -> None:
     """The largest static midspan deflection is 1, and the moment PL/4."""
-    from engine.chunk import run_chunk
-    from engine.plan import make_plan
+    from engine.batch.chunk import run_chunk
+    from engine.batch.plan import make_plan
 
     sensors = {"midspan": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "quarter": fixed(0.25, "bending_moment")}
     given = study(beam(), force(values.WEIGHT, cruise(0.0, 1.0, 1.7, after=40.0)), sensor=sensors)

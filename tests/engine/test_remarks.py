@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from engine.plan import make_plan
-from engine.remarks import REMARKS, remarks
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.batch.plausibility import REMARKS, remarks
+from engine.scene.study import Study
 from tests.engine.build import beam, cruise, mass, study
 
 WAY = cruise(0.0, 1.0, 0.5)

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.dataset import Collector
-from engine.execution import execute, run
-from engine.histories import counts_reduced
+from engine.batch.dataset import Collector
+from engine.batch.execution import execute, run
+from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, MARKS
-from engine.kernels.pairs import survey
-from engine.lanes import padded
-from engine.plan import make_plan
-from engine.richardson import march_pair
-from engine.scene import Study
-from engine.tables import SceneTables
+from engine.kernels.stepping.pairs import survey
+from engine.march.richardson import march_pair
+from engine.march.tables import SceneTables
+from engine.model.variant_values import padded
+from engine.observation.histories import counts_reduced
+from engine.scene.study import Study
 from results_schema.status import Status
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.keeping import Kept

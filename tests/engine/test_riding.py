@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 import engine
 import studies
-from engine.lanes import LaneValues, padded
-from engine.march import march
-from engine.plan import make_plan
-from engine.scene import Study
-from engine.step_rules import contact_omega
+from engine.batch.plan import make_plan
+from engine.march.march import march
+from engine.march.step_rules import contact_omega
+from engine.model.variant_values import LaneValues, padded
+from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
 from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.riding import Twin

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.lanes import padded
-from engine.plan import make_plan
-from engine.richardson import march_chosen
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.march.richardson import march_chosen
+from engine.model.variant_values import padded
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing
 from tests.engine.company import Company

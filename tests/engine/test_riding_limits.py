@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 import engine
 import studies
-from engine.lanes import padded
-from engine.plan import make_plan
-from engine.richardson import march_chosen
+from engine.batch.plan import make_plan
+from engine.march.richardson import march_chosen
+from engine.model.variant_values import padded
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
 from tests.engine.riders import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, shuttle, study, swing
 from tests.engine.riders import RIGID, TWO, riding

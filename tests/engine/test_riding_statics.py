@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import engine
-from engine.influence import static_values
-from engine.lanes import LaneValues, padded
-from engine.march import march
-from engine.plan import make_plan
-from engine.step_rules import allow_any_steps
-from engine.ways import frozen
+from engine.batch.plan import make_plan
+from engine.march.march import march
+from engine.march.step_rules import allow_any_steps
+from engine.model.station_path import frozen
+from engine.model.variant_values import LaneValues, padded
+from engine.statics.static_response import static_values
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, shuttle
 from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding

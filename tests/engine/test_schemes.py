@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from engine.batch.plan import make_plan
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, generalized_alpha, hht_alpha
-from engine.lanes import LaneValues
-from engine.model import build_model
-from engine.plan import make_plan
-from engine.scene import Study
-from engine.tables import SceneTables
-from engine.transition import spectral_radius, transitions
+from engine.march.tables import SceneTables
+from engine.methods.transition import spectral_radius, transitions
+from engine.model.scene_model import build_model
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study
 

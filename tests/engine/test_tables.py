@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import engine.tables as tables
+import engine.march.tables as tables
 from engine.accuracy.groups import Group
-from engine.outcome import Outcome, outcome
-from engine.plan import make_plan
-from engine.scene import Study
+from engine.batch.plan import make_plan
+from engine.march.outcome import Outcome, outcome
+from engine.scene.study import Study
 from tests.engine.build import beam, cruise, mass, oscillator, shuttle, study, under
 
 ONE = mass(0.3, shuttle(0.1, 0.9, 1.0, 0.1, 2))

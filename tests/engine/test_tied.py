@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from engine.scene import Study
+from engine.scene.study import Study
 from tests.engine import twin as twins
 from tests.engine.build import aboard, beam, cruise, fixed, mass, oscillator, shuttle, swing, under
 from tests.engine.test_twin import DAMPED, ENTERING, SPRINGS, WAYPOINTS, case, compare, scheme

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.execution import run
-from engine.lanes import LaneValues
-from engine.model import build_model
-from engine.plan import make_plan
-from engine.scene import Study
-from engine.step_rules import contact_omega, least_steps
-from engine.tables import SceneTables
-from engine.transition import spectral_radius, transitions
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.march.step_rules import contact_omega, least_steps
+from engine.march.tables import SceneTables
+from engine.methods.transition import spectral_radius, transitions
+from engine.model.scene_model import build_model
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, study, under

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE, Lanes, Newmark, Record, State, Ties, Watch
-from engine.kernels.march import march_many
-from engine.kernels.start import settle, watch_start
+from engine.kernels.stepping.march import march_many
+from engine.kernels.stepping.start import settle, watch_start
 
 Array = NDArray[np.float64]
 STATIONS, BLOCKS = 12, 2

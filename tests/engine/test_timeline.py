@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.execution import run
-from engine.motions import Cruise, OutAndBack, Sinusoidal
-from engine.plan import make_plan
-from engine.reduction import Compared, Cycle
-from engine.scene import Study
-from engine.timeline import MOST_STATIONS, Rider, build_timeline
+from engine.batch.execution import run
+from engine.batch.plan import make_plan
+from engine.model.timeline import MOST_STATIONS, Rider, build_timeline
+from engine.observation.reduction import Compared, Cycle
+from engine.scene.motions import Cruise, OutAndBack, Sinusoidal
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
@@ -102,7 +102,7 @@ def test_slices_do_not_show(steps: int) -> None:
     ends = {}
     for most in (MOST_STATIONS, 10 * MOST_STATIONS):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("engine.timeline.MOST_STATIONS", most)
+            patch.setattr("engine.model.timeline.MOST_STATIONS", most)
             way = cruise(0.0, 1.0, 1.0, after=20.505)
             given = study(beam(), mass(0.5, way), solver={"steps": steps}, output={"histories": "all"})
             ends[most] = run(given)

@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.comparison import lagged_inertia, runge_kutta, wilson_theta
-from engine.lanes import LaneValues
-from engine.model import SceneModel, build_model
-from engine.scene import Study
-from engine.tables import SceneTables
-from engine.transition import (
+from engine.march.tables import SceneTables
+from engine.methods.comparison import lagged_inertia, runge_kutta, wilson_theta
+from engine.methods.transition import (
     Frozen,
     FrozenCompared,
     held_transitions,
@@ -23,6 +20,9 @@ from engine.transition import (
     step_matrices,
     transitions,
 )
+from engine.model.scene_model import SceneModel, build_model
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
 from tests.engine import build
 
 Array = NDArray[np.float64]

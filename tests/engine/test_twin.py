@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.execution import run
-from engine.scene import Study
+from engine.batch.execution import run
+from engine.scene.study import Study
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.reading import Reading
 from tests.engine.twin import Twin, march_twin

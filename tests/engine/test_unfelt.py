@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import engine
-from engine.bodies.import_track import line_between
-from engine.contacts import span_counted
-from engine.model import build_model
+from engine.bodies.files.track import line_between
+from engine.model.scene_model import build_model
+from engine.observation.contact_forces import span_counted
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, straight
 from tests.engine.build import Table, beam, cruise, fixed, mass, study

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import run, unreduced_march
+from engine import run
 from engine.bodies.build import build_body
-from engine.scene import Study
-from engine.unreduced import Unreduced, unreduced_model
-from engine.unreduced_march import course_of, march_unreduced
-from engine.unreduced_statics import unreduced_frequencies, unreduced_statics
+from engine.scene.study import Study
+from engine.unreduced import march as unreduced_march
+from engine.unreduced.march import course_of, march_unreduced
+from engine.unreduced.scene import Unreduced, unreduced_model
+from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 

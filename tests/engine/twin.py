@@ -15,8 +15,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from engine.bodies.beam_modes import BeamProperties, Spring, uniform_beam
-from engine.scene import Study
+from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
+from engine.scene.study import Study
 from tests.naive import motions, ode
 from tests.naive import newmark as naive
 from tests.naive import scene as scenes

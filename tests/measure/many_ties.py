@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.batch.plan import make_plan
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Lanes
-from engine.kernels.start import settle
-from engine.march import prepare
-from engine.plan import make_plan
-from engine.step_rules import allow_any_steps
-from studies.bench import MIDSPAN, Scene
+from engine.kernels.stepping.start import settle
+from engine.march.march import prepare
+from engine.march.step_rules import allow_any_steps
+from studies.commands.bench import MIDSPAN, Scene
 
 Array = NDArray[np.float64]
 SOURCE = Path(__file__).with_name("many_ties.c")

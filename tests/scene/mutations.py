@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from engine.document import write_document
+from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 
 How = Literal["drop", "misspell", "retype", "text", "nan"]

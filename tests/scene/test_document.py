@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.document import document_of, read_document, write_document
-from engine.scene import load
+from engine.scene.study import load
+from engine.study_file.document import document_of, read_document, write_document
 from results_schema.errors import BadInput
 from tests.scene.sample import MINIMAL, SAMPLE
 

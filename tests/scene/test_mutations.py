@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from engine.scene import load
-from engine.sweep import Cases, expand
+from engine.scene.study import load
+from engine.scene.sweep import Cases, expand
 from tests.scene.mutations import Mutation, mutations, survives
 from tests.scene.sample import MINIMAL, SAMPLE
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.scene import STANDARD_GRAVITY, Study, load
+from engine.scene.study import STANDARD_GRAVITY, Study, load
 from results_schema.errors import BadInput
 from tests.scene.sample import MINIMAL, SAMPLE
 

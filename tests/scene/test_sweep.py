@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.scene import Study, load
-from engine.sweep import Cases, expand
+from engine.scene.study import Study, load
+from engine.scene.sweep import Cases, expand
 from results_schema.errors import BadInput
 from tests.scene.sample import MINIMAL, SAMPLE
 

@@ -9,9 +9,9 @@ import sys
 import pytest
 from pydantic import Field, ValidationError
 
-from engine import units
-from engine.spec import Spec
-from engine.units import (
+from engine.study_file import units
+from engine.study_file.spec import Spec
+from engine.study_file.units import (
     ACCELERATION,
     AREA,
     DAMPING,
@@ -127,7 +127,7 @@ def test_pint_says_the_same_of_common_units() -> None:
 
 def test_pint_is_imported_only_for_uncommon_units() -> None:
     code = (
-        "import sys; from engine.scene import Study; "
+        "import sys; from engine.scene.study import Study; "
         "Study(kind='passage', gravity='9.81 m/s^2'); assert 'pint' not in sys.modules; "
         "assert not {'scipy', 'xarray', 'dask', 'numba', 'matplotlib'} & set(sys.modules); "
         "Study(kind='passage', gravity='32.17 ft/s^2'); assert 'pint' in sys.modules"

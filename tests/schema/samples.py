@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from results_schema import files
+from results_schema.store import files
 from results_schema.variables import axes, expand
 
 SENSORS = {"midspan": "m", "support": "N m"}

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from results_schema import files
-from results_schema.archive import describe, open_archive, output_state, write_archive
 from results_schema.errors import OutputFailed
+from results_schema.store import files
+from results_schema.store.archive import describe, open_archive, output_state, write_archive
 from results_schema.validate import validate
 from tests.schema.samples import ATTRIBUTES, CARRIAGES, SENSORS, FailNth, groups, in_child, march, with_histories
 

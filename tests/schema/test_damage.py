@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from results_schema.archive import describe, open_archive, output_state, write_archive
 from results_schema.errors import ArchiveError, BadInput, WanderlastError
-from results_schema.links import hdf5_library
+from results_schema.store.archive import describe, open_archive, output_state, write_archive
+from results_schema.store.links import hdf5_library
 from tests.schema.samples import ATTRIBUTES, groups, in_child, march
 
 

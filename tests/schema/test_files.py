@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from results_schema import files
 from results_schema.errors import BadInput, OutputFailed
+from results_schema.store import files
 from tests.schema.samples import FailNth
 
 

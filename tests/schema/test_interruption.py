@@ -4,9 +4,9 @@ import signal
 
 import numpy as np
 
-from results_schema import files
-from results_schema.archive import output_state, write_archive
-from results_schema.parts import PartStore
+from results_schema.store import files
+from results_schema.store.archive import output_state, write_archive
+from results_schema.store.parts import PartStore
 from tests.schema.samples import ATTRIBUTES, KillNth, in_child, march
 
 SHAPE = (4, 3)

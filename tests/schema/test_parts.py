@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from results_schema import files
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed
-from results_schema.parts import PartStore, Rows
+from results_schema.store import files
+from results_schema.store.parts import PartStore, Rows
 from tests.schema.samples import FailNth, in_child
 
 
@@ -207,7 +207,7 @@ def test_a_second_run_is_refused_at_once_and_the_first_goes_on(path):
 
 HOLDER = """
 import sys
-from results_schema.parts import PartStore
+from results_schema.store.parts import PartStore
 with PartStore(sys.argv[1], "key"):
     print("held", flush=True)
     sys.stdin.read()

@@ -11,7 +11,7 @@ import studies
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.scene import Study
+    from engine.scene.study import Study
 
 KINDS = ("eigenfrequencies", "influence")
 MASS = 'mass = { of = "carriage.car.mass", values = [20.0, 50.0] }'

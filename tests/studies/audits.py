@@ -8,9 +8,9 @@ from typing import Any
 import xarray as xr
 
 import studies
-from engine.scene import Study
-from studies.options import RunOptions
-from studies.runner import Outcome, run_to_archive
+from engine.scene.study import Study
+from studies.protocol.options import RunOptions
+from studies.runs.runner import Outcome, run_to_archive
 from tests.engine.build import beam, cruise, mass, study
 
 SWEEP = {

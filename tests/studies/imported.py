@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from engine.document import write_document
+from engine.study_file.document import write_document
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, PINNED, straight
 from tests.bodies.models import Files, optional, write_cards
 

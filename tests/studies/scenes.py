@@ -13,7 +13,7 @@ from results_schema.status import Status
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.scene import Study
+    from engine.scene.study import Study
 
 BED = """\
 [body.bed]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.amplification import with_derived_errors
+from studies.findings.amplification import with_derived_errors
 from tests.studies import scenes
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from results_schema.archive import Archive, open_archive, write_archive
 from results_schema.errors import ArchiveError
-from studies import theory
-from studies.answers import findings_of
-from studies.archived import results_of
-from studies.cli import main
-from studies.results import Results
+from results_schema.store.archive import Archive, open_archive, write_archive
+from studies.commands.cli import main
+from studies.findings import theory
+from studies.reporting.answers import findings_of
+from studies.results.results import Results
+from studies.runs.archived import results_of
 from tests.bodies.frames import LENGTH
 from tests.studies import at_rest, imported, scenes
 from tests.studies.small import SMALL, write
@@ -43,7 +43,7 @@ def hook(event, arguments):
         if path.is_relative_to(here) and path != here and path.relative_to(here).parts[0] not in kept:
             raise SystemExit(f"opened {path}")
 sys.addaudithook(hook)
-from studies.cli import main
+from studies.commands.cli import main
 code = main(["info", sys.argv[2]])
 sys.exit(code or main(["report", sys.argv[2], "-o", sys.argv[3]]))
 """

@@ -13,16 +13,18 @@ import xarray as xr
 
 import engine
 import studies
-from engine.sweep import expand
-from results_schema.archive import open_archive
+from engine.scene.sweep import expand
 from results_schema.errors import BadInput
-from results_schema.pieces import PieceStore
 from results_schema.status import Fidelity, Status
-from studies import answers, at_rest, catalogue, summary
-from studies.cli import main
-from studies.resting import frequency_errors, reading_errors
-from studies.results import Results
-from studies.study import kind_of
+from results_schema.store.archive import open_archive
+from results_schema.store.pieces import PieceStore
+from studies.at_rest import at_rest
+from studies.at_rest.resting import frequency_errors, reading_errors
+from studies.commands import catalogue
+from studies.commands.cli import main
+from studies.protocol.study import kind_of
+from studies.reporting import answers, summary
+from studies.results.results import Results
 from tests.scene.mutations import Mutation, distinct, survives
 from tests.studies import at_rest as small
 from tests.studies.at_rest import KINDS, MASS, TABLE

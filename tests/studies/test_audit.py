@@ -10,16 +10,25 @@ import pytest
 import xarray as xr
 
 import studies
-from engine.plan import make_plan
-from results_schema.archive import open_archive
+from engine.batch.plan import make_plan
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from results_schema.store.archive import open_archive
 from results_schema.validate import validate
-from studies.actions import exit_code
-from studies.audit import GROUP, NONE_AUDITED, Verdict, as_json, audit_group, refuse_audit, relative_errors, told_audit
-from studies.cli import main
-from studies.measuring import Work
-from studies.results import Results
+from studies.commands.actions import exit_code
+from studies.commands.cli import main
+from studies.protocol.measuring import Work
+from studies.results.results import Results
+from studies.runs.audit import (
+    GROUP,
+    NONE_AUDITED,
+    Verdict,
+    as_json,
+    audit_group,
+    refuse_audit,
+    relative_errors,
+    told_audit,
+)
 from tests.engine.build import beam
 from tests.studies.audits import FINE, POOR, RICH, by_hand, crossing, group_of, outcome
 from tests.studies.small import SMALL, write
@@ -80,7 +89,7 @@ def test_it_goes_on_to_the_same_group(tmp_path: Path, monkeypatch: pytest.Monkey
 
     (tmp_path / "again").mkdir()
     with monkeypatch.context() as patched:
-        patched.setattr("studies.runner.audit_group", stopped)
+        patched.setattr("studies.runs.runner.audit_group", stopped)
         with pytest.raises(KeyboardInterrupt):
             outcome(crossing(RICH, FINE), tmp_path / "again")
     resumed = outcome(crossing(RICH, FINE), tmp_path / "again")
@@ -181,8 +190,8 @@ def test_without_an_audit_nothing_is_said(
 
 
 def test_it_is_said_that_no_audit_was_worth_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.accuracy.audit.MOST_TIME", 0.0)
-    monkeypatch.setattr("engine.accuracy.audit.FREE_SECONDS", 0.0)
+    monkeypatch.setattr("engine.batch.audit.MOST_TIME", 0.0)
+    monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", 0.0)
     found = outcome(crossing(RICH, {}), tmp_path)
     assert found.audit is None and exit_code(found) == 0
     assert told_audit(found.audit, Results.of(found.results)) == [NONE_AUDITED]

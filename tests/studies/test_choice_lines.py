@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from engine.execution import run
-from engine.lanes import LaneValues
-from engine.reduction import Compared, Reduction
+from engine.batch.execution import run
+from engine.model.variant_values import LaneValues
+from engine.observation.reduction import Compared, Reduction
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction
 from tests.engine.build import Table, beam, mass, shuttle, study, swing

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import studies
-from studies.choices import as_json, told_choices
-from studies.results import Results
+from studies.findings.choices import as_json, told_choices
+from studies.results.results import Results
 from tests.engine.build import beam, cruise, mass, study
 
 ZETA = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.4]}}

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from engine.accuracy.groups import MarchGroup
-from engine.execution import run_jobs
-from engine.plan import Plan, make_plan
+from engine.batch.execution import run_jobs
+from engine.batch.plan import Plan, make_plan
 from results_schema.status import Fidelity
-from studies import forecast as forecasts
-from studies.chosen import HEADINGS, chosen, rows
-from studies.forecast import forecast
-from studies.preview import preview
-from studies.words import scientific
+from studies.commands import forecast as forecasts
+from studies.commands.chosen import HEADINGS, chosen, rows
+from studies.commands.forecast import forecast
+from studies.commands.preview import preview
+from studies.results.formatting import scientific
 from tests.engine.build import beam, cruise, mass, study
 
 SPEEDS = {"of": "carriage.car.motion.speed", "from": 1e-3, "to": 1.0, "count": 60, "spacing": "log"}

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from results_schema import files
-from results_schema.archive import open_archive
 from results_schema.errors import WorkersGaveUp
-from results_schema.locks import Lock
-from studies import catalogue, trouble
-from studies.cli import main
+from results_schema.store import files
+from results_schema.store.archive import open_archive
+from results_schema.store.locks import Lock
+from studies.commands import catalogue
+from studies.commands import error_exit as trouble
+from studies.commands.cli import main
 from tests.schema.samples import FailNth
 from tests.studies.small import SEPARATED, SMALL, write
 
@@ -171,7 +172,7 @@ def test_help_and_version(capsys: Captured) -> None:
 
 
 def test_check_explains_and_writes_nothing(here: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.forecast.SECONDS", 1e9)
+    monkeypatch.setattr("studies.commands.forecast.SECONDS", 1e9)
     write(here)
     assert main(["check", "small.toml"]) == 0
     output = capsys.readouterr().out
@@ -243,7 +244,7 @@ def test_workers_that_give_up_are_code_70(here: Path, capsys: Captured, monkeypa
     def give_up(*_: object, **__: object) -> None:
         raise WorkersGaveUp("no worker is left", remedy="run again to resume")
 
-    monkeypatch.setattr("engine.execution.execute", give_up)
+    monkeypatch.setattr("engine.batch.execution.execute", give_up)
     assert "no worker is left" in refused(capsys, "run", "small.toml", code=70)
 
 
@@ -273,7 +274,7 @@ def test_our_own_bug_leaves_a_log(here: Path, capsys: Captured, monkeypatch: pyt
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("one\nover nothing")
 
-    monkeypatch.setattr("engine.plan.make_plan", broken)
+    monkeypatch.setattr("engine.batch.plan.make_plan", broken)
     message = refused(capsys, "run", "small.toml", code=1)
     (log,) = here.glob("wanderlast-*.log")
     assert str(log) in message and "one over nothing" in message

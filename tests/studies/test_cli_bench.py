@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from engine.execution import march_seconds
+from engine.batch.execution import march_seconds
+from engine.batch.plan import Plan
 from engine.kernels.schemes import SCHEMES
-from engine.plan import Plan
-from studies import bench
-from studies.bench import Scene, Throughput
-from studies.cli import main
+from studies.commands import bench
+from studies.commands.bench import Scene, Throughput
+from studies.commands.cli import main
 from tests.naive import motions, newmark, scene
 from tests.reference.closed_forms import PinnedBeam
 
@@ -45,7 +45,7 @@ def test_it_marches_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
         marched.append((plan.size, {group.steps for group in plan.groups}, plan.base.omega.size, threads))
         return march_seconds(plan, threads, repeats)
 
-    monkeypatch.setattr("studies.bench.march_seconds", spy)
+    monkeypatch.setattr("studies.commands.bench.march_seconds", spy)
     found = bench.measure(Scene(modes=4, steps=100, variants=64), threads=1, best_of=3)
     assert marched == [(64, {100}, 4, 1)] * 3
     assert found.seconds > 0

@@ -12,16 +12,16 @@ import pytest
 import xarray as xr
 
 import engine
-from results_schema.archive import open_archive
 from results_schema.errors import Interrupted, OutputFailed
-from results_schema.parts import PartStore, Rows
-from studies import gathering
-from studies.cli import main
-from studies.gathering import Gatherer
-from studies.options import RunOptions
-from studies.provenance import OF_TIME_AND_MACHINE
-from studies.runner import run_to_archive
-from studies.stopping import GRACE_SECONDS, Stop, stop_on_signals
+from results_schema.store.archive import open_archive
+from results_schema.store.parts import PartStore, Rows
+from studies.commands.cli import main
+from studies.protocol.options import RunOptions
+from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
+from studies.runs import part_writer as gathering
+from studies.runs.part_writer import Gatherer
+from studies.runs.provenance import OF_TIME_AND_MACHINE
+from studies.runs.runner import run_to_archive
 from tests.studies.small import LONG, SCENES, start, write
 
 

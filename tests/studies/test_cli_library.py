@@ -7,12 +7,12 @@ import tomllib
 import pytest
 
 import engine
-from engine.plan import make_plan
-from engine.sweep import Cases, expand
+from engine.batch.plan import make_plan
+from engine.scene.sweep import Cases, expand
 from results_schema.errors import BadInput
-from studies import catalogue
-from studies.measuring import MeasuringKind
-from studies.study import kind_named, kind_names, kind_of
+from studies.commands import catalogue
+from studies.protocol.measuring import MeasuringKind
+from studies.protocol.study import kind_named, kind_names, kind_of
 from tests.scene.mutations import Mutation, distinct, survives
 
 BUILT_IN = catalogue.built_in()

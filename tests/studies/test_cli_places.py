@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from results_schema import files
-from studies.cli import main
+from results_schema.store import files
+from studies.commands.cli import main
 from tests.studies.small import SMALL, write
 from tests.studies.test_cli import Captured, here, refused
 
@@ -34,7 +34,7 @@ def test_a_read_only_folder_is_code_74(
         raise AssertionError("nothing is computed before")
 
     monkeypatch.setattr(files.tempfile, "TemporaryFile", refuse)
-    monkeypatch.setattr("engine.plan.make_plan", compute)
+    monkeypatch.setattr("engine.batch.plan.make_plan", compute)
     message = refused(capsys, *arguments, code=74)
     assert "cannot be written" in message and "bytes free there" in message and "-o" not in message
     assert sorted(here.iterdir()) == before
@@ -52,7 +52,7 @@ def test_a_disk_too_small_is_code_74_before_computing(
 
 def test_remarks_are_told(here: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     write(here)
-    for place in ("engine.remarks.remarks", "studies.preview.remarks"):
+    for place in ("engine.batch.plausibility.remarks", "studies.commands.preview.remarks"):
         monkeypatch.setattr(place, lambda _: ["too \x1b fast"])
     assert main(["check", "small.toml"]) == 0
     assert "Worth knowing\n- too \\x1b fast\n" in capsys.readouterr().out

@@ -7,14 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.groups import MarchGroup
-from engine.execution import run
-from engine.histories import counts_reduced
-from engine.lanes import LaneValues
-from engine.plan import CHUNK_BYTES, make_plan
-from engine.reduction import Compared
-from studies.indices import harmonics
+from engine.batch.execution import run
+from engine.batch.plan import CHUNK_BYTES, make_plan
+from engine.model.variant_values import LaneValues
+from engine.observation.histories import counts_reduced
+from engine.observation.reduction import Compared
+from studies.findings.indices import harmonics
+from studies.findings.peaks import PEAKS, peaks
 from studies.kinds.double_peak import KIND, SAME_PEAK, STATIONS, DoublePeakReduction
-from studies.peaks import PEAKS, peaks
 from tests.engine.build import beam, mass, study, swing
 
 Array = NDArray[np.float64]

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 import engine
-from results_schema.archive import open_archive
 from results_schema.errors import ArchiveError, BadInput
+from results_schema.store.archive import open_archive
 from results_schema.validate import validate
-from studies import answers, gathering
-from studies.cli import main
-from studies.options import RunOptions
-from studies.pictures import choice, envelopes, estimates
-from studies.report import write_report
-from studies.results import Results
-from studies.runner import run_to_archive
-from studies.study import kind_of
+from studies.commands.cli import main
+from studies.pictures.common import choice, envelopes, estimates
+from studies.protocol.options import RunOptions
+from studies.protocol.study import kind_of
+from studies.reporting import answers
+from studies.reporting.report import write_report
+from studies.results.results import Results
+from studies.runs import part_writer as gathering
+from studies.runs.runner import run_to_archive
 from tests.scene.mutations import mutations, survives
 from tests.studies import scenes
 from tests.studies.small import SCENES, write

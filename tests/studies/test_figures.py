@@ -9,8 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from studies import answers, figures, views
-from studies.results import Results
+from studies.pictures.common import figures
+from studies.pictures.common import sweep_view as views
+from studies.reporting import answers
+from studies.results.results import Results
 from tests.studies import scenes
 
 KINDS = tuple(scenes.MOTIONS)

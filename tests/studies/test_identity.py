@@ -17,21 +17,23 @@ import xarray as xr
 from scipy.io import mmread, mmwrite
 
 import engine
-from engine.bodies import Matrices, import_files
-from engine.bodies.import_files import Request
-from engine.bodies.import_model import FileModel, hashes_of
-from engine.bodies.reduced_body import save_body
-from results_schema import files
-from results_schema.archive import FILES, open_archive
+from engine.bodies import Matrices
+from engine.bodies.files import reader as import_files
+from engine.bodies.files.model import FileModel, hashes_of
+from engine.bodies.files.reader import Request
+from engine.bodies.reduced.body import save_body
 from results_schema.errors import BadInput
-from results_schema.parts import PartStore
-from results_schema.pieces import PieceStore
-from studies import gathering, identity
-from studies.cli import main
-from studies.identity import PROGRAM, run_key, sources, sources_hash
-from studies.options import RunOptions
-from studies.runner import run_to_archive
-from studies.study import KINDS_FOLDER
+from results_schema.store import files
+from results_schema.store.archive import FILES, open_archive
+from results_schema.store.parts import PartStore
+from results_schema.store.pieces import PieceStore
+from studies.commands.cli import main
+from studies.protocol.options import RunOptions
+from studies.protocol.study import KINDS_FOLDER
+from studies.runs import identity
+from studies.runs import part_writer as gathering
+from studies.runs.identity import PROGRAM, run_key, sources, sources_hash
+from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files, in_process
 from tests.studies import at_rest, imported
@@ -288,7 +290,7 @@ def test_fault_43_pieces_of_another_study_are_computed_again(here: Path, monkeyp
 LOADED = """
 import json, sys
 from pathlib import Path
-from studies.cli import main
+from studies.commands.cli import main
 assert main(["run", sys.argv[1], "-o", "out.nc"]) in (0, 3)
 names = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
 print("\\n" + json.dumps([name for name in names if name]))
@@ -313,7 +315,12 @@ def test_fault_43_the_key_covers_every_source_that_a_run_loads(kind: str, here: 
 def test_fault_43_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fault 43: another text of any source is another key, above all of peaks, indices and every kind of study."""
     known = {path.relative_to(PROGRAM).as_posix() for path in sources()}
-    assert {"studies/peaks.py", "studies/indices.py", "studies/at_rest.py", "engine/reduction.py"} <= known
+    assert {
+        "studies/findings/peaks.py",
+        "studies/findings/indices.py",
+        "studies/at_rest/at_rest.py",
+        "engine/observation/reduction.py",
+    } <= known
     assert {path.relative_to(PROGRAM).as_posix() for path in KINDS_FOLDER.glob("*.py")} <= known
     copy = tmp_path / "studies" / "peaks.py"
     copy.parent.mkdir()

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from studies import indices
+from studies.findings import indices
 from tests.naive import indices as naive
 
 Array = NDArray[np.float64]

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import studies
-from engine.execution import run
-from engine.lanes import LaneValues
-from engine.reduction import Compared
+from engine.batch.execution import run
+from engine.model.variant_values import LaneValues
+from engine.observation.reduction import Compared
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
-from studies import answers
-from studies import study as running
 from studies.kinds.asymmetry import AsymmetryReduction
-from studies.results import Results
+from studies.protocol import study as running
+from studies.reporting import answers
+from studies.results.results import Results
 from tests.engine.build import beam, force, shuttle, study, under
 from tests.studies import scenes
 
@@ -159,7 +159,7 @@ def test_findings_of_an_asymmetry_name_the_largest_and_its_place() -> None:
 
 def test_lag_under_the_carriage_is_half_of_that_at_a_fixed_place() -> None:
     """Slow and damped, in the model itself: the closed form that the findings compare with."""
-    from studies import theory
+    from studies.findings import theory
 
     extra = '[sensor.under]\nunder = "table"'
     results = Results.of(scenes.run("asymmetry", scenes.pace("asymmetry", 0.2, 0.4, 2), extra=extra))
@@ -202,7 +202,7 @@ def test_odd_and_even_parts_are_told_no_less_than_half_of_what_histories_differ_
 def test_loaded_frequency_is_the_closed_form_of_a_shuttle() -> None:
     from scipy.special import j0
 
-    from studies import theory
+    from studies.findings import theory
 
     results = Results.of(scenes.run("double-peak"))
     found = theory.loaded_frequency(results, np.array([0.1, 0.5, 1.0]))

@@ -14,19 +14,19 @@ import xarray as xr
 
 import engine
 import studies
-from engine.march import Halted
-from engine.spec import Spec
-from results_schema import files
-from results_schema.archive import open_archive
+from engine.march.march import Halted
+from engine.study_file.spec import Spec
 from results_schema.errors import ArchiveBusy, BadInput, Interrupted, OutputFailed
-from results_schema.pieces import PieceStore, pieces_so_far
-from studies import summary
-from studies.cli import main
-from studies.measuring import MeasuringKind, Piece, Work, measure, question_of, usual
-from studies.options import RunOptions
-from studies.results import Results
-from studies.runner import run_to_archive
-from studies.stopping import Stop
+from results_schema.store import files
+from results_schema.store.archive import open_archive
+from results_schema.store.pieces import PieceStore, pieces_so_far
+from studies.commands.cli import main
+from studies.protocol.measuring import MeasuringKind, Piece, Work, measure, question_of, usual
+from studies.protocol.options import RunOptions
+from studies.protocol.stopping import Stop
+from studies.reporting import summary
+from studies.results.results import Results
+from studies.runs.runner import run_to_archive
 from tests.schema.samples import FailNth
 from tests.studies import precision, scenes
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from studies.peaks import PEAKS, Peaks, peaks
+from studies.findings.peaks import PEAKS, Peaks, peaks
 from tests.naive import indices as naive
 from tests.studies.test_indices import waves
 

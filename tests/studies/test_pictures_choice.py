@@ -12,18 +12,17 @@ import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
 
-from results_schema.archive import SCHEMA_VERSION, write_archive
 from results_schema.status import Fidelity
+from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from results_schema.variables import axes as coordinates
 from results_schema.variables import declarations
-from studies import figures
-from studies.choices import NAMES, told_choices
-from studies.console import show_outcome
-from studies.figures import BLUE, MUTED, Figure
-from studies.pictures import choice, estimates
-from studies.report import write_report
-from studies.results import Results
-from studies.runner import Outcome
+from studies.commands.console import show_outcome
+from studies.findings.choices import NAMES, told_choices
+from studies.pictures.common import choice, estimates, figures
+from studies.pictures.common.figures import BLUE, MUTED, Figure
+from studies.reporting.report import write_report
+from studies.results.results import Results
+from studies.runs.runner import Outcome
 from tests.studies import at_rest, scenes
 from tests.studies.test_figures import sweeps
 from tests.studies.test_report import check_standing_alone

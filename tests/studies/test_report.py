@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from results_schema import files
-from results_schema.archive import SCHEMA_VERSION, write_archive
 from results_schema.errors import ArchiveError, BadInput, OutputFailed
-from studies import answers
-from studies.report import PAGE, write_report
+from results_schema.store import files
+from results_schema.store.archive import SCHEMA_VERSION, write_archive
+from studies.reporting import answers
+from studies.reporting.report import PAGE, write_report
 from tests.studies import scenes
 
 if TYPE_CHECKING:

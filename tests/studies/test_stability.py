@@ -12,14 +12,14 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
-from studies import report
 from studies.kinds.stability import KIND
 from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
-from studies.maps.ground import Ground, threshold
+from studies.maps.map_scene import Ground, threshold
 from studies.maps.methods import METHODS, hht
 from studies.maps.table import MAPS
-from studies.measuring import Work
-from studies.results import Results
+from studies.protocol.measuring import Work
+from studies.reporting import report
+from studies.results.results import Results
 
 BEAM: dict[str, Any] = {
     "kind": "beam",
@@ -219,7 +219,7 @@ def test_a_mass_tied_by_its_place_rings_and_damping_calms_it() -> None:
 
 
 def question() -> Any:
-    from studies.measuring import question_of
+    from studies.protocol.measuring import question_of
 
     return question_of(study(), KIND.settings)
 
@@ -296,7 +296,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_what_the_maps_cannot_stand_on_is_refused(name: str) -> None:
-    from studies.study import kind_of
+    from studies.protocol.study import kind_of
 
     tables, where = BAD[name]
     with pytest.raises(BadInput) as caught:

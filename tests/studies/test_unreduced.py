@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.scene import Study
-from engine.unreduced_comparison import Compared
-from results_schema.archive import Archive, open_archive
+from engine.scene.study import Study
+from engine.unreduced.comparison import Compared
 from results_schema.errors import BadInput
+from results_schema.store.archive import Archive, open_archive
 from results_schema.validate import validate
-from studies import unreduced
-from studies.options import RunOptions
-from studies.report import write_report
-from studies.runner import run_to_archive
+from studies.protocol.options import RunOptions
+from studies.reporting.report import write_report
+from studies.runs import unreduced
+from studies.runs.runner import run_to_archive
 from tests.engine.build import beam, cruise, fixed, mass, shuttle
 from tests.engine.test_unreduced import RIGID, frame, riding
 

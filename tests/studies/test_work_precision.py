@@ -12,20 +12,24 @@ import pytest
 import engine
 import studies
 from engine.accuracy.choice import pilots_of
-from engine.chunk import run_chunk
-from engine.execution import run_jobs
+from engine.batch.chunk import run_chunk
+from engine.batch.execution import run_jobs
+from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES
-from engine.lanes import LaneValues
-from engine.march import march
-from engine.ode import ModalEquations
-from engine.plan import make_plan
-from engine.tables import SceneTables
+from engine.march.march import march
+from engine.march.tables import SceneTables
+from engine.methods.ode import ModalEquations
+from engine.model.variant_values import LaneValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from studies import advice, answers, figures, ladders, trade
-from studies import precision as measured
-from studies.measuring import Work
-from studies.precision_variables import AUTOMATIC
+from studies.pictures.common import figures
+from studies.precision import findings as advice
+from studies.precision import ladders
+from studies.precision import pareto as trade
+from studies.precision import precision as measured
+from studies.precision.variables import AUTOMATIC
+from studies.protocol.measuring import Work
+from studies.reporting import answers
 from tests.naive import ode
 from tests.naive.newmark import Newmark
 from tests.naive.newmark import march as naive_march
@@ -205,7 +209,7 @@ def test_jax_marches_the_same_where_it_is_installed() -> None:
 
 
 def test_without_jax_the_archive_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from studies import jax_march
+    from studies.precision import jax_march
 
     monkeypatch.setattr(jax_march, "find_spec", lambda name: None)
     study = engine.load(precision.TEXT)

@@ -10,8 +10,10 @@ import pytest
 import xarray as xr
 
 from results_schema.status import Status
-from studies import advice, answers, trade
-from studies.words import number
+from studies.precision import findings as advice
+from studies.precision import pareto as trade
+from studies.reporting import answers
+from studies.results.formatting import number
 from tests.studies import precision
 
 

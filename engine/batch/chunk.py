@@ -1,0 +1,92 @@
+"""One chunk of variants: their results, what these were computed with, how far they may be off, and kept histories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.again import marches_again
+from engine.accuracy.groups import Found, Group
+from engine.accuracy.results import Result, results_of, worst_held
+from engine.batch.plan import Plan
+from engine.march.outcome import Flat, histories
+from engine.march.tables import SceneTables
+from engine.observation.histories import counts_shown
+from results_schema.status import Status
+from results_schema.store.parts import Rows, joined
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+def run_chunk(
+    plan: Plan, group: Group, variants: Counts, halted: Callable[[], bool] = lambda: False
+) -> tuple[Flat, Rows | None]:
+    """The results (V, ...) of some variants of a group by name, and the histories of those that are kept. Raises
+    Halted."""
+    values = plan.values(group, variants)
+    found = group.found(values, variants, plan.choice, halted)
+    results = results_of(plan.asked)
+    error, status = told_errors(found, results), _status(plan, group, found)
+    missing = status >= Status.NOT_CONVERGED
+    error[:, missing] = np.nan
+    flat = dict(found.outcome.numbers) | {
+        "status": status,
+        "diverged_step": found.outcome.diverged_step,
+        **found.used,
+        "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
+        "error_estimate": _worst(error, results),
+    }
+    return flat, _histories(plan, group, variants, found.used, halted)
+
+
+def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
+    """(R, V) the errors told; of places no less than a step is long, and no more than the track."""
+    error = np.where(np.isfinite(found.error), found.error, np.nan)
+    steps = np.maximum(found.used["steps_used"], 1)
+    for number, result in enumerate(results):
+        if result.name.endswith("_position"):
+            least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
+            error[number] = np.minimum(np.maximum(error[number], least), 1.0)
+    return error
+
+
+def _worst(error: Array, results: tuple[Result, ...]) -> Array:
+    """(V,) the largest error of what is held; NaN where nothing is, or one is not known."""
+    held = [number for number, result in enumerate(results) if np.isfinite(result.tolerance)]
+    return np.max(error[held], axis=0) if held else np.full(error.shape[1], np.nan)
+
+
+def _status(plan: Plan, group: Group, found: Found) -> NDArray[np.int8]:
+    """(V,) what the march says, and whether what is held is within its tolerance."""
+    held = found.held
+    missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
+    known = worst_held(found.error, results_of(plan.asked))
+    unknown = np.isnan(held) | (np.isnan(known) & ~_all_is_fixed(group))
+    missed = np.where(unknown, np.int8(Status.UNRESOLVED), missed)
+    return np.maximum(found.outcome.status, missed).astype(np.int8)
+
+
+def _all_is_fixed(group: Group) -> bool:
+    """Whether the study leaves nothing open, so that no error of its variants is the program's."""
+    return group.grid.fixed and not group.grid.chooses
+
+
+def _histories(plan: Plan, group: Group, variants: Counts, used: Flat, halted: Callable[[], bool]) -> Rows | None:
+    """Histories of the kept ones among some variants, marched again with samples."""
+    lanes = np.flatnonzero(np.isin(variants, plan.shown))
+    if not lanes.size:
+        return None
+    values, spent = plan.values(group, variants[lanes]), {name: column[lanes] for name, column in used.items()}
+    rows = [
+        Rows(variants[lanes[own]], histories(tables, values.part(own), _counts(plan, tables), halted))
+        for tables, own in marches_again(group.grid, spent)
+    ]
+    return joined(rows)
+
+
+def _counts(plan: Plan, tables: SceneTables) -> Counts:
+    """Stations of the kept histories of a march, by their count."""
+    return counts_shown(tables.timeline, plan.window, plan.study.output.histories)

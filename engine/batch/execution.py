@@ -1,0 +1,257 @@
+"""Run a plan: chunks of variants as dask tasks on threads. The only file that knows dask and threads."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.groups import Group
+from engine.batch.plan import EVERY_MARCH, Plan, make_plan
+from engine.linear_algebra import one_thread
+from engine.observation.reduction import Reduction
+from engine.scene.study import Study
+from results_schema.errors import BadInput, Interrupted
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.march.march import March
+    from results_schema.store.parts import Rows
+
+Counts = NDArray[np.int64]
+Arrays = dict[str, NDArray[Any]]
+Sink = Callable[[Counts, Arrays, "Rows | None"], object]
+Progress = Callable[[int, int], object]
+
+_COUNTING = threading.Lock()
+WAITING = 4  # finished chunks per thread that may wait for the sink
+
+
+@one_thread()
+def run(
+    study: Study,
+    *,
+    threads: int | None = None,
+    chunk: int | None = None,
+    reduction: Reduction | None = None,
+    results: str = EVERY_MARCH,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a study in memory and return the march's dataset. Raises BadInput.
+
+    threads: default all processors. chunk: variants per task, chosen by time and memory otherwise; results do not
+    depend on either, bit for bit. reduction, results: as of `make_plan`. Until it returns, linear algebra keeps to
+    one thread in the whole process.
+    """
+    from engine.batch.dataset import Collector, build
+
+    plan = make_plan(study, reduction=reduction, results=results)
+    collector = Collector(plan.size)
+    execute(plan, collector.add, threads=threads, chunk=chunk, progress=progress)
+    return build(plan, collector.arrays, collector.selected)
+
+
+@one_thread()
+def execute(
+    plan: Plan,
+    sink: Sink,
+    *,
+    threads: int | None = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+    done: Counts | None = None,
+) -> None:
+    """March everything that is not ``done`` and hand chunk after chunk to ``sink``, always on the calling thread.
+
+    Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
+    """
+    _check_threads(threads)
+    warm_up(plan)
+    choose(plan, threads, stop)
+    tasks = list(plan.chunks(done, chunk))
+    finished = 0 if done is None else int(done.size)
+    halt = threading.Event()
+    results: queue.Queue[Any] = queue.Queue(maxsize=WAITING * (threads or os.cpu_count() or 1))
+    worker = threading.Thread(target=_compute, args=(plan, tasks, threads, results, (halt, stop)), daemon=True)
+    worker.start()
+    try:
+        for _ in tasks:
+            outcome = _next(results, stop)
+            if isinstance(outcome, BaseException):
+                raise outcome
+            variants, arrays, selected = outcome
+            sink(variants, arrays, selected)
+            finished += variants.size
+            if progress is not None:
+                progress(finished, plan.size)
+    finally:
+        halt.set()
+        while worker.is_alive():
+            _drain(results)
+            worker.join(0.01)
+
+
+def warm_up(plan: Plan) -> None:
+    """Load or compile the kernels once."""
+    for grid in {min(grid.scene.ties, 2): grid for grid in plan.grids}.values():
+        _first_steps(grid)
+
+
+def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
+    """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
+    from engine.march.march import Halted
+
+    try:
+        plan.choose(lambda jobs: run_jobs(jobs, threads or os.cpu_count() or 1), partial(_any_set, (stop,)))
+    except Halted:
+        raise Interrupted("stopped; finished work is kept", remedy="run again to go on") from None
+
+
+def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
+    """Wall time of marching every variant once with the study's sensors alone, without compiling, tabulating, and
+    gathering results; the mean over ``repeats`` marches in a row."""
+    from engine.march.march import prepare
+    from engine.march.richardson import march_pair
+    from engine.march.tables import SceneTables
+    from engine.model.variant_values import padded
+
+    nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
+    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors", stride) for b in plan.groups}
+    workers = threads or os.cpu_count() or 1
+    chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
+    if stride > 1:
+        pairs = [(tables[id(group)], plan.values(group, padded(part)), nothing, part.size) for group, part in chunks]
+        return seconds_of_jobs([partial(march_pair, *pair) for pair in pairs], workers) / repeats
+    marches = [prepare(tables[id(group)], plan.values(group, padded(part)), nothing) for group, part in chunks]
+    return seconds_of(marches, workers) / repeats
+
+
+def seconds_of(marches: Sequence[March], threads: int) -> float:
+    """Wall time of marches that are ready to go, on threads, without tabulating; each can go once."""
+    for march in marches:
+        for segment in march.tables.timeline.segments:
+            march.tables.table(segment)
+        for part in march.state:
+            part += 0.0  # the operating system hands memory out at the first touch
+    return seconds_of_jobs([march.go for march in marches], threads)
+
+
+def seconds_of_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> float:
+    """Wall time of jobs on threads."""
+    start = time.perf_counter()
+    run_jobs(jobs, threads)
+    return time.perf_counter() - start
+
+
+def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
+    """Jobs on threads."""
+    import dask.threaded
+
+    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
+    dask.threaded.get(graph, list(graph), num_workers=threads)
+
+
+def _first_steps(grid: SceneGrid) -> None:
+    """March one variant over the first segment of a scene with hardly any steps."""
+    from engine.march.march import Halted
+    from engine.march.richardson import march_chosen
+    from engine.march.tables import SceneTables
+
+    tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
+    with suppress(Halted):
+        values = grid.values.part(np.zeros(1, dtype=np.int64)).padded
+        march_chosen(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
+
+
+def _compute(
+    plan: Plan,
+    tasks: list[tuple[Group, Counts]],
+    threads: int | None,
+    results: queue.Queue[Any],
+    halts: tuple[threading.Event, threading.Event | None],
+) -> None:
+    """Run the chunks as one dask graph on its threaded scheduler."""
+    import dask.threaded
+
+    halted = partial(_any_set, halts)
+    left = Counter(id(group) for group, _ in tasks)
+    graph = {
+        ("chunk", i): (partial(_task, plan, (group, variants), left, results, halted),)
+        for i, (group, variants) in enumerate(tasks)
+    }
+    try:
+        dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
+    except BaseException as error:
+        _hand_over(error, results, halted)
+
+
+def _task(
+    plan: Plan,
+    chunk: tuple[Group, Counts],
+    left: Counter[int],
+    results: queue.Queue[Any],
+    halted: Callable[[], bool],
+) -> None:
+    """One chunk; what it raises travels to the caller as its result. The last of a scene drops its tables."""
+    from engine.batch.chunk import run_chunk
+
+    if halted():
+        return
+    group, variants = chunk
+    try:
+        found: Any = (variants, *run_chunk(plan, group, variants, halted))
+    except BaseException as error:
+        found = error
+    with _COUNTING:
+        left[id(group)] -= 1
+        last = left[id(group)] == 0
+    if last:
+        group.forget()
+    _hand_over(found, results, halted)
+
+
+def _hand_over(found: Any, results: queue.Queue[Any], halted: Callable[[], bool]) -> None:
+    """Wait for room in the queue, unless the caller has gone."""
+    while not halted():
+        try:
+            results.put(found, timeout=0.05)
+            return
+        except queue.Full:
+            continue
+
+
+def _next(results: queue.Queue[Any], stop: threading.Event | None) -> Any:
+    """The next finished chunk, or Interrupted."""
+    while True:
+        if stop is not None and stop.is_set():
+            raise Interrupted("stopped; finished work is kept", remedy="run again to go on")
+        try:
+            return results.get(timeout=0.05)
+        except queue.Empty:
+            continue
+
+
+def _drain(results: queue.Queue[Any]) -> None:
+    while not results.empty():
+        results.get_nowait()
+
+
+def _any_set(events: tuple[threading.Event | None, ...]) -> bool:
+    return any(event is not None and event.is_set() for event in events)
+
+
+def _check_threads(threads: int | None) -> None:
+    if threads is not None and threads < 1:
+        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))

@@ -1,0 +1,321 @@
+"""From a study to work: all variants, grouped by scene and by what they are computed with, and what that will take.
+
+Everything follows from the study alone: neither chunks nor threads nor interruptions change a result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.choice import PILOTS, Choice, cases_tolerance, choose
+from engine.accuracy.grids import SceneGrid, fixed_steps, unit_steps
+from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
+from engine.accuracy.ladder import ladder_of
+from engine.accuracy.reference import Share
+from engine.accuracy.results import results_of
+from engine.kernels.layout import LANES
+from engine.march.envelopes import check_places, places_read
+from engine.march.outcome import Asked
+from engine.march.step_rules import check_even_steps, check_free_vibration, check_most_steps, check_slowest, check_steps
+from engine.march.tables import SceneTables
+from engine.model.distinct_models import base_scene, scenes, split
+from engine.model.scene_model import SceneModel, check_moves
+from engine.model.timeline import Window
+from engine.model.variant_values import LaneValues
+from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
+from engine.observation.reduction import Reduction
+from engine.scene.study import Study
+from engine.scene.sweep import Cases, expand
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity
+from results_schema.variables import declarations, registered
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
+
+TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
+LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
+TASKS = 16  # into which small studies are cut, so that all threads have work
+MOST_LANES = 65536  # of one chunk
+MOST_MEMORY = 16 * 2**30
+CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
+EVERY_MARCH = "march"  # the kind of results that every march has
+SHOWN = 64  # variants whose histories are kept by default
+#: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
+#: about as much as the convergence of two hundred variants of one scene.
+FEW, FEW_IN_SCENE = 256, 16
+
+
+@dataclass(eq=False)
+class Plan:
+    """All work of a study. base: the scene without sweep. results: the kind whose declared results are kept. grids,
+    members: its scenes, and the variants of each. choice: of what a large sweep is computed with, once it is made."""
+
+    study: Study
+    cases: Cases
+    asked: Asked
+    grids: tuple[SceneGrid, ...]
+    members: tuple[Counts, ...]
+    shown: Counts
+    base: SceneModel
+    results: str
+    choice: Choice | None = None
+    _groups: tuple[Group, ...] = field(default=())
+
+    @property
+    def size(self) -> int:
+        """Number of variants."""
+        return self.cases.size
+
+    @property
+    def window(self) -> Window:
+        """What extremes and histories cover."""
+        return self.asked.window
+
+    @property
+    def reduction(self) -> Reduction | None:
+        """What the study makes of histories."""
+        return self.asked.reduction
+
+    @property
+    def converges(self) -> bool:
+        """Whether every variant is marched until its results stay: where there are few."""
+        return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids))
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Variants that are computed alike; those of a large sweep are known when it is chosen for."""
+        if not self._groups:
+            self._groups = tuple(self._converging() if self.converges else self._marching())
+        return self._groups
+
+    @property
+    def cases_tolerance(self) -> Array:
+        """(V,) `solver.tolerance` of every variant over the study's."""
+        return cases_tolerance(self.asked, self.cases)
+
+    def choose(self, share: Share, halted: Callable[[], bool], pilots: int = PILOTS) -> None:
+        """Measure pilots and choose, where the study has many variants. Raises Halted."""
+        if not self.converges and self.choice is None:
+            self.choice = choose(self.asked, self.cases, self.grids, self.members, share, halted, pilots)
+            self._groups = ()  # those of before the choice told sizes only
+            self.__dict__.pop("seconds", None)
+
+    def _converging(self) -> Iterator[Group]:
+        for grid, members in zip(self.grids, self.members, strict=True):
+            yield ConvergingGroup(grid, members)
+
+    def _marching(self) -> Iterator[Group]:
+        """Variants of one scene by their rung, of like pace side by side: they rise and fall together."""
+        for grid, members in zip(self.grids, self.members, strict=True):
+            rungs = np.zeros(members.size, dtype=np.int64)
+            if self.choice is not None:
+                rungs = self.choice.rung[members].astype(np.int64)
+            for own in split(np.arange(members.size), rungs):
+                yield from self._on_rung(grid, members[own], int(rungs[own[0]]))
+
+    def _on_rung(self, grid: SceneGrid, variants: Counts, rung: int) -> Iterator[Group]:
+        """Variants on a rung, those that must take more steps apart."""
+        ladder = ladder_of(self.asked, grid)
+        column, cut = divmod(rung, len(ladder.cuts))
+        values = LaneValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
+        numerics = ladder.columns[column]
+        by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
+        pace = values.time_scale(grid.scene.carriages[0].name)
+        for part in split(np.arange(variants.size), by):
+            lanes = part[np.argsort(pace[part], kind="stable")]
+            yield MarchGroup(grid, variants[lanes], numerics, int(by[part[0]]))
+
+    @cached_property
+    def seconds(self) -> float:
+        """Expected time of the march on one thread."""
+        return float(sum(group.seconds_per_variant * group.variants.size for group in self.groups))
+
+    @property
+    def stations_shown(self) -> int:
+        """About the most stations that a kept history has."""
+        if self.study.output.histories == "auto":
+            return WHOLE_STATIONS
+        units = max(rider.end for rider in self.base.riders)
+        return int(np.ceil(units * max((group.usual_steps for group in self.groups), default=0)))
+
+    @cached_property
+    def phases_shown(self) -> Array | None:
+        """The phases of the kept histories over a cycle, if all variants have the same."""
+        if self.window != "last-cycle" or self.base.riders[0].motion.period is None:
+            return None
+        if self.study.output.histories == "auto" and not self.grids[0].fixed:
+            return np.arange(CYCLE_STATIONS) / CYCLE_STATIONS
+        if len({grid.unit for grid in self.grids}) > 1 or not self.grids[0].fixed:
+            return None
+        timeline = self.grids[0].tables(self.grids[0].scene, 1).timeline
+        first, last = timeline.window
+        return (counts_shown(timeline, self.window, self.study.output.histories) - first) / (last - first)
+
+    @property
+    def disk_bytes(self) -> int:
+        """Upper bound of the archive's size; the parts take as much until it is written."""
+        shown = int(self.shown.size) * self.stations_shown * (len(self.study.sensor) + 2)
+        return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
+
+    @property
+    def memory_bytes(self) -> int:
+        """Expected peak: results, a chunk per thread, and the program itself."""
+        return needed_memory(self.disk_bytes)
+
+    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Group, Counts]]:
+        """The tasks that are left; ``chunk`` fixes the number of variants of each."""
+        for group in self.groups:
+            left = group.variants if done is None else group.variants[~np.isin(group.variants, done)]
+            size = chunk or _even(left.size, self.lanes_per_chunk(group))
+            for first in range(0, left.size, size):
+                yield group, left[first : first + size]
+
+    def lanes_per_chunk(self, group: Group) -> int:
+        """Variants of one task, by time and memory."""
+        least = TASK_SECONDS if self.converges else LEAST_TASK_SECONDS  # each chunk has tables of its own there
+        task = float(np.clip(self.seconds / TASKS, least, TASK_SECONDS))
+        lanes = min(task / max(group.seconds_per_variant, 1e-12), CHUNK_BYTES / group.chunk_bytes)
+        if self.converges:  # two threads share a scene
+            lanes = min(lanes, group.variants.size // 2 + LANES)
+        return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
+
+    def values(self, group: Group, variants: Counts) -> LaneValues:
+        """Numbers of some variants of a group."""
+        return LaneValues(group.scene.study, self.cases.columns_of(variants), variants.size)
+
+
+def _even(size: int, most: int) -> int:
+    """The size of equal chunks of at most ``most``, in whole blocks."""
+    parts = max(1, -(-size // most))
+    return LANES * max(1, -(-size // (parts * LANES)))
+
+
+def make_plan(
+    study: Study,
+    *,
+    reduction: Reduction | None = None,
+    results: str = EVERY_MARCH,
+    check_steps: CheckSteps = check_steps,
+) -> Plan:
+    """Plan a study. Raises BadInput for whatever cannot be run, before anything is computed.
+
+    results: the kind whose declared results are kept, which must be declared by then; those of every march unless a
+    study names its own. check_steps: refuses fixed steps that cannot be right.
+    """
+    if results not in registered():
+        raise BadInput("no such kind of results is declared", where="results", received=repr(results))
+    check_moves(study)
+    cases = expand(study)
+    window: Window = "whole" if reduction is None else "last-cycle"
+    asked = Asked(study, reduction, window, reads_accelerations(results))
+    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(asked))
+    grids, members = [], []
+    for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):
+        for grid, own in _grids(asked, cases, scene, variants, check_steps):
+            grids.append(grid)
+            members.append(own)
+    check_places(study, (grid.scene for grid in grids))
+    plan = Plan(
+        study, cases, asked, tuple(grids), tuple(members), _shown(study, cases.size), base_scene(study), results
+    )
+    check_memory(study, plan.size, plan.disk_bytes)
+    return plan
+
+
+def _grids(
+    asked: Asked, cases: Cases, scene: SceneModel, variants: Counts, check_steps: CheckSteps
+) -> Iterator[tuple[SceneGrid, Counts]]:
+    """The variants of a scene, by their steps where the study fixes these. Raises BadInput."""
+    values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
+    check_readings(scene, asked.window)
+    if scene.fidelity is Fidelity.STATIC or not fixed_steps(values):
+        if scene.fidelity is not Fidelity.STATIC:
+            check_slowest(scene, values)
+            check_springs(scene)
+        yield SceneGrid(asked, scene, values, unit_steps(scene)), variants
+        return
+    steps = values.steps
+    check_even_steps(scene, steps)
+    check_most_steps(scene, steps)
+    check_steps(scene, values, steps)
+    for lanes in split(np.arange(variants.size), steps):
+        unit = int(steps[lanes[0]]) // scene.scheme.stride
+        yield SceneGrid(asked, scene, values.part(lanes), unit), variants[lanes]
+
+
+def check_springs(scene: SceneModel) -> None:
+    """Refuse free vibration with springs by a conditionally stable scheme. Raises BadInput."""
+    if scene.springs:
+        check_free_vibration(scene)
+
+
+def check_readings(scene: SceneModel, window: Window) -> None:
+    """Refuse a sensor under a carriage that is never on its body while anything is recorded, and rates of what is at
+    rest. Raises BadInput."""
+    tables = SceneTables(scene, 1, window)
+    for sensor in tables.sensors:
+        if scene.fidelity is Fidelity.STATIC and sensor.offset_order:
+            raise BadInput(
+                f'fidelity = "static" has no {sensor.quantity}',
+                where=scene.study.source.where(f"sensor.{sensor.name}.quantity"),
+                expected="a quantity that statics tell, such as displacement",
+            )
+        seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
+        if not seen:
+            raise BadInput(
+                "the carriage is off its body for all of the recorded part, so the sensor reads nothing",
+                where=scene.study.source.where(f"sensor.{sensor.name}.under"),
+                expected="a carriage on its body",
+            )
+
+
+def reads_accelerations(results: str) -> bool:
+    """Whether the results of this kind include the accelerations of the carriages."""
+    return "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
+
+
+def numbers_per_variant(asked: Asked) -> int:
+    """Numbers of 8 bytes that are kept of one variant, besides histories."""
+    study, reduction = asked.study, asked.reduction
+    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
+    found += -(-len(results_of(asked)) // 2)  # errors are of half that size
+    if reduction is not None:
+        sizes = reduction.sizes(study)
+        found += sum(prod(sizes[dim] for dim in dims) for dims in reduction.outputs(study).values())
+    return found
+
+
+def needed_memory(result_bytes: int) -> int:
+    """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
+    return 300 * 2**20 + 3 * result_bytes + 6 * CHUNK_BYTES
+
+
+def check_memory(study: Study, size: int, result_bytes: int) -> None:
+    """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
+    needed = needed_memory(result_bytes)
+    if needed > MOST_MEMORY:
+        raise BadInput(
+            "the study does not fit into memory",
+            where=study.source.where("sweep"),
+            expected=f"at most {MOST_MEMORY / 2**30:.0f} GiB",
+            received=f"{needed / 2**30:.1f} GiB for {size} variants",
+            remedy="fewer variants or sensors, or fewer histories",
+        )
+
+
+def _shown(study: Study, size: int) -> Counts:
+    """Variants whose histories are kept: all, none, or some spread over the sweep."""
+    wanted = study.output.histories
+    if wanted == "none":
+        return np.zeros(0, dtype=np.int64)
+    if wanted != "auto" or size <= SHOWN:
+        return np.arange(size, dtype=np.int64)
+    return np.unique(np.rint(np.linspace(0, size - 1, SHOWN)).astype(np.int64))

@@ -1,0 +1,111 @@
+"""What a user should know before believing a study: things that are allowed and yet often a mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.batch.plan import Plan
+from engine.model.variant_values import moving_mass, weight
+
+Array = NDArray[np.float64]
+
+FAST = 3.0  # times the critical speed
+HEAVY = 2.0  # times the body's mass
+DEEP = 0.1  # of the length: a static deflection beyond linear bending
+
+
+def remarks(plan: Plan) -> list[str]:
+    """One sentence per remark, each once, in the order of `REMARKS`; none for an ordinary study."""
+    return list(dict.fromkeys(sentence for remark in REMARKS for sentence in remark(plan)))
+
+
+def _unsupported(plan: Plan) -> Iterator[str]:
+    riding = {carriage.rides for carriage in plan.base.carriages}
+    for number, part in enumerate(plan.base.bodies):
+        if part.modal.rigid_modes and number not in riding:
+            yield f"nothing holds body {part.name} fully: it will move away as a rigid body"
+
+
+def _released(plan: Plan) -> Iterator[str]:
+    for part in plan.base.bodies:
+        if part.own_weight and plan.study.start == "rest":
+            yield (
+                f"body {part.name} is released undeformed at time 0 and rings under its own weight; "
+                'initial = "equilibrium" starts it in its sag'
+            )
+
+
+def _leaves_between(plan: Plan) -> Iterator[str]:
+    for carriage in plan.base.carriages:
+        low, high = carriage.rider.motion.range()
+        if carriage.rider.stays and (low < 0.0 or high > carriage.rider.length):
+            yield (
+                f"the way of {carriage.name} leaves its body ({low:.4g} to {high:.4g} m of "
+                f"{carriage.rider.length:.4g} m), where it does not act: a spline may pass beyond its waypoints"
+            )
+
+
+def _fast(plan: Plan) -> Iterator[str]:
+    worst = max((_speed_ratio(grid).max() for grid in plan.grids), default=0.0)
+    if worst > FAST:
+        yield f"some variants run at up to {worst:.3g} times the critical speed omega_1 L/pi: are the units right?"
+
+
+def _heavy(plan: Plan) -> Iterator[str]:
+    worst = 0.0
+    for grid in plan.grids:
+        for number, carriage in enumerate(grid.scene.carriages):
+            mass = grid.scene.bodies[carriage.body].modal.mass
+            worst = max(worst, float(moving_mass(grid.scene, grid.values, number).max()) / mass)
+    if worst > HEAVY:
+        yield f"a carriage weighs up to {worst:.3g} times its body: look at more modes and steps before believing it"
+
+
+def _deep(plan: Plan) -> Iterator[str]:
+    worst = 0.0
+    for grid in plan.grids:
+        for number, carriage in enumerate(grid.scene.carriages):
+            body = grid.scene.bodies[carriage.body].modal
+            if not body.rigid_modes:
+                s = np.linspace(0.0, body.length, 33)
+                flexibility = np.abs(body.influence_at(s, s)).max() / body.length
+                worst = max(worst, float(np.abs(weight(grid.scene, grid.values, number)).max()) * flexibility)
+    if worst > DEEP:
+        yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
+
+
+def _thin(plan: Plan) -> Iterator[str]:
+    """Fewer than 20 fixed steps in a first period."""
+    for grid in plan.grids:
+        if grid.fixed:
+            periods = float(_time_scale(grid).max()) * grid.scene.first_omega / (2.0 * np.pi)
+            steps = grid.unit * grid.scene.scheme.stride
+            if steps < 20.0 * periods:
+                yield f"{steps} steps are only {steps / periods:.2g} in a first period of the body"
+
+
+def _time_scale(grid: SceneGrid) -> Array:
+    """(V,) s per unit of scene time."""
+    return grid.values.time_scale(grid.scene.carriages[0].name)
+
+
+def _speed_ratio(grid: SceneGrid) -> Array:
+    """(V,) top speed of the first carriage over the critical speed."""
+    scene = grid.scene
+    speed = scene.carriages[0].rider.top_speed / _time_scale(grid)
+    return np.asarray(speed * np.pi / (scene.first_omega * scene.leading_body.modal.length))
+
+
+REMARKS: tuple[Callable[[Plan], Iterator[str]], ...] = (
+    _unsupported,
+    _released,
+    _leaves_between,
+    _fast,
+    _heavy,
+    _deep,
+    _thin,
+)

@@ -1,0 +1,131 @@
+"""A uniform Euler-Bernoulli beam as the user describes it."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, Strict, Tag, model_validator
+
+from engine.bodies.modal.description import MAX_MODES, Body, Rayleigh
+from engine.study_file.checks import Check, on_body
+from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
+from engine.study_file.units import (
+    Area,
+    Damping,
+    Density,
+    Length,
+    Pressure,
+    RotationalStiffness,
+    SecondMoment,
+    Stiffness,
+    fault,
+)
+
+__all__ = ["MAX_MODES", "Beam", "Body", "Rayleigh", "Spring"]
+
+END_WORDS = ("pinned", "clamped", "free")
+
+
+class Spring(Spec):
+    """Springs and a damper to ground at a place of the beam (m): N/m, N m/rad, N s/m, not all zero."""
+
+    at: Length = Field(ge=0)
+    stiffness: Stiffness = Field(default=0.0, ge=0)
+    rotational: RotationalStiffness = Field(default=0.0, ge=0)
+    damping: Damping = Field(default=0.0, ge=0)
+
+
+_ENDS = tuple("-".join(ends) for ends in product(END_WORDS, repeat=2))
+_MEANT = {
+    "simply-supported": "pinned-pinned",
+    "hinged-hinged": "pinned-pinned",
+    "fixed-fixed": "clamped-clamped",
+    "cantilever": "clamped-free",
+}
+Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
+Springs = Annotated[tuple[Spring, ...], Strict(False), Field(min_length=1, max_length=100)]
+Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
+
+
+class Beam(Body):
+    """A uniform beam. SI units; `supports` names both ends or lists springs, between which all is free.
+
+    fibre_distance: of the extreme fibre, for stress.
+
+    >>> bed = Beam(kind="beam", length="15 m", area=0.01, second_moment=8.33e-6, youngs_modulus="210 GPa",
+    ...            density=7850, supports="pinned-pinned", damping_ratio=0.02)
+    >>> bed.bending_stiffness, bed.mass, bed.ends
+    (1749300.0, 1177.5, ('pinned', 'pinned'))
+    """
+
+    kind: Literal["beam"]
+    length: Length = Field(gt=0)
+    area: Area = Field(gt=0)
+    second_moment: SecondMoment = Field(gt=0)
+    youngs_modulus: Pressure = Field(gt=0)
+    density: Density = Field(gt=0)
+    supports: Supports
+    fibre_distance: Length | None = Field(default=None, gt=0)
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E I, N m2."""
+        return self.youngs_modulus * self.second_moment
+
+    @property
+    def mass_per_length(self) -> float:
+        """rho A, kg/m."""
+        return self.density * self.area
+
+    @property
+    def mass(self) -> float:
+        """Of the whole beam, kg."""
+        return self.mass_per_length * self.length
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """How the ends at 0 and at the length are held; both free on springs."""
+        left, right = self.supports.split("-") if isinstance(self.supports, str) else ("free", "free")
+        return left, right
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """Springs to ground; none where the ends are named."""
+        return () if isinstance(self.supports, str) else self.supports
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        return ("axial_force",)  # loads act across it
+
+    @property
+    def lacks_for_stress(self) -> str:
+        return "fibre_distance" if self.fibre_distance is None else ""
+
+    @property
+    def modes_are_open(self) -> bool:
+        return self.modes == "auto" and not isinstance(self.damping_ratio, tuple)
+
+    def dampers(self) -> list[tuple[str, float | str, float]]:
+        return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
+
+    @model_validator(mode="after")
+    def _list_of_ratios(self) -> Beam:
+        if isinstance(self.damping_ratio, tuple) and self.modes == "auto":
+            raise fault("a list of damping ratios needs modes as a number", expected=f"modes = 1 to {MAX_MODES}")
+        return self
+
+    def checks(self, here: str) -> list[Check]:
+        checks = []
+        for index in range(len(self.springs)):
+            spring = f"{here}.supports.{index}"
+            parts = tuple(f"{spring}.{key}" for key in ("stiffness", "rotational", "damping"))
+            checks.append(on_body(f"{spring}.at", (f"{spring}.at", f"{here}.length"), "a support off the beam"))
+            checks.append(
+                Check(spring, parts, lambda k, r, c: k + r + c > 0, "a support that holds nothing", "one of them > 0")
+            )
+        if isinstance(self.damping_ratio, tuple):
+            count = len(self.damping_ratio)
+            what = f"more modes than the {count} damping ratios"
+            checks.append(Check(f"{here}.modes", (f"{here}.modes",), lambda n: n <= count, what, f"at most {count}"))
+        return checks

@@ -1,0 +1,145 @@
+"""Models as plain files: matrices as Matrix Market or NPZ, nodes and rows as CSV."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from engine.bodies.files.market import from_market
+from engine.bodies.files.model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
+from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
+from results_schema.errors import BadInput
+
+_SPARSE = ("csr", "csc", "coo")
+_MODAL = ("0", "q", "modal")
+
+
+def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileModel:
+    """A model from its files: stiffness, mass, nodes, and freedoms and recovery if they are given. Raises BadInput."""
+    stiffness, mass = (read_matrix(files[key], file_bytes(files[key])) for key in ("stiffness", "mass"))
+    nodes, places = nodes_of(lines_of(files["nodes"], file_bytes(files["nodes"])))
+    if "freedoms" in files:
+        owner, direction = freedoms_of(lines_of(files["freedoms"], file_bytes(files["freedoms"])), nodes)
+    else:
+        owner, direction = freedoms_in_order(stiffness.shape[0], len(nodes), files["stiffness"])
+    for key, matrix in (("stiffness", stiffness), ("mass", mass)):
+        if matrix.shape != (len(owner), len(owner)):
+            size = " x ".join(str(part) for part in matrix.shape)
+            what, expected = f"the {key} matrix does not fit the degrees of freedom", f"{len(owner)} x {len(owner)}"
+            raise BadInput(what, where=files[key], expected=expected, received=size)
+    held = np.zeros(len(owner), dtype=np.bool_)
+    recovery = read_matrix(files["recovery"], file_bytes(files["recovery"])) if "recovery" in files else None
+    model = FileModel(stiffness, mass, nodes, places, owner, direction, held, hashes_of(*files.values()), recovery)
+    return checked(model, files["stiffness"])
+
+
+def read_matrix(path: str, raw: bytes) -> Any:
+    """A sparse matrix from Matrix Market text or scipy's NPZ. Raises BadInput."""
+    found = _from_npz(path, raw) if raw[:2] == b"PK" else from_market(lines_of(path, raw))
+    if np.iscomplexobj(found):
+        raise BadInput("a complex matrix", where=path, expected="real numbers")
+    return found
+
+
+def _from_npz(path: str, raw: bytes) -> Any:
+    """Of scipy's `save_npz`; pickles are refused, indices checked."""
+    from scipy.sparse import coo_array, csc_array, csr_array
+
+    try:
+        with np.load(BytesIO(raw), allow_pickle=False) as found:
+            form, shape = found["format"].item(), tuple(int(size) for size in found["shape"])
+            form = form.decode("ascii") if isinstance(form, bytes) else str(form)
+            if form not in _SPARSE or len(shape) != 2 or max(shape) > MAX_FREEDOMS:
+                expected = f"a csr, csc or coo matrix of at most {MAX_FREEDOMS} rows"
+                raise BadInput("not a matrix of a model", where=path, expected=expected, received=f"{form} {shape}")
+            data = found["data"]
+            if data.dtype.kind not in "fiu" or data.ndim != 1:
+                raise BadInput("not a matrix of real numbers", where=path, received=str(data.dtype))
+            if form == "coo":
+                return coo_array((data, (found["row"], found["col"])), shape=shape).tocsc()
+            kind = csr_array if form == "csr" else csc_array
+            matrix = kind((data, found["indices"], found["indptr"]), shape=shape)
+            matrix.check_format(full_check=True)
+            return matrix.tocsc()
+    except (BadInput, MemoryError):
+        raise
+    except Exception as error:
+        what, expected = "the matrix cannot be read", "a file of scipy.sparse.save_npz without pickles"
+        raise BadInput(what, where=path, expected=expected, received=str(error)[:200]) from None
+
+
+def nodes_of(lines: list[Line]) -> tuple[Any, Any]:
+    """Numbers (P,) and coordinates (P, 3) from lines `node, x, y, z`, with a heading or without. Raises BadInput."""
+    numbers: dict[int, int] = {}
+    places: list[tuple[float, float, float]] = []
+    for line, fields in _rows(lines, 4):
+        number = whole(line, fields[0])
+        if number in numbers:
+            raise line.fault(f"node {number} is defined twice", expected=f"first in line {numbers[number]}")
+        numbers[number] = line.number
+        x, y, z = (real(line, field, noun=f"a coordinate of node {number}") for field in fields[1:])
+        places.append((x, y, z))
+    if not numbers:
+        raise BadInput("there is no node", where=lines[0].path, expected="lines of node, x, y, z")
+    return np.array(list(numbers), dtype=np.int64), np.array(places)
+
+
+def freedoms_of(lines: list[Line], nodes: Any) -> tuple[Any, Any]:
+    """Owner and direction (n,) of every row from lines `node, direction`. Raises BadInput.
+
+    A direction is x, y, z, rx, ry, rz, or 1 to 6; `modal` makes the first number that of a modal coordinate.
+    """
+    known = {int(number): place for place, number in enumerate(nodes)}
+    words = {word: index for index, word in enumerate(DIRECTIONS)} | {str(i + 1): i for i in range(6)}
+    found: dict[tuple[int, int], int] = {}
+    for line, fields in _rows(lines, 2):
+        number, word = whole(line, fields[0]), fields[1].strip().lower()
+        if word in _MODAL:
+            row = (-1, number)
+        elif word not in words:
+            raise line.fault("no such direction", expected="x, y, z, rx, ry, rz or modal", received=fields[1])
+        elif number not in known:
+            raise line.fault(f"there is no node {number}", expected="a node of the file of nodes")
+        else:
+            row = (known[number], words[word])
+        if row in found:
+            raise line.fault("this degree of freedom stands here twice", expected=f"first in line {found[row]}")
+        found[row] = line.number
+    if not found:
+        raise BadInput("there is no degree of freedom", where=lines[0].path, expected="lines of node, direction")
+    owner, direction = np.array(list(found), dtype=np.int64).T
+    return owner, direction
+
+
+def freedoms_in_order(size: int, nodes: int, where: str) -> tuple[Any, Any]:
+    """Owner and direction of every row: six or three per node, node by node in their order. Raises BadInput."""
+    for each in (6, 3):
+        if size == each * nodes:
+            owner, direction = np.divmod(np.arange(size, dtype=np.int64), each)
+            return owner, direction
+    raise BadInput(
+        "the matrix does not fit the nodes",
+        where=where,
+        expected=f"{6 * nodes} or {3 * nodes} rows for {nodes} nodes",
+        received=f"{size} rows",
+        remedy="name the rows in a file: freedoms = ...",
+    )
+
+
+def _rows(lines: list[Line], count: int) -> list[tuple[Line, list[str]]]:
+    """Lines that hold something, split at commas or semicolons; a heading, comments after # left out."""
+    found: list[tuple[Line, list[str]]] = []
+    for line in lines:
+        text = line.text.partition("#")[0].strip()
+        fields = [field.strip().strip('"') for field in re.split("[,;]", text)]
+        heading = not found and line.number <= 2 and not re.match(r"[+-]?\d", fields[0])
+        if not text or (heading and re.match("[A-Za-z]", fields[0])):
+            continue
+        if len(fields) != count:
+            raise line.fault("the line does not fit", expected=f"{count} fields", received=text)
+        found.append((line, fields))
+    return found

@@ -1,0 +1,194 @@
+"""A frame as a modal body: its matrices, its modes (all of the model, or of its Craig-Bampton reduction), its track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
+from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.points import frame_points, point_loads
+from engine.bodies.frame.sections import TrackSections
+from engine.bodies.frame.shapes import mode_forces, track_shapes
+from engine.bodies.frame.statics import TrackStatics, track_statics
+from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
+from engine.bodies.modal.craig_bampton import reduce_model
+from engine.bodies.modal.description import AUTO_MODES, MAX_MODES
+from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
+from engine.bodies.modal.modal_body import Array, ModalBody, Shapes
+from engine.linear_algebra import one_thread
+from engine.study_file.document import shortened
+from results_schema.errors import BadInput
+
+_UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
+
+
+def frame_body(frame: Frame) -> ModalBody:
+    """The frame in modal coordinates with its exact statics; the last few are remembered.
+
+    Raises BadInput, with the key within the body as its place, for a frame that cannot be reduced as it asks.
+    """
+    return _frame_body(Content.of(frame))
+
+
+@lru_cache(maxsize=8)
+def _frame_body(content: Content) -> ModalBody:
+    import scipy.linalg  # noqa: F401, its library is to be held too
+
+    try:
+        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
+            found = _reduced(content.frame)
+            probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
+    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
+        raise _unsolvable(str(error)) from error
+    if not all(np.isfinite(part).all() for part in (found.omega, found.participation, probe, found.wave_number)):
+        raise _unsolvable("a result that is not finite")
+    return found
+
+
+def _unsolvable(reason: str) -> BadInput:
+    """The refusal of a frame whose numbers floats cannot hold together."""
+    what = "the stiffnesses, masses or lengths of this frame differ too much to be solved"
+    return BadInput(what, where="section", expected="numbers of one scale", received=shortened(reason))
+
+
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """What does not depend on how many modes a frame keeps: its matrices, its track and its statics."""
+
+    assembly: Assembly
+    flexibility: Flexibility
+    track: TrackBeams
+    ends: TrackPoints
+    statics: TrackStatics
+
+
+@lru_cache(maxsize=8)
+def _whole(content: Content) -> _Whole:
+    frame = content.frame
+    assembly = assemble(frame)
+    flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
+    track, ends = track_of(frame, assembly.mesh)
+    gravity = unit(frame.gravity)
+    spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
+    statics = track_statics(track, ends, assembly, flexibility, gravity, spread)
+    return _Whole(assembly, flexibility, track, ends, statics)
+
+
+def _reduced(frame: Frame) -> ModalBody:
+    whole = _whole(Content.of(frame, without=ABOUT_MODES))
+    assembly, flexibility, track, statics = whole.assembly, whole.flexibility, whole.track, whole.statics
+    omega, shapes = frame_modes(frame, assembly, flexibility)
+    moved = whole.ends.of(assembly.whole(shapes))
+    masses = MASSES[frame.mass_matrix](track.beams)
+    along = track_shapes(track, moved, mode_forces(track, moved, omega, masses))
+    turn = settled(omega, along, statics.length, shapes)
+    moved, shapes = without_rounding(moved @ turn, (0, 1)), shapes @ turn
+    kept = kept_modes(frame, omega)
+    omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
+    gravity = unit(frame.gravity)
+    forces = mode_forces(track, moved, omega, masses)
+    sections = TrackSections(statics, forces)
+    loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
+    bending = track.bending
+    return ModalBody(
+        length=statics.length,
+        mass=assembly.total_mass,
+        omega=omega,
+        participation=_frozen(shapes.T @ pull),
+        wave_number=_frozen(track.wave_number(omega)),
+        bending_stiffness=float(bending[0]) if np.ptp(bending) <= 1e-9 * bending[0] else np.nan,
+        dampers=(),
+        shapes=track_shapes(track, moved, forces),
+        statics=statics,
+        gravity_share=float(track.direction @ gravity),
+        sections=sections,
+        points=frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None,
+    )
+
+
+def frame_modes(frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:
+    """omega (k,) and shapes (n, k) of the lowest modes that the frame asks for; groups of equal frequencies whole."""
+    count = AUTO_MODES if frame.modes == "auto" else int(frame.modes)
+    if not frame.interface:
+        return flexibility.modes(count)
+    interface = interface_freedoms(frame, assembly)
+    held = np.ones(6 * len(assembly.mesh.points), dtype=np.bool_)
+    held[np.delete(assembly.free, interface)] = False
+    loose = rigid_motions(assembly.mesh, held, assembly.springs)[~held]
+    reduction = reduce_model(assembly.stiffness, assembly.mass, interface, loose, frame.fixed_interface_modes)
+    omega, shapes = reduction.modes(flexibility.rigid)
+    if frame.modes == "auto":
+        count = min(len(omega), MAX_MODES)
+    ends = np.append(groups(omega)[1:], len(omega))
+    count = int(ends[ends >= min(count, len(omega))][0])
+    return omega[:count], shapes[:, :count]
+
+
+def interface_freedoms(frame: Frame, assembly: Assembly) -> Counts:
+    """Places of the interface's degrees of freedom among the free ones."""
+    nodes = [list(frame.node).index(name) for name in frame.interface]
+    wanted = (6 * np.array(nodes)[:, None] + np.arange(6)).reshape(-1)
+    return np.flatnonzero(np.isin(assembly.free, wanted))
+
+
+def groups(omega: Array) -> Counts:
+    """First modes of the groups of equal frequencies."""
+    apart = np.diff(omega) > SAME_FREQUENCY * omega[1:]
+    return np.concatenate([[0], np.flatnonzero(apart) + 1])
+
+
+def settled(omega: Array, along: Shapes, length: float, shapes: Array) -> Array:
+    """(k, k) turn within groups of equal frequencies, and signs, so that modes do not depend on the solver's whim.
+
+    Within a group the first mode moves the track most, the next what is left, by the mean square along it. Then the
+    first place of the track where a mode reaches half of its largest value is positive.
+    """
+    count = len(omega)
+    turn = np.eye(count)
+    fine = along.derivatives(np.linspace(0.0, length, 16 * count + 1), (0,))[0]
+    for first, end in pairwise([*groups(omega), count]):
+        part = fine[:, first:end]
+        if end - first > 1:
+            _, vectors = np.linalg.eigh(part.T @ part)
+            turn[first:end, first:end] = vectors[:, ::-1]
+    fine, whole = fine @ turn, shapes @ turn
+    size = np.abs(fine).max(axis=0)
+    for mode in range(count):
+        felt = size[mode] > _UNFELT * np.abs(whole[:, mode]).max()
+        line = fine[:, mode] if felt else whole[:, mode]
+        start = line[np.argmax(np.abs(line) >= 0.5 * np.abs(line).max())]
+        turn[:, mode] *= -1.0 if start < 0.0 else 1.0
+    return turn
+
+
+def kept_modes(frame: Frame, omega: Array) -> Counts:
+    """The modes that stay: not those left out (nor their equals), nor rigid-body modes if these are dropped."""
+    out = np.zeros(len(omega), dtype=np.bool_)
+    for index, number in enumerate(frame.leave_out):
+        if number > len(omega):
+            expected = f"numbers of modes, 1 to {len(omega)}"
+            raise BadInput(
+                "there is no such mode to leave out",
+                where=f"leave_out.{index}",
+                expected=expected,
+                received=str(number),
+            )
+        out[number - 1] = True
+    for first, end in pairwise([*groups(omega), len(omega)]):
+        out[first:end] |= out[first:end].any()
+    if frame.rigid_body_modes == "drop":
+        out |= omega == 0.0
+    kept = np.flatnonzero(~out)
+    if not len(kept):
+        raise BadInput("no mode is left", where="leave_out" if frame.leave_out else "modes", expected="at least one")
+    return kept
+
+
+def _frozen(values: Array) -> Array:
+    values.flags.writeable = False
+    return values

@@ -1,0 +1,291 @@
+"""A frame of beam elements as the user describes it: nodes and sections by name, members between them, a track.
+
+Directions are those of the nodes' coordinates. A member's local axes: x from its first node to its second, z the part
+of `up` square to x, y = z x x; `second_moment` is that of bending along z (as a beam's under its load), the
+`..._lateral` one that of bending along y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, Strict, Tag, model_validator
+
+from engine.bodies.frame.geometry import TrackLine
+from engine.bodies.frame.rules import check_frame, track_line
+from engine.bodies.modal.description import Body
+from engine.study_file.checks import Check
+from engine.study_file.document import shortened
+from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
+from engine.study_file.units import (
+    Area,
+    Damping,
+    Density,
+    Dimensionless,
+    Inertia,
+    Length,
+    Mass,
+    Pressure,
+    RotationalDamping,
+    RotationalStiffness,
+    SecondMoment,
+    Stiffness,
+    fault,
+)
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+MAX_ELEMENTS = 1000
+MAX_COORDINATE = 1e9
+MAX_POINTS = 50
+MAX_FIXED_INTERFACE_MODES = 64
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+Theory = Literal["euler-bernoulli", "timoshenko"]
+_THEORIES = {"euler": "euler-bernoulli", "bernoulli": "euler-bernoulli"}
+TheoryWord = Annotated[str, AfterValidator(one_of("euler-bernoulli", "timoshenko", meant=_THEORIES))]
+MassWord = Annotated[str, AfterValidator(one_of("consistent", "lumped"))]
+PlaneWord = Annotated[str, AfterValidator(one_of(*PLANES))]
+
+
+def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(vector):
+        raise fault("this direction has no length", expected="three numbers, not all zero", received=shortened(vector))
+    return vector
+
+
+def _each_once(words: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(words)) < len(words):
+        raise fault("an entry stands here twice", expected="each one once", received=shortened(words))
+    return words
+
+
+Vector = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False), AfterValidator(_not_zero)]
+Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
+Place = Annotated[tuple[Coordinate, Coordinate, Coordinate], Strict(False)]
+Node = Annotated[tuple[Coordinate, ...], Strict(False), Field(min_length=2, max_length=3)]
+Two = Annotated[tuple[str, str], Strict(False)]
+Names = Annotated[tuple[str, ...], Strict(False), AfterValidator(_each_once)]
+Three = tuple[float, float, float]
+
+_DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
+_Directions = Annotated[
+    tuple[_DirectionWord, ...], Strict(False), Field(min_length=1, max_length=6), AfterValidator(_each_once)
+]
+_HOLDS = {"clamped": DIRECTIONS, "pinned": DIRECTIONS[:3]}
+_HoldWord = Annotated[str, AfterValidator(one_of(*_HOLDS, meant={"fixed": "clamped", "hinged": "pinned"}))]
+Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
+
+
+class Section(Spec):
+    """A cross-section with its material; SI units. Shear areas are for Timoshenko members, fibre distances for stress.
+
+    Give shear_modulus or poissons_ratio. In a plane frame only the section's bending in that plane counts.
+    """
+
+    area: Area = Field(gt=0)
+    second_moment: SecondMoment = Field(gt=0)
+    second_moment_lateral: SecondMoment | None = Field(default=None, gt=0)
+    torsion_constant: SecondMoment | None = Field(default=None, gt=0)
+    youngs_modulus: Pressure = Field(gt=0)
+    shear_modulus: Pressure | None = Field(default=None, gt=0)
+    poissons_ratio: Dimensionless | None = Field(default=None, gt=-1, lt=0.5)
+    density: Density = Field(gt=0)
+    shear_area: Area | None = Field(default=None, gt=0)
+    shear_area_lateral: Area | None = Field(default=None, gt=0)
+    fibre_distance: Length | None = Field(default=None, gt=0)
+    fibre_distance_lateral: Length | None = Field(default=None, gt=0)
+
+    @property
+    def shear_stiffness(self) -> float | None:
+        """G, Pa; None where it is not known."""
+        if self.poissons_ratio is not None:
+            return self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+        return self.shear_modulus
+
+    @model_validator(mode="after")
+    def _one_shear_modulus(self) -> Section:
+        if self.shear_modulus is not None and self.poissons_ratio is not None:
+            raise fault("the shear modulus is given twice", expected="shear_modulus or poissons_ratio")
+        return self
+
+
+class Member(Spec):
+    """A straight beam between two nodes. offsets: rigid arms (m) from each node to the end of its axis."""
+
+    nodes: Two
+    section: str
+    elements: int = Field(default=8, ge=1, le=MAX_ELEMENTS)
+    up: Vector | None = None
+    theory: TheoryWord = "euler-bernoulli"
+    offsets: Annotated[tuple[Place, Place], Strict(False)] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+class PointMass(Spec):
+    """A rigid mass (kg) at a node; offset (m) of its centre from it, inertia (kg m2) about that centre."""
+
+    node: str
+    mass: Mass = Field(gt=0)
+    inertia: Annotated[
+        tuple[Annotated[Inertia, Field(ge=0)], Annotated[Inertia, Field(ge=0)], Annotated[Inertia, Field(ge=0)]],
+        Strict(False),
+    ] = (0.0, 0.0, 0.0)
+    offset: Place = (0.0, 0.0, 0.0)
+
+
+_Stiffness = Annotated[Stiffness, Field(ge=0)]
+_Rotational = Annotated[RotationalStiffness, Field(ge=0)]
+_Damping = Annotated[Damping, Field(ge=0)]
+_RotationalDamping = Annotated[RotationalDamping, Field(ge=0)]
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class NodeSpring(Spec):
+    """Springs and dampers in all directions at a node, to ground or `to` another node's rigid arm to this place."""
+
+    node: str
+    to: str | None = None
+    stiffness: Annotated[tuple[_Stiffness, _Stiffness, _Stiffness], Strict(False)] = _ZERO
+    rotational: Annotated[tuple[_Rotational, _Rotational, _Rotational], Strict(False)] = _ZERO
+    damping: Annotated[tuple[_Damping, _Damping, _Damping], Strict(False)] = _ZERO
+    rotational_damping: Annotated[tuple[_RotationalDamping, _RotationalDamping, _RotationalDamping], Strict(False)] = (
+        _ZERO
+    )
+
+
+class Point(Spec):
+    """A place off the track and a direction (along gravity unless given): for sensors, and shoes of other bodies.
+
+    offset: m, from the node by a rigid arm.
+    """
+
+    node: str
+    direction: Vector | None = None
+    offset: Place = _ZERO
+
+
+class Track(Spec):
+    """Where loads ride: members in order, one straight line, or a line beside it.
+
+    offset: m, from the members' axis to the load, so that it twists them too. direction: in which the load acts and
+    deflection counts; along gravity unless given.
+    """
+
+    members: Annotated[Names, Field(min_length=1)]
+    offset: Place = _ZERO
+    direction: Vector | None = None
+
+
+class Frame(Body):
+    """A two- or three-dimensional frame. Loads ride on `track`; its length is the body's length.
+
+    plane: a 2-D frame moves in that plane only. gravity_direction: downwards unless given. mass_matrix: "consistent"
+    or "lumped". interface: nodes that Craig-Bampton reduction keeps, with fixed_interface_modes besides. leave_out:
+    numbers of modes (from 1) that are not kept; rigid_body_modes: "keep" or "drop" those of a body that nothing holds.
+    """
+
+    derived: ClassVar[tuple[str, ...]] = ("length",)
+
+    kind: Literal["frame"]
+    plane: PlaneWord | None = None
+    gravity_direction: Vector | None = None
+    node: dict[str, Node] = Field(min_length=2)
+    section: dict[str, Section] = Field(min_length=1)
+    member: dict[str, Member] = Field(min_length=1)
+    point_mass: dict[str, PointMass] = Field(default_factory=dict)
+    spring: dict[str, NodeSpring] = Field(default_factory=dict, max_length=MAX_POINTS)
+    point: dict[str, Point] = Field(default_factory=dict, max_length=MAX_POINTS)
+    supports: dict[str, Support] = Field(default_factory=dict)
+    track: Track
+    mass_matrix: MassWord = "consistent"
+    interface: Annotated[Names, Field(max_length=MAX_POINTS)] = ()
+    fixed_interface_modes: int = Field(default=12, ge=0, le=MAX_FIXED_INTERFACE_MODES)
+    leave_out: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Strict(False)] = ()
+    rigid_body_modes: Annotated[str, AfterValidator(one_of("keep", "drop"))] = "keep"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Frame:
+        check_frame(self)
+        return self
+
+    @cached_property
+    def line(self) -> TrackLine:
+        """The track as a line in space."""
+        return track_line(self)
+
+    @property
+    def length(self) -> float:
+        """Of the track, m."""
+        return self.line.length
+
+    @property
+    def gravity(self) -> Three:
+        """The direction of gravity as it is given, else down: against the last axis."""
+        if self.gravity_direction is not None:
+            return self.gravity_direction
+        last = PLANES[self.plane][1] if self.plane else 2
+        return (0.0, -1.0, 0.0) if last == 1 else (0.0, 0.0, -1.0)
+
+    @property
+    def direction(self) -> Three:
+        """The direction in which loads act on the track."""
+        return self.gravity if self.track.direction is None else self.track.direction
+
+    @property
+    def lacks_for_stress(self) -> str:
+        for name, _ in self.line.members:
+            section = self.member[name].section
+            if self.section[section].fibre_distance is None:
+                return f"section.{section}.fibre_distance"
+            if self.plane is None and self.section[section].fibre_distance_lateral is None:
+                return f"section.{section}.fibre_distance_lateral"
+        return ""
+
+    def place(self, node: str) -> Three:
+        """Coordinates of a node, m; in a plane frame two may be given."""
+        given = self.node[node]
+        if len(given) == 3:
+            return (given[0], given[1], given[2])
+        found = [0.0, 0.0, 0.0]
+        for axis, value in zip(PLANES[str(self.plane)], given, strict=True):
+            found[axis] = value
+        return (found[0], found[1], found[2])
+
+    def holds(self, node: str) -> Sequence[str]:
+        """The directions in which a node is held."""
+        support = self.supports.get(node, ())
+        return _HOLDS[support] if isinstance(support, str) else support
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """The directions in which no node moves, as the frame is plane."""
+        if self.plane is None:
+            return ()
+        (across,) = {0, 1, 2} - set(PLANES[self.plane])
+        return (DIRECTIONS[across], *(f"r{DIRECTIONS[axis]}" for axis in PLANES[self.plane]))
+
+    @property
+    def modes_are_open(self) -> bool:
+        reduced = bool(self.interface or self.leave_out)
+        return self.modes == "auto" and not reduced and not isinstance(self.damping_ratio, tuple)
+
+    def with_more_modes(self, times: int) -> Frame:
+        """The same body with so many times its modes; of a reduced one, those within its fixed interface."""
+        if not self.interface:
+            return super().with_more_modes(times)
+        fixed = self.model_copy(
+            update={"fixed_interface_modes": min(times * self.fixed_interface_modes, MAX_FIXED_INTERFACE_MODES)}
+        )
+        return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
+
+    def dampers(self) -> list[tuple[str, float | str, float]]:
+        found: list[tuple[str, float | str, float]] = []
+        for name, spring in self.spring.items():
+            for key, words in (("damping", DIRECTIONS[:3]), ("rotational_damping", DIRECTIONS[3:])):
+                rates = zip(words, getattr(spring, key), strict=True)
+                found += [(f"spring.{name}.{key}.{i}", f"spring.{name}.{w}", c) for i, (w, c) in enumerate(rates)]
+        return found
+
+    def checks(self, here: str) -> list[Check]:
+        return []

@@ -1,0 +1,171 @@
+"""Statics of a frame along its track, exact for the finite-element model.
+
+A load at s acts on the ends of its element through the static shapes, and the element with held ends bends besides:
+w(x; s) = c(x)^T G c(s) + w_held(x; s), c the shapes, G the flexibility between the track's points. For Euler-Bernoulli
+and Timoshenko members this is the exact beam solution between the nodes, not only at them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.bodies.frame.assembly import Assembly
+from engine.bodies.frame.track import TrackBeams, TrackPoints, track_places
+from engine.bodies.modal.flexibility import Flexibility, without_rounding
+from engine.bodies.modal.modal_body import Array
+from results_schema.errors import BadInput
+
+Counts = NDArray[np.int64]
+_ENDS = 32  # ends of elements whose loads are solved at a time
+_SAMPLES = 5  # places per element that show every pattern of its cubic shapes
+
+
+@dataclass(frozen=True, eq=False)
+class TrackStatics:
+    """Influence functions along a track.
+
+    patterns (r, 6): orthonormal, all that loads on the track do to a point; flexibility (6 (E + 1), r (E + 1)):
+    displacements and rotations of all points per unit of each pattern on each; weight (6 (E + 1),): the same under own
+    weight per unit gravity; spread (E, 3): own weight per length along the elements' axes, kg/m; rigid: number of
+    rigid-body modes.
+    """
+
+    track: TrackBeams
+    patterns: Array
+    flexibility: Array
+    weight: Array
+    spread: Array
+    rigid: int
+
+    @property
+    def length(self) -> float:
+        """Of the track, m."""
+        return float(self.track.places[-1])
+
+    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
+        left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
+        place, load = np.broadcast_arrays(left[:, None], right)
+        return self._broadcast(place, load, derivative)
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """The same for pairs, `x` and `s` broadcast against each other; (X, 1) and (S,) are fast."""
+        left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
+        return self._broadcast(left, right, derivative)
+
+    def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) under own weight per unit gravity, m^(1-j)/(m/s^2)."""
+        self.refuse_loose()
+        place = track_places(x, self.length, derivative)
+        found = self.under_response(self.weight, place, derivative)
+        return np.asarray(found + self.track.under_spread_load(place, self.spread, derivative))
+
+    def under_response(self, response: Array, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) where the track's points move by `response` (6 (E + 1),)."""
+        place = track_places(x, self.length, derivative)
+        ends = response.reshape(-1, 6)
+        element, _ = self.track.at(place)
+        moved = np.concatenate([ends[element], ends[element + 1]], axis=1)
+        return np.asarray(np.sum(self.track.to_ends(place, derivative) * moved, axis=1))
+
+    def refuse_loose(self) -> None:
+        """Raise BadInput for a body that no static state can carry."""
+        if self.rigid:
+            raise BadInput(
+                "own weight of a body that is free to move as a rigid one",
+                where="supports",
+                expected="supports that hold the body",
+                received=f"{self.rigid} rigid-body mode(s)",
+            )
+
+    def moved(self, element: Counts, s: Array) -> Array:
+        """(S, 12) displacements and rotations of an element's ends under a unit load at s, pair by pair."""
+        count = len(self.patterns)
+        other, _ = self.track.at(s)
+        acts = self.track.to_ends(s).reshape(-1, 2, 6) @ self.patterns.T
+        found = np.zeros((len(s), 12))
+        for row in range(12):
+            for end in range(2):
+                for pattern in range(count):
+                    flexible = self.flexibility[6 * element + row, count * (other + end) + pattern]
+                    found[:, row] += flexible * acts[:, end, pattern]
+        return found
+
+    def lines(self, element: Counts, takes: Array, s: Array) -> Array:
+        """(X, S) sums of `takes` (X, 12) times the motions of the ends of elements (X,) under a unit load at each s.
+
+        As `moved`, for all places with all loads, in a small part of the time.
+        """
+        count = len(self.patterns)
+        rows = 6 * element[:, None] + np.arange(12)
+        flexible = np.sum(takes[:, :, None] * self.flexibility[rows], axis=1)
+        other, _ = self.track.at(s)
+        ends = self.track.to_ends(s).reshape(-1, 2, 6)
+        found = np.zeros((len(element), len(s)))
+        for end in range(2):
+            for number, pattern in enumerate(self.patterns):
+                found += flexible[:, count * (other + end) + number] * np.sum(ends[:, end] * pattern, axis=1)
+        return found
+
+    def _broadcast(self, x: Array, s: Array, derivative: int) -> Array:
+        if is_every_pair(x, s):
+            place = x.reshape(-1)
+            element, _ = self.track.at(place)
+            whole = self.lines(element, self.track.to_ends(place, derivative), s)
+            i, j = np.nonzero(element[:, None] == self.track.at(s)[0])
+            whole[i, j] += self.track.within(place[i], s[j], derivative)
+            return whole.reshape(np.broadcast_shapes(x.shape, s.shape))
+        place, load = np.broadcast_arrays(x, s)
+        return self._deflection(place.reshape(-1), load.reshape(-1), derivative).reshape(place.shape)
+
+    def _deflection(self, x: Array, s: Array, derivative: int) -> Array:
+        """Pair by pair, summed in a fixed order so that a value never depends on its neighbours."""
+        element, _ = self.track.at(x)
+        takes, found = self.track.to_ends(x, derivative), self.track.within(x, s, derivative)
+        moved = self.moved(element, s)
+        for row in range(12):
+            found = found + takes[:, row] * moved[:, row]
+        return found
+
+
+def is_every_pair(x: Array, s: Array) -> bool:
+    """Whether places (X, 1), or a single one, meet many loads (S,)."""
+    return s.ndim == 1 and s.size > 1 and x.size == x.shape[0] and (x.ndim == 2 or x.size == 1)
+
+
+def track_statics(
+    track: TrackBeams, points: TrackPoints, assembly: Assembly, flexibility: Flexibility, gravity: Array, spread: Array
+) -> TrackStatics:
+    """Statics from a factorised model; gravity (3,): unit vector; spread (E, 3): see `TrackStatics`."""
+    patterns = _patterns(track)
+    size, total = 6 * len(track.places), 6 * len(assembly.mesh.points)
+    moved = np.zeros((size, len(track.places) * len(patterns)))
+    for ends in np.array_split(np.arange(len(track.places)), -(-len(track.places) // _ENDS)):
+        loads = points.loads(patterns, ends, total)[assembly.free]
+        columns = slice(len(patterns) * ends[0], len(patterns) * (ends[-1] + 1))
+        moved[:, columns] = points.of(assembly.whole(flexibility.solve(loads))).reshape(size, -1)
+    rigid = assembly.rigid.shape[1]
+    weight = np.zeros((size, 1))
+    if not rigid:
+        pull = assembly.drag @ gravity
+        weight = points.of(assembly.whole(flexibility.solve(pull[:, None]))).reshape(size, 1)
+    moved, weight = without_rounding(moved, 0), without_rounding(weight, 0)
+    return TrackStatics(track, patterns, moved, weight[:, 0], spread, rigid)
+
+
+def _patterns(track: TrackBeams) -> Array:
+    """(r, 6) orthonormal basis of all that a load anywhere on the track does to a point, forces and torques apart."""
+    steps = np.linspace(0.0, 1.0, _SAMPLES + 2)[1:-1]
+    places = (track.places[:-1, None] + np.diff(track.places)[:, None] * steps).reshape(-1)
+    acts = track.to_ends(places).reshape(-1, 6)
+    found = []
+    for part in (slice(0, 3), slice(3, 6)):
+        _, sizes, directions = np.linalg.svd(np.linalg.qr(acts[:, part], mode="r"))
+        for direction in directions[: int(np.count_nonzero(sizes > 1e-12 * sizes.max(initial=0.0)))]:
+            row = np.zeros(6)
+            row[part] = direction
+            found.append(row)
+    return np.array(found)

@@ -1,0 +1,198 @@
+"""An imported model as a modal body: its modes, its track between nodes, its points, and its checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from engine.bodies.frame.body import settled
+from engine.bodies.frame.geometry import unit
+from engine.bodies.imported.checks import findings
+from engine.bodies.imported.imported import Imported, Recovering
+from engine.bodies.imported.line import LinePoints, LineShapes, LineStatics, LineStress, NoSections
+from engine.bodies.imported.model import HeldModel, held_model
+from engine.bodies.imported.rows import node_rows, track_rows
+from engine.bodies.modal.description import AUTO_MODES
+from engine.bodies.modal.flexibility import Flexibility
+from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.linear_algebra import one_thread
+from engine.study_file.document import shortened
+from results_schema.errors import BadInput
+
+MOST_SAMPLES = 4001  # places where the wave numbers of shapes are read
+_COLUMNS = 64
+_UNFELT = 1e-9  # of the largest displacement: below it a mode does not move the track
+
+
+_Parts = tuple[Array, Any, Array, Array, Array]  # mode shapes, track's rows and slopes, own weight, points' loads
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A body by what its modes depend on, so that the variants of a sweep share them."""
+
+    text: str
+    body: Imported = field(compare=False)
+
+
+def imported_body(body: Imported) -> ModalBody:
+    """The body in modal coordinates with its exact statics; the last few are remembered.
+
+    Raises BadInput, with the key within the body as its place, for a model that cannot be a body as it stands.
+    """
+    text = body.model_dump_json(exclude={"damping_ratio": True, "own_weight": True}) + body.content
+    return _imported_body(_Content(text, body))
+
+
+@lru_cache(maxsize=8)
+def _imported_body(content: _Content) -> ModalBody:
+    import scipy.linalg  # noqa: F401, its library is to be held too
+
+    try:
+        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
+            found = _modal_body(content.body)
+    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
+        raise _unsolvable(str(error)) from error
+    statics = found.statics
+    assert isinstance(statics, LineStatics)
+    for part in (found.omega, found.participation, found.wave_number, statics.flexibility, statics.weight):
+        if not np.isfinite(part).all():
+            raise _unsolvable("a result that is not finite")
+    return found
+
+
+def _unsolvable(reason: str) -> BadInput:
+    what = "the stiffnesses and masses of this model cannot be solved"
+    return BadInput(what, where="supports", expected="a model that is held, of one scale", received=shortened(reason))
+
+
+def _modal_body(body: Imported) -> ModalBody:
+    held = held_model(body)
+    rows, slopes = track_rows(body, held)
+    omega, shapes = _modes(body, held)
+    ends = slopes @ (rows.T @ shapes)
+    places = body.line.places
+    turn = settled(omega, LineShapes(places, ends), body.length, shapes)
+    ends, shapes = ends @ turn, shapes @ turn
+    gravity = unit(body.gravity_direction)
+    pull = held.drag @ gravity
+    flexibility = held.flexibility
+    statics = LineStatics(
+        places=places,
+        flexibility=slopes @ _between(flexibility, rows) @ slopes.T,
+        weight=slopes @ (rows.T @ flexibility.solve(pull[:, None]))[:, 0],
+        rigid=flexibility.rigid.shape[1],
+    )
+    along = LineShapes(places, np.ascontiguousarray(ends))
+    names, loads = _point_loads(body, held)
+    sections = _sections(body, held, statics, (shapes, rows, slopes, pull, loads))
+    return ModalBody(
+        length=body.length,
+        mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
+        omega=omega,
+        participation=shapes.T @ pull,
+        wave_number=_wave_number(along, np.abs(shapes).max(axis=0)),
+        bending_stiffness=np.nan,
+        dampers=(),
+        shapes=along,
+        statics=statics,
+        gravity_share=float(unit(body.direction) @ gravity),
+        sections=sections,
+        points=_points(names, held, statics, sections, (shapes, rows, slopes, pull, loads)) if names else None,
+        checks=findings(body, held, along),
+    )
+
+
+def _modes(body: Imported, held: HeldModel) -> tuple[Array, Array]:
+    """omega (k,) and shapes (n, k) of the lowest modes that move a mass; groups of equal frequencies whole."""
+    count = AUTO_MODES if body.modes == "auto" else int(body.modes)
+    rigid, moving = held.flexibility.rigid.shape[1], _rank(held.mass)
+    omega, shapes = held.flexibility.modes(min(count, moving))
+    if not len(omega) or not np.isfinite(omega).all():
+        raise ArithmeticError("modes that are not finite")
+    if body.rigid_body_modes == "drop":
+        omega, shapes = omega[rigid:], shapes[:, rigid:]
+    if not len(omega):
+        raise BadInput("no mode is left", where="modes", expected=f"more than {rigid}, the rigid-body modes")
+    return omega, shapes
+
+
+def _rank(mass: Any) -> int:
+    """How many modes there are: the rank of a small mass matrix; of a large one, rows with a mass."""
+    diagonal = mass.diagonal()
+    rows = np.flatnonzero(diagonal > 0.0)
+    if len(rows) > 10 * _COLUMNS:
+        return len(rows)
+    scale = 1.0 / np.sqrt(diagonal[rows])
+    values = np.linalg.eigvalsh(mass[rows][:, rows].toarray() * np.outer(scale, scale))
+    return int(np.count_nonzero(values > 1e-10 * values.max(initial=0.0)))
+
+
+def _between(flexibility: Flexibility, rows: Any) -> Array:
+    """(m, m) rows^T G rows."""
+    count = rows.shape[1]
+    found = np.zeros((count, count))
+    for first in range(0, count, _COLUMNS):
+        part = slice(first, first + _COLUMNS)
+        found[:, part] = rows.T @ flexibility.solve(rows[:, part].toarray())
+    return 0.5 * (found + found.T)
+
+
+def _wave_number(along: LineShapes, size: Array) -> Array:
+    """(N,) 1/m: root of curvature over deflection, each by its mean square; 0 where a mode does not move the track.
+
+    size (N,): each mode's largest displacement anywhere.
+    """
+    stations = np.linspace(0.0, along.places[-1], min(MOST_SAMPLES, 16 * len(along.places) + 1))
+    deflection, bent = (np.sqrt(np.mean(along.derivatives(stations, (order,))[0] ** 2, axis=0)) for order in (0, 2))
+    felt = deflection > _UNFELT * size
+    most = np.pi / np.diff(along.places).min()
+    return np.asarray(np.minimum(np.sqrt(np.divide(bent, deflection, out=np.zeros_like(bent), where=felt)), most))
+
+
+def _point_loads(body: Imported, held: HeldModel) -> tuple[dict[str, int], Array]:
+    """Names of points with their numbers, and unit forces (n, Q) there. Raises BadInput for one that cannot move."""
+    at = {int(number): index for index, number in enumerate(held.file.nodes)}
+    columns = np.zeros((len(held.free), len(body.point)))
+    for number, (name, point) in enumerate(body.point.items()):
+        way = unit(body.gravity_direction if point.direction is None else point.direction)
+        columns[:, number] = node_rows(held, [at[point.node]], way, 0).toarray()[:, 0]
+        if not columns[:, number].any():
+            what = f"node {point.node} cannot move in this direction"
+            raise BadInput(what, where=f"point.{name}", expected="a free node")
+    return {f"point.{name}": number for number, name in enumerate(body.point)}, columns
+
+
+def _points(
+    names: dict[str, int], held: HeldModel, statics: LineStatics, sections: NoSections, parts: _Parts
+) -> LinePoints:
+    shapes, rows, slopes, pull, loads = parts
+    moved = held.flexibility.solve(loads)
+    return LinePoints(
+        numbers=names,
+        shapes=loads.T @ shapes,
+        flexibility=loads.T @ moved,
+        response=slopes @ (rows.T @ moved),
+        weight=moved.T @ pull,
+        statics=statics,
+        sections=sections,
+    )
+
+
+def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> NoSections:
+    """Stress along the track where the body has a recovery matrix: means of rows at the track's nodes."""
+    if not isinstance(body, Recovering) or body.stress_rows is None:
+        return NoSections()
+    shapes, rows, slopes, pull, loads = parts
+    told = np.array([held.recovery[np.array(one) - 1].mean(axis=0) for one in body.stress_rows])
+    moved = held.flexibility.solve(np.ascontiguousarray(told.T))
+    return LineStress(
+        statics=statics,
+        values=told @ shapes,
+        response=(rows.T @ moved).T @ slopes.T,
+        weight=moved.T @ pull,
+        points=moved.T @ loads,
+    )

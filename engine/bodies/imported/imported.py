@@ -1,0 +1,300 @@
+"""Bodies out of finite-element files as the user describes them: which files, where loads ride, what holds the body."""
+
+from __future__ import annotations
+
+import re
+from abc import abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, Strict, ValidationInfo, model_validator
+
+from engine.bodies.files.model import Counts, FileModel
+from engine.bodies.files.reader import Request, read_files, role_of
+from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
+from engine.bodies.frame.frame import DIRECTIONS, Place, Support, Vector
+from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.rules import Key, refuse
+from engine.bodies.modal.description import Body
+from engine.study_file.checks import Check
+from engine.study_file.document import shortened
+from engine.study_file.spec import Spec, one_of
+from engine.study_file.units import Force, Length, fault
+from results_schema.errors import BadInput
+
+MAX_POINTS = 50
+MAX_TRACK = 1000
+ALONG = 1e-3  # sine of the angle between track and load below which the load acts along the track
+_HOLDS = {"clamped": DIRECTIONS, "pinned": DIRECTIONS[:3]}
+_GROUP = re.compile(r"\d{1,18}(-\d{1,18})?(,\d{1,18}(-\d{1,18})?)*")
+
+FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
+NodeNumber = Annotated[int, Field(ge=1, lt=10**18)]
+StressRows = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Strict(False), Field(min_length=1, max_length=64)]
+
+
+class NodeTrack(Spec):
+    """Where loads ride: `nodes` in their order, or all nodes near the straight line `from` ... `to`.
+
+    tolerance: m, how far they may stand beside a straight line (0.1 % of its length if not given). direction: in which
+    loads act and deflection counts; along gravity unless given. interpolation: between nodes by their rotations
+    ("rotations"), by a smooth curve through their displacements ("spline"), or by rotations where all have them.
+    """
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    nodes: Annotated[tuple[NodeNumber, ...], Strict(False), Field(min_length=2, max_length=MAX_TRACK)] | None = None
+    start: Place | None = Field(default=None, alias="from")
+    end: Place | None = Field(default=None, alias="to")
+    tolerance: Length | None = Field(default=None, gt=0)
+    direction: Vector | None = None
+    interpolation: Annotated[str, AfterValidator(one_of("auto", "rotations", "spline"))] = "auto"
+
+    @model_validator(mode="after")
+    def _one_way(self) -> NodeTrack:
+        line = (self.start is None, self.end is None)
+        if line != ((True, True) if self.nodes is not None else (False, False)):
+            raise fault("a track is given in one way", expected="nodes = [...], or from = [x, y, z] and to = [x, y, z]")
+        return self
+
+
+class NodePoint(Spec):
+    """A node off the track and a direction (along gravity unless given): for sensors, and shoes of other bodies."""
+
+    node: NodeNumber
+    direction: Vector | None = None
+
+
+class Imported(Body):
+    """Base of bodies out of finite-element files. Paths are from the working folder.
+
+    supports: directions held by node, or by nodes ("1-21", "3,7,9", "all"). length_unit, force_unit: those of the files
+    in m and N. rigid_body_modes: "keep" or "drop" those of a body that nothing holds.
+    """
+
+    derived: ClassVar[tuple[str, ...]] = ("length",)
+    names_files: ClassVar[bool] = True
+    roles: ClassVar[tuple[str, ...]] = ()
+    lacking: ClassVar[Literal["refused", "whole nodes held", "held"]] = "refused"  # what a node has no row for
+
+    track: NodeTrack
+    supports: dict[str, Support] = Field(default_factory=dict)
+    point: dict[str, NodePoint] = Field(default_factory=dict, max_length=MAX_POINTS)
+    gravity_direction: Vector = (0.0, 0.0, -1.0)
+    length_unit: Length = Field(default=1.0, gt=0)
+    force_unit: Force = Field(default=1.0, gt=0)
+    rigid_body_modes: Annotated[str, AfterValidator(one_of("keep", "drop"))] = "keep"
+
+    @property
+    @abstractmethod
+    def request(self) -> Request:
+        """What is to be read."""
+
+    @property
+    def files(self) -> Mapping[str, str]:
+        """The files' paths by their keys."""
+        return {role: str(getattr(self, role)) for role in self.roles if getattr(self, role) is not None}
+
+    @cached_property
+    def model(self) -> FileModel:
+        """The files' matrices and nodes, in the files' units. Raises BadInput."""
+        assert self.recorded is None, "what an archive holds is told without the files of its models"
+        return read_files(self.request)
+
+    @cached_property
+    def line(self) -> NodeLine:
+        """The track's nodes and places, m. Raises BadInput with the key within the track."""
+        places = self.model.places * self.length_unit
+        if self.track.nodes is not None:
+            return line_of_nodes(self.model.nodes, places, self.track.nodes, self.track.tolerance)
+        ends = np.array(self.track.start), np.array(self.track.end)
+        return line_between(self.model.nodes, places, ends, self.track.tolerance)
+
+    @property
+    def length(self) -> float:
+        """Of the track, m."""
+        return self.line.length if self.recorded is None else self.recorded.length
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """The direction in which loads act on the track."""
+        return self.gravity_direction if self.track.direction is None else self.track.direction
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        return ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+
+    @cached_property
+    def content(self) -> str:
+        """SHA-256 of the files, with those that they include."""
+        return self.model.digest
+
+    @property
+    def hashes(self) -> tuple[tuple[str, str], ...]:
+        return self.model.hashes
+
+    @model_validator(mode="after")
+    def _consistent(self, info: ValidationInfo) -> Imported:
+        if self.take(info.context):
+            return self
+        for role, path in self.files.items():
+            if "\0" in path or not Path(path).name:
+                refuse((role,), "not a path of a file", received=shortened(path))
+        files = self.files
+        try:
+            nodes = self.model.nodes
+        except BadInput as error:
+            what = f"{error.where}: {error.what}" if error.where else error.what
+            key: Key = (role_of(error, files),)
+            refuse(key, what, expected=error.expected, received=error.received, remedy=error.remedy)
+        try:
+            line = self.line
+        except BadInput as error:
+            key = ("track", *error.where.split("."))
+            refuse(key, error.what, expected=error.expected, received=error.received, remedy=error.remedy)
+        if np.linalg.norm(np.cross(line.tangent, unit(self.direction))) < ALONG:
+            what, expected = "the load acts along the track", "a direction across the track"
+            refuse(("track", "direction"), what, expected=expected)
+        self._check_track_rows()
+        for group in self.supports:
+            self.group(group)
+        for name, point in self.point.items():
+            if point.node not in nodes:
+                refuse(("point", name, "node"), "there is no such node", received=str(point.node))
+        return self
+
+    def _check_track_rows(self) -> None:
+        """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""
+        if self.lacking == "held":
+            return
+        model = self.model
+        rows = set(zip(model.owner.tolist(), model.direction.tolist(), strict=True))
+        known = set(model.owner.tolist())
+        for node in self.line.nodes.tolist():
+            if self.lacking == "whole nodes held" and node not in known:
+                continue
+            for way, part in enumerate(unit(self.direction).tolist()):
+                if abs(part) > ALONG and (node, way) not in rows:
+                    what = f"node {model.nodes[node]} of the track does not move along {DIRECTIONS[way]} in these files"
+                    refuse(("track",), what, expected="nodes with degrees of freedom along the load")
+
+    def group(self, text: str) -> Counts:
+        """Places in the model's list of the nodes that a key of the supports names. Raises pydantic's errors."""
+        nodes = self.model.nodes
+        if text == "all":
+            return np.arange(len(nodes))
+        plain = text.replace(" ", "")
+        if not _GROUP.fullmatch(plain):
+            expected = 'a node\'s number, "1-21", "3,7,9" or "all"'
+            refuse(("supports", text), "no nodes", expected=expected, received=shortened(text))
+        found = np.zeros(len(nodes), dtype=np.bool_)
+        for part in plain.split(","):
+            low, _, high = part.partition("-")
+            chosen = (nodes >= int(low)) & (nodes <= int(high or low))
+            if not chosen.any():
+                refuse(("supports", text), "there is no such node", received=part)
+            found |= chosen
+        return np.flatnonzero(found)
+
+    def holds(self, text: str) -> tuple[str, ...]:
+        """The directions that an entry of the supports holds."""
+        support = self.supports[text]
+        return _HOLDS[support] if isinstance(support, str) else support
+
+    def checks(self, here: str) -> list[Check]:
+        return []
+
+
+class Recovering(Imported):
+    """Base of bodies that may have a recovery matrix: stresses by the model's displacements (and modal coordinates).
+
+    stress_rows: for each node of the track, in order, the rows (from 1) whose mean is its stress, one per element that
+    meets there; linear in between.
+    """
+
+    recovery: FilePath | None = None
+    stress_rows: Annotated[tuple[StressRows, ...], Strict(False), Field(min_length=2, max_length=MAX_TRACK)] | None = (
+        None
+    )
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        return tuple(word for word in super().untold if word != "stress" or self.stress_rows is None)
+
+    @model_validator(mode="after")
+    def _rows(self) -> Recovering:
+        if (self.recovery is None) != (self.stress_rows is None):
+            key = "recovery" if self.recovery is None else "stress_rows"
+            refuse((key,), "this key is missing", expected="recovery and stress_rows, or none of them")
+        if self.stress_rows is None or self.recorded is not None:
+            return self
+        count, most = len(self.line.nodes), int(self.model.recovery.shape[0])
+        if len(self.stress_rows) != count:
+            expected, received = f"{count} lists, one per node of the track", str(len(self.stress_rows))
+            refuse(("stress_rows",), "not one list per node", expected=expected, received=received)
+        for node, rows in enumerate(self.stress_rows):
+            if max(rows) > most:
+                expected = f"1 to {most}"
+                refuse(("stress_rows", node), "there is no such row", expected=expected, received=str(max(rows)))
+        return self
+
+
+class Matrices(Recovering):
+    """A body of plain files. stiffness, mass: Matrix Market or scipy's sparse NPZ; nodes: CSV of node, x, y, z.
+
+    freedoms: CSV of node, direction for every row of the matrices (x, y, z, rx, ry, rz, or `modal`); otherwise six or
+    three per node in the order of the nodes. What a node lacks counts as held. recovery: a file as those of matrices.
+    """
+
+    roles: ClassVar[tuple[str, ...]] = ("stiffness", "mass", "nodes", "freedoms", "recovery")
+    lacking = "held"
+
+    kind: Literal["matrices"]
+    stiffness: FilePath
+    mass: FilePath
+    nodes: FilePath
+    freedoms: FilePath | None = None
+
+    @property
+    def request(self) -> Request:
+        return Request("matrices", tuple(self.files.items()))
+
+
+class Ansys(Imported):
+    """A body of ANSYS. full: the `.full` file with stiffness and mass; nodes: a `.cdb` or `.rst` file."""
+
+    roles: ClassVar[tuple[str, ...]] = ("full", "nodes")
+
+    kind: Literal["ansys"]
+    full: FilePath
+    nodes: FilePath
+
+    @property
+    def request(self) -> Request:
+        return Request("ansys", tuple(self.files.items()))
+
+
+class Nastran(Recovering):
+    """A body of Nastran. matrices: `.op4`, `.op2`, or punched DMIG; nodes: bulk data, `.asm` or `.op2`.
+
+    stiffness, mass: names of the matrices (kaa and maa, or kxx and mxx, unless given). superelement: of an `.op2` file.
+    recovery: the name of another matrix, such as mes1. A node that the matrices lack counts as held.
+    """
+
+    roles: ClassVar[tuple[str, ...]] = ("matrices", "nodes")
+    lacking = "whole nodes held"
+
+    kind: Literal["nastran"]
+    matrices: FilePath
+    nodes: FilePath
+    stiffness: str = Field(default="", max_length=64)
+    mass: str = Field(default="", max_length=64)
+    superelement: int = Field(default=0, ge=0)
+
+    @property
+    def request(self) -> Request:
+        names = (("stiffness", self.stiffness), ("mass", self.mass), ("recovery", self.recovery or ""))
+        return Request("nastran", tuple(self.files.items()), (*names, ("superelement", self.superelement)))

@@ -1,0 +1,212 @@
+"""The track of an imported body between its nodes: mode shapes, statics, and points beside it.
+
+Between two nodes the deflection is the cubic of both values and slopes (mechanics section 1). Slopes are the nodes'
+rotations about the axis across track and load; or those of the C2 spline through the values (not-a-knot), where the
+model has none. Either way value and slope are linear in the model's displacements u: z = B u. A load on the track acts
+through the same B, so that w(x; s) = h(x)^T B G B^T h(s), G the whole model's flexibility, h the cubics: what a direct
+solve with this interpolation gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from engine.bodies.frame.track import track_places
+from engine.bodies.modal.modal_body import Array
+from engine.kernels.shapes import combined_rows
+from results_schema.errors import BadInput
+
+# Of value and slope at the left end, then at the right one: coefficients of x^0 to x^3 on [0, 1].
+_CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+_ENDS = 4
+
+
+def cubics(places: Array, s: ArrayLike, derivative: int) -> tuple[Any, Array]:
+    """Which of the (2 P) values and slopes, value and slope by node, act at the stations (S,): numbers (S, 4) and
+    weights (S, 4) of d^j/ds^j; at a node from the right."""
+    at = track_places(s, float(places[-1]), derivative)
+    left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
+    length = np.diff(places)[left]
+    x = np.clip((at - places[left]) / length, 0.0, 1.0)
+    table, powers = _CUBIC, np.arange(4)
+    for _ in range(derivative):
+        table, powers = (table * powers)[:, 1:], powers[:-1]
+    weights = np.zeros((_ENDS, len(at)))
+    for coefficients in table.T[::-1]:
+        weights = weights * x + coefficients[:, None]
+    weights *= length ** (np.arange(_ENDS)[:, None] % 2 - derivative)
+    return 2 * left[:, None] + np.arange(_ENDS), weights.T
+
+
+@dataclass(frozen=True, eq=False)
+class LineShapes:
+    """Shapes of N modes: values and slopes (2 P, N) at places (P,), m; unit modal mass."""
+
+    places: Array
+    ends: Array
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N); at a node from the right."""
+        parts = [cubics(self.places, s, order) for order in orders]
+        found = np.empty((len(orders), len(parts[0][0]), self.ends.shape[1]))
+        combined_rows(parts[0][0], np.stack([weights for _, weights in parts]), self.ends, found)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class LineStatics:
+    """Influence functions along a track: flexibility (2 P, 2 P) between values and slopes at places (P,); weight
+    (2 P,): the same under own weight per unit gravity; rigid: number of rigid-body modes."""
+
+    places: Array
+    flexibility: Array
+    weight: Array
+    rigid: int
+
+    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
+        return self.influence_at(np.atleast_1d(x)[:, None], np.atleast_1d(s)[None, :], derivative)
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """The same for pairs, `x` and `s` broadcast against each other; summed in a fixed order."""
+        place, load = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(s))
+        taken, takes = cubics(self.places, place.reshape(-1), derivative)
+        acting, acts = cubics(self.places, load.reshape(-1), 0)
+        found: Array = np.zeros(place.size)
+        for one in range(_ENDS):
+            for other in range(_ENDS):
+                found += takes[:, one] * acts[:, other] * self.flexibility[taken[:, one], acting[:, other]]
+        return found.reshape(place.shape)
+
+    def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) under own weight per unit gravity, m^(1-j)/(m/s^2)."""
+        self.refuse_loose()
+        return self.under(self.weight, x, derivative)
+
+    def under(self, ends: Array, x: ArrayLike, derivative: int) -> Array:
+        """(X,) d^j/dx^j of the deflection where values and slopes are `ends` (2 P,)."""
+        numbers, weights = cubics(self.places, x, derivative)
+        return np.asarray(np.sum(weights * ends[numbers], axis=1))
+
+    def refuse_loose(self) -> None:
+        """Raise BadInput for a body that no static state can carry."""
+        if self.rigid:
+            what, received = (
+                "own weight of a body that is free to move as a rigid one",
+                f"{self.rigid} rigid-body mode(s)",
+            )
+            raise BadInput(what, where="supports", expected="supports that hold the body", received=received)
+
+
+class NoSections:
+    """An imported body has no section forces, and without a recovery matrix no stress."""
+
+    def rows(self, quantity: str, s: ArrayLike) -> Array:
+        """Raises BadInput."""
+        self._refuse(quantity)
+
+    def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """Raises BadInput."""
+        self._refuse(quantity)
+
+    def own_weight(self, quantity: str, x: ArrayLike) -> Array:
+        """Raises BadInput."""
+        self._refuse(quantity)
+
+    def under_point(self, quantity: str, number: int, x: ArrayLike) -> Array:
+        """Raises BadInput."""
+        self._refuse(quantity)
+
+    def _refuse(self, quantity: str) -> NoReturn:
+        what, expected = f"an imported body tells no {quantity}", "displacement, velocity or acceleration"
+        raise BadInput(what, where="sensor", expected=expected)
+
+
+@dataclass(frozen=True, eq=False)
+class LineStress(NoSections):
+    """Stress at the nodes of a track, linear in between: of N modes, values (P, N); per unit value and slope loads,
+    response (P, 2 P); under own weight per unit gravity, weight (P,); per unit force at points, points (P, Q)."""
+
+    statics: LineStatics
+    values: Array
+    response: Array
+    weight: Array
+    points: Array
+
+    def rows(self, quantity: str, s: ArrayLike) -> Array:
+        """Stress of every mode at the stations `s` (S,), as (S, N). Raises BadInput for another quantity."""
+        return self._along(quantity, s, self.values)
+
+    def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """Stress at `x` per unit force at `s`, for pairs that are broadcast against each other."""
+        place, load = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(s))
+        left, share = self._between(quantity, place.reshape(-1))
+        acting, acts = cubics(self.statics.places, load.reshape(-1), 0)
+        found: Array = np.zeros(place.size)
+        for end in range(_ENDS):
+            column = acting[:, end]
+            stress = (1.0 - share) * self.response[left, column] + share * self.response[left + 1, column]
+            found += acts[:, end] * stress
+        return found.reshape(place.shape)
+
+    def own_weight(self, quantity: str, x: ArrayLike) -> Array:
+        """Stress at `x` (X,) under the body's own weight, per unit gravity."""
+        self.statics.refuse_loose()
+        return self._along(quantity, x, self.weight[:, None])[:, 0]
+
+    def under_point(self, quantity: str, number: int, x: ArrayLike) -> Array:
+        """Stress at `x` (X,) per unit force at a point."""
+        return self._along(quantity, x, self.points[:, [number]])[:, 0]
+
+    def _along(self, quantity: str, x: ArrayLike, values: Array) -> Array:
+        left, share = self._between(quantity, x)
+        return np.asarray((1.0 - share[:, None]) * values[left] + share[:, None] * values[left + 1])
+
+    def _between(self, quantity: str, x: ArrayLike) -> tuple[Any, Array]:
+        """The node left of every place (X,), and how far towards the next one it lies."""
+        if quantity != "stress":
+            self._refuse(quantity)
+        places = self.statics.places
+        at = track_places(x, float(places[-1]))
+        left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
+        return left, (at - places[left]) / np.diff(places)[left]
+
+
+@dataclass(frozen=True, eq=False)
+class LinePoints:
+    """Points by name: shapes (Q, N), kg^(-1/2); flexibility (Q, Q), m/N; response (2 P, Q) of the track's values and
+    slopes to a unit force at each; weight (Q,): motion under own weight per unit gravity."""
+
+    numbers: Mapping[str, int]
+    shapes: Array
+    flexibility: Array
+    response: Array
+    weight: Array
+    statics: LineStatics
+    sections: NoSections
+
+    def row(self, name: str) -> Array:
+        """(N,) what every mode moves a point by."""
+        return np.asarray(self.shapes[self.numbers[name]])
+
+    def influence(self, name: str, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) of the track per unit force at a point."""
+        return self.statics.under(self.response[:, self.numbers[name]], x, derivative)
+
+    def section_influence(self, quantity: str, name: str, x: ArrayLike) -> Array:
+        """Stress at `x` (X,) of the track per unit force at a point. Raises BadInput for other quantities."""
+        return self.sections.under_point(quantity, self.numbers[name], x)
+
+    def between(self, name: str, other: str) -> float:
+        """Motion of a point per unit force at another one, m/N."""
+        return float(self.flexibility[self.numbers[name], self.numbers[other]])
+
+    def own_weight(self, name: str) -> float:
+        """Motion of a point under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
+        self.statics.refuse_loose()
+        return float(self.weight[self.numbers[name]])

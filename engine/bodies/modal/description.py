@@ -1,0 +1,109 @@
+"""What all bodies share, as the user describes them: damping, number of modes, own weight."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import Field, PrivateAttr, Strict, Tag
+
+from engine.study_file.checks import Check
+from engine.study_file.document import Beside
+from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form
+from engine.study_file.units import Dimensionless, Rate, Time
+
+MAX_MODES = 64
+AUTO_MODES = 12
+
+
+class Rayleigh(Spec):
+    """Damping a M + b K, a in 1/s and b in s: mode k has the ratio a/(2 omega_k) + b omega_k/2."""
+
+    rayleigh: Annotated[tuple[Annotated[Rate, Field(ge=0)], Annotated[Time, Field(ge=0)]], Strict(False)]
+
+
+Ratio = Annotated[Dimensionless, Field(ge=0, lt=1)]
+Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
+DampingRatio = Annotated[
+    Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
+]
+Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
+
+
+@dataclass(frozen=True)
+class Recorded(Beside):
+    """What an archive tells of a body that is made of files, so that they need not be read. length: of the track, m."""
+
+    length: float
+
+
+class Body(Spec):
+    """Base of all bodies: a track of some length along which loads ride.
+
+    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. modes: how many are kept. own_weight:
+    gravity acts on the body too, and deflections count from the unstressed state. names_files: whether it is made of
+    files.
+    """
+
+    names_files: ClassVar[bool] = False
+    _recorded: Recorded | None = PrivateAttr(default=None)
+
+    damping_ratio: DampingRatio = 0.0
+    modes: Modes = "auto"
+    own_weight: bool = False
+
+    @property
+    def recorded(self) -> Recorded | None:
+        """What an archive tells of it, where it comes from one: then there are no files to read."""
+        return self._recorded
+
+    def take(self, context: object) -> bool:
+        """Take what stands beside the table, where it comes from an archive; whether there was something."""
+        self._recorded = context if isinstance(context, Recorded) else None
+        return self._recorded is not None
+
+    @abstractmethod
+    def checks(self, here: str) -> list[Check]:
+        """Conditions between the numbers of this body at the dotted key `here`."""
+
+    @property
+    def lacks_for_stress(self) -> str:
+        """The key within the body that stress and strain need and that is not given, or ""."""
+        return ""
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Quantities that no sensor can read on this body."""
+        return ()
+
+    @property
+    def content(self) -> str:
+        """What tells apart the contents of a file that the body names; "" where it names none."""
+        return ""
+
+    @property
+    def modes_are_open(self) -> bool:
+        """Whether the number of its modes is chosen by the tolerance."""
+        return False
+
+    def with_modes(self, count: int) -> Self:
+        """The same body with so many modes; those beyond a list of damping ratios have its last one."""
+        changes: dict[str, Any] = {"modes": min(count, MAX_MODES)}
+        if isinstance(self.damping_ratio, tuple):
+            missing = max(0, changes["modes"] - len(self.damping_ratio))
+            changes["damping_ratio"] = self.damping_ratio + self.damping_ratio[-1:] * missing
+        return self.model_copy(update=changes)
+
+    def with_more_modes(self, times: int) -> Self:
+        """The same body with so many times its modes, as far as it has them."""
+        return self.with_modes(times * (AUTO_MODES if self.modes == "auto" else int(self.modes)))
+
+    @property
+    def hashes(self) -> tuple[tuple[str, str], ...]:
+        """Path and SHA-256 of every file that the body is made of."""
+        return ()
+
+    def dampers(self) -> list[tuple[str, float | str, float]]:
+        """Discrete dampers: key within the body, place on the track (m) or a point's name, coefficient (N s/m)."""
+        return []

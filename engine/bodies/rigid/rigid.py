@@ -1,0 +1,44 @@
+"""A rigid body as the user describes it: it rises, falls and pitches, and does not bend."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from engine.bodies.modal.description import Body
+from engine.study_file.checks import Check, on_body
+from engine.study_file.units import Inertia, Length, Mass
+
+
+class Rigid(Body):
+    """A rigid body: a vehicle or a table on its contacts.
+
+    length: of its track, m. mass: kg. inertia: kg m2, of pitch about its centre of mass. centre: m along its track,
+    the middle if not given.
+    """
+
+    kind: Literal["rigid"]
+    length: Length = Field(gt=0)
+    mass: Mass = Field(gt=0)
+    inertia: Inertia = Field(gt=0)
+    centre: Length | None = None
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        return ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+
+    @property
+    def centre_of_mass(self) -> float:
+        """m along its track."""
+        return 0.5 * self.length if self.centre is None else self.centre
+
+    def with_modes(self, count: int) -> Rigid:
+        """Itself: it has no modes that bend."""
+        return self
+
+    def checks(self, here: str) -> list[Check]:
+        if self.centre is None:
+            return []
+        where = f"{here}.centre"
+        return [on_body(where, (where, f"{here}.length"), "a centre of mass off the body")]

@@ -1,0 +1,75 @@
+"""The state of a scene at time 0: undeformed and at rest, or in static equilibrium."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import State
+from engine.model.attachment import rows
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.track import rate_rows
+from engine.model.variant_values import LaneTable
+from engine.statics.equilibrium import StaticState, static_state
+
+Array = NDArray[np.float64]
+
+NOW = 1e-12  # of a rider's time: an event so early is that of time 0
+
+
+def initial_state(model: SceneModel, lanes: LaneTable) -> State:
+    """Modal state at time 0, (blocks, N, LANES): undeformed and at rest, or the static equilibrium under the weights
+    at their first places. Coordinates count from the body's own sag where its weight acts."""
+    shape = lanes.rates.shape
+    q, v = np.zeros(shape), np.zeros(shape)
+    for part in model.bodies:
+        if part.own_weight and model.study.start == "rest":
+            sag = part.modal.participation / part.modal.omega**2
+            q[:, part.modes] = -sag[:, None] * lanes.gravity[:, None]
+    along = _first_places(model)
+    if model.study.start == "equilibrium":
+        found, count = _coordinates(model, along, static_state(model, along)), len(model.carriages)
+        for load in range(count):
+            q += found[:, load, None] * lanes.weight[:, load, None]
+        q += found[:, count, None] * lanes.gravity[:, None]
+    _meet(model, lanes, along, (q, v))
+    return State(q, v, np.zeros(shape), np.zeros(shape))
+
+
+def _first_places(model: SceneModel) -> tuple[Way, ...]:
+    """Where all riders are at time 0, and their speed per unit of scene time."""
+    found = []
+    for rider in model.riders:
+        change = min(time for time in rider.events() if time > NOW * rider.end)
+        path = rider.path(np.zeros(1), 0.0, change)
+        found.append(Way(np.clip(path.S, 0.0, rider.length), path.dS, path.ddS, rider.touches(0.0, change)))
+    return tuple(found)
+
+
+def _coordinates(model: SceneModel, along: tuple[Way, ...], state: StaticState) -> Array:
+    """(N, L) static modal coordinates per unit weight of each carriage and per unit gravity."""
+    found = np.zeros((model.omega.size, state.force.shape[2]))
+    for r, grips in enumerate(model.grips):
+        for grip in grips:
+            if grip.rider is None or along[grip.rider].active:
+                part = model.bodies[grip.body]
+                soft = grip.factor * rows(model, grip, along)[0] * part.modal.modal_flexibility
+                found[part.modes] += soft[:, None] * state.force[0, r]
+    found[state.loose] = state.coordinate[0]
+    return found
+
+
+def _meet(model: SceneModel, lanes: LaneTable, along: tuple[Way, ...], state: tuple[Array, Array]) -> None:
+    """Speeds at which bodies on rigid joints follow the track from the first instant, while that is at rest like under
+    a rigid mass: the smallest ones,  y' = v (v.v)^-1 s' (phi'.q + sag')."""
+    joints = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.rigid]
+    if not joints:
+        return
+    q, v = state
+    rows, slope, sag = rate_rows(model, joints, along)
+    for place, r in enumerate(joints):
+        rows[model.bodies[model.grips[r][0].body].modes, place] = 0.0
+    rate = np.einsum("kr,bkj->rbj", slope, q) + sag[:, None, None] * lanes.gravity
+    pull = np.linalg.lstsq(rows.T @ rows, (rate / lanes.time_scale).reshape(len(joints), -1), rcond=None)[0]
+    v -= np.einsum("kr,rbj->bkj", rows, pull.reshape(rate.shape))

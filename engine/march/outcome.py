@@ -1,0 +1,315 @@
+"""From what a march observed to the numbers of each variant: extremes, places, statuses, the study's own reduction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import (
+    BELOW_AT,
+    DIVERGED_AT,
+    LARGEST,
+    LARGEST_AT,
+    SECONDS,
+    SMALLEST,
+    SMALLEST_AT,
+    SQUARES,
+)
+from engine.kernels.schemes import Scheme
+from engine.march.cycles import reduced
+from engine.march.envelopes import MOST_KEPT, envelope_names
+from engine.march.march import Marched
+from engine.march.richardson import march_chosen
+from engine.march.tables import SceneTables
+from engine.model.scene_model import SceneModel
+from engine.model.timeline import Window
+from engine.model.variant_values import LaneValues, weights
+from engine.observation.contact_forces import contact_forces
+from engine.observation.histories import counts_reduced
+from engine.observation.reduction import Reduction
+from engine.observation.signals import silent
+from engine.scene.study import Study
+from results_schema.status import Fidelity, SchemeUsed, Status
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+STILL = 1e-6  # of the usual reading on its body: a static reading below, as on a support, is rounding (1e-12 at most)
+
+Flat = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations."""
+
+    study: Study
+    reduction: Reduction | None
+    window: Window
+    accelerated: bool = False
+
+    @property
+    def keeps_histories(self) -> bool:
+        """Whether histories of the sensors are a result."""
+        return self.study.output.histories != "none"
+
+    @property
+    def least_fidelity(self) -> Fidelity:
+        """The lowest model that tells these results: statics have no accelerations, and nothing that only motion
+        makes."""
+        if self.accelerated:
+            return Fidelity.FORCE
+        return Fidelity.STATIC if self.reduction is None else self.reduction.least_fidelity
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What V variants report by one march: numbers (V, ...) by name, histories (H, S, V) of all signals at the stations
+    that were asked for, statuses and the first diverged steps (V,), and (V, J) what errors of the sensors are divided
+    by, infinite for those that read but rounding."""
+
+    numbers: Flat
+    history: Array
+    status: NDArray[np.int8]
+    diverged_step: Counts
+    scale: Array
+
+    def of(self, lanes: Counts | NDArray[np.bool_]) -> Outcome:
+        """Some of the variants."""
+        numbers = {name: array[lanes] for name, array in self.numbers.items()}
+        return Outcome(
+            numbers, self.history[..., lanes], self.status[lanes], self.diverged_step[lanes], self.scale[lanes]
+        )
+
+    def replaced(self, lanes: Counts, other: Outcome) -> Outcome:
+        """The same with the outcome of other marches for some of the variants, at the same stations."""
+        found = Outcome(
+            {name: array.copy() for name, array in self.numbers.items()},
+            self.history.copy(),
+            self.status.copy(),
+            self.diverged_step.copy(),
+            self.scale.copy(),
+        )
+        for name, array in found.numbers.items():
+            array[lanes] = other.numbers[name]
+        found.history[..., lanes] = other.history
+        found.status[lanes], found.diverged_step[lanes] = other.status, other.diverged_step
+        found.scale[lanes] = other.scale
+        return found
+
+
+def outcome(
+    asked: Asked,
+    tables: SceneTables,
+    values: LaneValues,
+    stations: Counts,
+    halted: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
+    own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
+    counts = np.unique(np.concatenate([own, stations, *(side.counts for side in tables.kinks)]))
+    lanes, size = values.padded, values.size
+    marched = march_chosen(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
+    history = marched.history[np.searchsorted(counts, stations)]
+    reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
+    numbers = {
+        **_extremes(tables, marched, counts),
+        **_contact_forces(tables, marched),
+        **_envelopes(tables, lanes, size, halted),
+        **_statics(tables, values),
+        **reduced(asked.reduction, tables, values, own, reduction),
+    }
+    status, diverged_step = _status(tables.model, marched)
+    for array in numbers.values():
+        if array.dtype == np.float64:
+            array[status >= Status.NOT_CONVERGED] = np.nan
+    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
+
+
+def used(tables: SceneTables, size: int) -> Flat:
+    """What so many variants were computed with, by the names of the archive."""
+    marched = 0 if _rests(tables) else tables.steps
+    modes = 0 if _knows_all(tables) else tables.model.body_modes
+    return {
+        "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
+        "scheme_used": np.full(size, int(number_of(tables.model.scheme)), dtype=np.int8),
+        "modes_used": np.full(size, modes, dtype=np.int32),
+        "steps_used": np.full(size, marched, dtype=np.int32),
+        "work": np.full(size, float(marched * tables.model.body_modes)),
+    }
+
+
+def number_of(scheme: Scheme) -> SchemeUsed:
+    """A scheme as archives number it."""
+    return SchemeUsed[scheme.name.upper().replace("-", "_")]
+
+
+def _knows_all(tables: SceneTables) -> bool:
+    """Whether these are statics of the whole body, whatever modes it keeps."""
+    return _rests(tables) and tables.model.numerics.static_correction
+
+
+def _rests(tables: SceneTables) -> bool:
+    """Whether nothing is marched."""
+    return tables.model.fidelity is Fidelity.STATIC
+
+
+def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
+    """Largest and smallest value of every sensor, where the first carriage was then, and the root mean square."""
+    found: Flat = {}
+    for side in tables.kinks:
+        reading = np.tensordot(side.weights, marched.history[np.searchsorted(counts, side.counts), side.sensor], 1)
+        _include(marched.marks[side.sensor], reading, side.at)
+    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
+        marks = marched.marks[j]
+        seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
+        found[f"{sensor.name}_max"] = np.where(seen, marks[LARGEST], np.nan)
+        found[f"{sensor.name}_min"] = np.where(seen, marks[SMALLEST], np.nan)
+        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, marks[LARGEST_AT])
+        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, marks[SMALLEST_AT])
+        found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / np.where(marks[SECONDS] > 0.0, marks[SECONDS], 1.0))
+    return found
+
+
+def _include(marks: Array, reading: Array, at: float) -> None:
+    """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
+    for value, place, beyond in ((LARGEST, LARGEST_AT, np.greater), (SMALLEST, SMALLEST_AT, np.less)):
+        more = beyond(reading, marks[value])
+        marks[value], marks[place] = np.where(more, reading, marks[value]), np.where(more, at, marks[place])
+
+
+def _envelopes(own: SceneTables, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:
+    """(V, places) largest and smallest values of every envelope, from marches that watch its places alone."""
+    found: dict[str, list[Array]] = {name: [] for name in envelope_names(own.model.study)}
+    nothing = np.zeros(0, dtype=np.int64)
+    for tables in own.companions:
+        marched = march_chosen(tables, values, nothing, size, halted)
+        for j, place in enumerate(tables.sensors):
+            for end, mark in (("max", LARGEST), ("min", SMALLEST)):
+                found[f"{place.name}_envelope_{end}"].append(marched.marks[j, mark])
+        if len(own.companions) > MOST_KEPT:
+            tables.forget()
+    return {name: np.stack(readings, axis=1) for name, readings in found.items()}
+
+
+def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
+    """Extremes of every contact force, and where it first was negative."""
+    found: Flat = {}
+    for c, carriage in enumerate(tables.model.carriages):
+        marks = marched.marks[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
+        seen = (marks[:, LARGEST_AT] >= 0.0).any(axis=0)
+        least = np.argmin(marks[:, SMALLEST], axis=0)[None]  # where a contact never counts, its smallest is infinite
+        found[f"{carriage.name}_contact_force_max"] = np.where(seen, marks[:, LARGEST].max(axis=0), np.nan)
+        found[f"{carriage.name}_contact_force_min"] = np.where(seen, marks[:, SMALLEST].min(axis=0), np.nan)
+        place = tables.timeline.positions(c, np.take_along_axis(marks[:, SMALLEST_AT], least, axis=0)[0])
+        found[f"{carriage.name}_contact_force_min_position"] = place
+        opened = _opened_at(tables, marched, c)
+        found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
+    return found
+
+
+def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
+    """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
+    contacts = _contacts_of(tables.model, carriage)
+    if not tables.model.reacts(carriage):
+        return np.full(marched.marks.shape[-1], -1.0)
+    after = [len(tables.sensors) + number for number in contacts]
+    below = np.concatenate([marched.guard[contacts, BELOW_AT], marched.marks[after, BELOW_AT]])
+    first = np.min(np.where(below >= 0.0, below, np.inf), axis=0)
+    return np.asarray(np.where(np.isfinite(first), first, -1.0))
+
+
+def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
+    """Numbers of the contact forces of a carriage among all contact forces."""
+    return [number for number, force in enumerate(contact_forces(model)) if force.carriage == carriage]
+
+
+def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
+    """Status of every variant, and the first step at which it had diverged, or -1."""
+    bad = np.concatenate([marched.marks[:, DIVERGED_AT], marched.guard[:, DIVERGED_AT]])
+    first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
+    diverged = np.isfinite(first) | ~marched.finite
+    sensors = len(marched.marks) - len(marched.guard)
+    reacting = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
+    below = np.concatenate(
+        [marched.marks[[sensors + c for c in reacting], BELOW_AT], marched.guard[reacting, BELOW_AT]]
+    )
+    separated = (below >= 0.0).any(axis=0)
+    status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))
+    status = np.where(diverged, np.int8(Status.DIVERGED), status).astype(np.int8)
+    return status, np.where(np.isfinite(first), first, -1.0).astype(np.int64)
+
+
+def _statics(tables: SceneTables, values: LaneValues) -> Flat:
+    """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
+    unit = tables.static_over_window
+    loads, gravity = weights(tables.model, values), values.gravity
+    found: Flat = {}
+    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
+        if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
+            found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
+        else:
+            found[f"{sensor.name}_static"] = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
+    return found
+
+
+def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -> Array:
+    """(V,) largest |sum of unit readings times weights + offset times gravity|, in pieces of variants."""
+    found = np.empty(gravity.size)
+    for first in range(0, gravity.size, 1024):
+        part = slice(first, first + 1024)
+        reading = offset[:, None] * gravity[part]
+        for r in range(loads.shape[0]):
+            reading = reading + force[:, r, None] * loads[r, part]
+        found[part] = np.abs(reading).max(axis=0)
+    return found
+
+
+def _scale(tables: SceneTables, values: LaneValues, numbers: Flat) -> Array:
+    """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body; of a rate its
+    own largest; infinite where nothing is but rounding."""
+    columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
+    count = len(tables.model.study.sensor)
+    for sensor, usual in zip(tables.sensors[:count], tables.static_scales, strict=False):
+        static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
+        own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
+        columns.append(own if sensor.offset_order else np.maximum(static, STILL * usual * weight))
+    found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
+    found[:, silent(tables.model, tables.sensors[:count])] = np.inf
+    return np.where(found > 0.0, found, np.inf)
+
+
+def histories(tables: SceneTables, values: LaneValues, counts: Counts, halted: Callable[[], bool]) -> dict[str, Array]:
+    """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
+    marched = march_chosen(tables, values.padded, counts, values.size, halted)
+    time_scale = values.time_scale(tables.model.carriages[0].name)
+    arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
+    for j, sensor in enumerate(tables.sensors):
+        arrays[sensor.name] = marched.history[:, j].T
+    for c, carriage in enumerate(tables.model.carriages):
+        path = tables.timeline.motion(c, counts.astype(np.float64))
+        arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], values.size, axis=0)
+        arrays[f"{carriage.name}_speed"] = path.dS / time_scale[:, None]
+        arrays[f"{carriage.name}_acceleration_along"] = path.ddS / time_scale[:, None] ** 2
+    status, _ = _status(tables.model, marched)
+    for name, array in arrays.items():
+        if name != "elapsed":
+            array[status >= Status.NOT_CONVERGED] = np.nan
+    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+
+
+def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
+    """(V, H) seconds since time 0 of stations by their count."""
+    timeline = tables.timeline
+    index, tau = timeline.moments(counts.astype(np.float64))
+    found = tau * time_scale[:, None]
+    free = np.array([segment.free for segment in timeline.segments])[index]
+    if free.any():
+        start = next(segment.first for segment in timeline.segments if segment.free)
+        steps = timeline.steps - start
+        rest = (counts - start) * (tables.free_seconds / steps)
+        found = found + np.where(free, rest, 0.0)
+    return found

@@ -1,0 +1,122 @@
+"""The lowest rung: every carriage so slow that nothing moves but the loads. Static readings stand for a march.
+
+What is read anywhere is exact for the model, as influence lines are; nothing is stepped, so a variant costs next to
+nothing and has neither lag nor vibration.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import (
+    BELOW_AT,
+    LARGEST,
+    LARGEST_AT,
+    MARKS,
+    SECONDS,
+    SMALLEST,
+    SMALLEST_AT,
+    SQUARES,
+)
+from engine.march.march import Marched
+from engine.march.tables import SceneTables
+from engine.model.station_path import Way
+from engine.model.variant_values import LaneValues, weights
+from engine.observation.contact_forces import ContactForce, ContactSensor
+from engine.observation.readings import Sensor
+from engine.observation.signals import Signal
+from engine.statics.static_response import static_readings
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+MOST_READINGS = 2**22  # stations x signals x variants at a time
+
+
+def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int, sampled: int | None = None) -> Marched:
+    """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
+    first ``sampled`` signals, or of the sensors, at stations by their count."""
+    model, signals = tables.model, tables.signals
+    loads = np.stack([*weights(model, values), values.gravity])[:, :size]
+    at = tables.static_counts
+    unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
+    distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
+    marks = np.zeros((len(signals), MARKS, distinct.shape[1]))
+    piece = max(1, MOST_READINGS // unit[:, :, 0].size)
+    for first in range(0, distinct.shape[1], piece):
+        part = slice(first, first + piece)
+        marks[:, :, part] = _marks(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
+    marks = marks[:, :, inverse.reshape(-1)]
+    sensors = len(tables.sensors)
+    time_scale = values.time_scale(model.carriages[0].name)[:size]
+    marks[:sensors, SQUARES], marks[:sensors, SECONDS] = _squares(tables, loads, time_scale)
+    guard = np.full((len(signals) - sensors, MARKS, size), -1.0)
+    shown = sensors if sampled is None else sampled
+    history = np.zeros((counts.size, shown, size))
+    if counts.size:
+        here = _counted(tables, signals[:shown], tables.ways_at(counts))[:, :, None]
+        found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
+        history = np.where(here, found, np.nan)
+    return Marched(marks, guard, history, np.ones(size, dtype=np.bool_))
+
+
+def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
+    """(S, J, C + 1) readings of all signals per unit weight of each carriage, and last per unit gravity."""
+    model = tables.model
+    readers = [signal if isinstance(signal, Sensor) else _reader(tables, signal) for signal in tables.signals]
+    return static_readings(model, readers, tables.ways_at(counts))
+
+
+def _reader(tables: SceneTables, contact: ContactForce) -> Sensor:
+    """A contact force as a sensor."""
+    body, carriage = tables.model.carriages[contact.carriage].body, contact.carriage
+    return ContactSensor("", "contact_force", body, 0.0, carriage, carriage, contact.contact)
+
+
+def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Flags:
+    """(S, J) where each signal reads anything."""
+    found = []
+    for signal in signals:
+        rider, counts = signal.rides(tables.model), signal.counted(tables.model, along)
+        here = None if rider is None else along[rider].here
+        found.append(counts if here is None else counts & here)
+    return np.stack(found, axis=1)
+
+
+def _marks(readings: Array, counted: Flags, at: Array) -> Array:
+    """(J, MARKS, V) of readings (S, J, V) at stations by their count (S,)."""
+    found = np.full((readings.shape[1], MARKS, readings.shape[2]), -1.0)  # none has diverged
+    seen = counted[:, :, None]
+    for value, where, sign in ((LARGEST, LARGEST_AT, 1.0), (SMALLEST, SMALLEST_AT, -1.0)):
+        signed = np.where(seen, sign * readings, -np.inf)
+        place = np.argmax(signed, axis=0)
+        found[:, value] = sign * np.take_along_axis(signed, place[None], axis=0)[0]
+        found[:, where] = np.where(np.asarray(counted.any(axis=0))[:, None], at[place], -1.0)
+    below: Flags = np.logical_and(seen, readings < 0.0)
+    found[:, BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
+    return found
+
+
+def _squares(tables: SceneTables, loads: Array, time_scale: Array) -> tuple[Array, Array]:
+    """(J, V) integrals over time of the sensors' squared readings, and the time in which they count, s.
+
+    Between two of the stations nothing jumps, so the driven part is summed over the middles between them; in free
+    vibration all stand where they stopped. Readings are linear in the loads (L, V), so their squares are loads Q loads
+    with one matrix Q for all variants, which differ in their pace.
+    """
+    at, timeline, sensors = tables.static_counts, tables.timeline, len(tables.sensors)
+    parts = [(0.5 * (at[:-1] + at[1:]), np.diff(timeline.moments(at)[1]), time_scale)]
+    parked = [segment for segment in timeline.segments if segment.free and segment.recorded]
+    if parked:
+        parts.append((np.array([parked[0].first + 0.5]), np.ones(1), np.full_like(time_scale, tables.free_seconds)))
+    squares, seconds = np.zeros((sensors, time_scale.size)), np.zeros((sensors, time_scale.size))
+    for counts, lengths, scale in parts:
+        weight = _counted(tables, tables.signals[:sensors], tables.ways_at(counts)) * lengths[:, None]
+        unit = _unit(tables, counts)[:, :sensors]
+        products = np.einsum("sj,sjl,sjm->jlm", weight, unit, unit, optimize=True)
+        for row, load in zip(np.moveaxis(products, 1, 0), loads, strict=True):
+            squares += (row @ loads) * load * scale
+        seconds += weight.sum(axis=0)[:, None] * scale
+    return np.maximum(squares, 0.0), seconds

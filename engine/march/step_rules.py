@@ -1,0 +1,245 @@
+"""The steps that a march must take whatever its accuracy, and what is refused where the study fixes fewer.
+
+Three rules: a conditionally stable scheme stays inside its limit; the highest mode under a moving mass must not
+resonate with the march (the alias rule, mechanics section 7.2); no step is longer than a period of a contact on its
+spring. With the mass held by nothing and the contact by the kept modes alone, spring k swings at
+omega_c^2 = k (1/m + 1/m_c),  1/m_c = mu/(1 + m_w mu),  mu = largest sum of phi^2 along the track: no frequency of the
+coupled scene exceeds (omega_N^2 + sum omega_c^2)^1/2. A body on its contacts has sum v^2, its own mobility there, in
+place of 1/m. Where a step is many contact periods long, the tie is as good as rigid at position level and the march may
+grow: measured at omega_c h = 200, 6e5 times per passage with average acceleration, 2.8e3 times with HHT-alpha -0.02, at
+most 1.4 with -0.05. Up to omega_c h = 2 pi it was 1.3 at most.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.schemes import Scheme
+from engine.model.scene_model import SceneModel
+from engine.model.ties import CarriageTie, SpringTie
+from engine.model.variant_values import LaneValues
+from results_schema.errors import BadInput
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+FREE_STEPS = 200  # per first period of free vibration where the study fixes the steps: 8e-5 of phase a period
+LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit, which a mass on it lowers a little
+# Steps must be so many times the alias rule's. Right above the rule average acceleration still grows by up to 1.23 per
+# passage in narrow bands, conditionally stable schemes by 10 to 7000; from here on by 1.12 or less (rarely 1.18).
+LEAST_MARGIN = 1.1
+MOST_STEPS = 100_000_000  # over one passage or cycle: a variant of so many takes minutes
+SLOWEST = 200  # steps per first period that a study whose steps are open must be able to take within that
+TRACK_PLACES = 257  # along the track, at which the mobility is looked for: four in a wave of 64 modes
+ALIAS_CELL = 0.01  # of a time scale: the alias rule is solved once for variants that are no further apart
+
+
+def least_steps(model: SceneModel, values: LaneValues) -> Array:
+    """(V,) the fewest steps per unit of scene time that a march may take whatever its accuracy: inside the scheme's
+    stability limit, by the alias rule, and none longer than a period of a contact on its spring."""
+    scale = values.time_scale(model.carriages[0].name)
+    found = limit_steps(model, float(model.omega.max()), scale)
+    found = np.maximum(found, LEAST_MARGIN * _alias(model, scale))
+    if model.springs:
+        found = np.maximum(found, model.scheme.stride * contact_omega(model, values) * scale / (2.0 * np.pi))
+        if np.isfinite(model.scheme.stability_limit):
+            found = np.maximum(found, LIMIT_MARGIN * limit_with_springs(model, values))
+    return found
+
+
+def _alias(model: SceneModel, scale: Array) -> Array:
+    """(V,) steps of the alias rule, of time scales rounded up: they rise with it."""
+    if model.scheme.is_damped:
+        return np.zeros_like(scale)
+    cells, inverse = np.unique(np.ceil(np.log(scale) / ALIAS_CELL), return_inverse=True)
+    return np.asarray(alias_steps(model, np.exp(ALIAS_CELL * cells))[inverse.reshape(-1)])
+
+
+def limit_steps(model: SceneModel, highest: float, time_scale: Array) -> Array:
+    """(V,) steps that stay inside the scheme's stability limit with a highest frequency, rad/s; 0 without a limit."""
+    return np.asarray(LIMIT_MARGIN * highest * time_scale / model.scheme.stability_limit)
+
+
+def free_steps(model: SceneModel) -> int:
+    """Steps per first period of free vibration, after the last carriage."""
+    limit = LIMIT_MARGIN * float(model.omega.max()) * 2.0 * math.pi / model.first_omega / model.scheme.stability_limit
+    return max(FREE_STEPS, math.ceil(limit))
+
+
+def alias_steps(model: SceneModel, time_scale: Array, kept: int | None = None) -> Array:
+    """(V,) least steps per passage or cycle of the alias rule for the masses that ride on their bodies; 0 without any.
+
+    A mass sees the highest mode's wave pass at k_N s' while the scheme turns that mode by its own phase; together they
+    must stay below half a turn per step, k_N s' h + phase(omega_N h) < pi, else the march may resonate with itself.
+    For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2). kept: of all modes.
+    """
+    found = np.zeros_like(time_scale)
+    joined = {spring.carriage for spring in model.springs if spring.rigid}
+    for number, carriage in enumerate(model.carriages):
+        if carriage.inertia != "force" or number in joined:
+            body = model.bodies[carriage.body].modal
+            wave = float(body.wave_number[:kept].max()) * carriage.rider.top_speed
+            found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega[:kept].max()) * time_scale))
+    return model.scheme.stride * found
+
+
+def _alias_root(scheme: Scheme, wave: float, angle: Array) -> Array:
+    """(V,) steps n at which wave/n + phase(angle/n) = pi: the left side falls with n, so bisection finds the root."""
+    low, high = np.zeros_like(angle), np.full_like(angle, 60.0)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        steps = np.exp(middle)
+        short = wave / steps + scheme.phase(angle / steps) >= math.pi
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.exp(high)
+
+
+def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
+    """Refuse fixed steps beyond the scheme's stability limit (fault 12), or too few for the alias rule where the scheme
+    does not damp enough. Raises BadInput with limit and suggestion."""
+    _check_limit(model, time_scale, steps)
+    if not model.scheme.is_damped:
+        _check_alias(model, time_scale, steps)
+
+
+def allow_any_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
+    """In place of `resonance.check_steps` where accuracy is not the question."""
+
+
+def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
+    limit = model.scheme.stability_limit
+    highest = float(model.omega.max())
+    found = highest * float(np.max(time_scale / steps))
+    if found > limit:
+        raise BadInput(
+            "the step is beyond the scheme's stability limit",
+            where=model.study.source.where("solver.steps"),
+            expected=f"omega h <= {limit:.4g} with the highest mode kept ({highest:.4g} rad/s)",
+            received=f"omega h = {found:.4g}",
+            remedy=f'{_enough(model, time_scale)}, steps = "auto", or scheme = "average-acceleration"',
+        )
+
+
+def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
+    least = LEAST_MARGIN * alias_steps(model, time_scale)
+    worst = int(np.argmax(least / steps))
+    if least[worst] > steps[worst]:
+        raise BadInput(
+            "too few steps for the highest mode under a moving mass: the march could resonate with itself and grow",
+            where=model.study.source.where("solver.steps"),
+            expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle (the alias rule)",
+            received=str(int(steps[worst])),
+            remedy=f'{_enough(model, time_scale)}, steps = "auto", fewer modes, or scheme = "hht-alpha" with '
+            "alpha = -0.05, which damps it",
+        )
+
+
+def _enough(model: SceneModel, time_scale: Array) -> str:
+    """A number of steps that these two rules refuse for no variant."""
+    inside = float(model.omega.max()) * time_scale / model.scheme.stability_limit
+    enough = LIMIT_MARGIN * float(np.max(np.maximum(inside, LEAST_MARGIN * alias_steps(model, time_scale))))
+    stride = model.scheme.stride
+    return f"steps = {stride * math.ceil(enough / stride)} or more"
+
+
+def check_even_steps(model: SceneModel, steps: Counts) -> None:
+    """Refuse a number of steps that a Richardson pair cannot halve. Raises BadInput."""
+    odd = steps[steps % model.scheme.stride != 0]
+    if odd.size:
+        raise BadInput(
+            "a Richardson pair halves the number of steps",
+            where=model.study.source.where("solver.steps"),
+            expected="an even number",
+            received=str(int(odd[0])),
+            remedy=f"steps = {int(odd[0]) + 1}",
+        )
+
+
+def check_slowest(model: SceneModel, values: LaneValues) -> None:
+    """Refuse variants so slow that no march could resolve them. Raises BadInput."""
+    periods = values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * math.pi)
+    check_most_steps(model, SLOWEST * periods)
+
+
+def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
+    """Refuse step counts beyond the cap (fault 13). Raises BadInput."""
+    if steps.size and not float(np.max(steps)) <= MOST_STEPS:
+        raise BadInput(
+            "too many steps over one passage or cycle",
+            where=model.study.source.where("solver.steps"),
+            expected=f"at most {MOST_STEPS}",
+            received=f"{float(np.max(steps)):.3g}",
+            remedy="a larger tolerance, a faster motion, fewer modes or larger steps",
+        )
+
+
+def contact_omega(model: SceneModel, values: LaneValues) -> Array:
+    """(V,) rad/s: omega_c of all springs, the root of the sum of squares; 0 without any."""
+    return np.sqrt(sum((_contact_square(model, values, one) for one in model.springs), np.zeros(values.size)))
+
+
+def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) -> Array:
+    if spring.rigid:
+        return np.zeros(values.size)
+    body = model.bodies[model.carriages[spring.carriage].body].modal
+    mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
+    stiffness = values.stiffness(spring)
+    if spring.held is not None:
+        own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
+        return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
+    contact = mobility / (1.0 + values.wheel_mass(model.carriages[spring.carriage].name) * mobility)
+    return np.asarray(stiffness * (1.0 / values.sprung_mass(spring) + contact))
+
+
+def check_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
+    """Refuse fixed steps (V,) that cannot be right. Raises BadInput with limit and suggestion."""
+    time_scale = values.time_scale(model.carriages[0].name)
+    check_fixed_steps(model, time_scale, steps)
+    if not model.springs:
+        return
+    check_free_vibration(model)
+    if math.isfinite(model.scheme.stability_limit):
+        _refuse(model, limit_with_springs(model, values), steps, "the step is beyond the scheme's stability limit")
+    least = model.scheme.stride * time_scale * contact_omega(model, values) / (2.0 * math.pi)
+    _refuse(model, least, steps, "a step is longer than a period of the contact on its spring: the march could grow")
+
+
+def vibrates_freely(carriage: CarriageTie) -> bool:
+    """Whether a carriage leaves free vibration behind."""
+    return bool(getattr(carriage.rider.motion, "after", 0.0) > 0.0)
+
+
+def check_free_vibration(model: SceneModel) -> None:
+    """Refuse free vibration with springs by a conditionally stable scheme: its steps follow from the bodies' modes
+    alone, whatever the springs of a variant. Raises BadInput."""
+    for carriage in model.carriages:
+        if math.isfinite(model.scheme.stability_limit) and vibrates_freely(carriage):
+            raise BadInput(
+                "free vibration with springs needs a scheme that is stable with any step",
+                where=model.study.source.where(f"carriage.{carriage.name}.motion.after"),
+                expected="0",
+                remedy='scheme = "average-acceleration"',
+            )
+
+
+def limit_with_springs(model: SceneModel, values: LaneValues) -> Array:
+    """(V,) steps at which the coupled scene reaches the scheme's limit, at most."""
+    highest = np.sqrt(float(model.omega.max()) ** 2 + contact_omega(model, values) ** 2)
+    return np.asarray(highest * values.time_scale(model.carriages[0].name) / model.scheme.stability_limit)
+
+
+def _refuse(model: SceneModel, least: Array, steps: Counts, what: str) -> None:
+    worst = int(np.argmax(least / steps))
+    if least[worst] > steps[worst]:
+        stride = model.scheme.stride
+        enough = stride * math.ceil(LIMIT_MARGIN * float(least.max()) / stride)
+        raise BadInput(
+            what,
+            where=model.study.source.where("solver.steps"),
+            expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle",
+            received=str(int(steps[worst])),
+            remedy=f'steps = {enough} or more, or steps = "auto"',
+        )

@@ -1,0 +1,269 @@
+"""The tables of a scene at one number of steps, built when they are first needed and shared by all its chunks."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import Alpha, Newmark, Ties, Watch
+from engine.march.step_rules import free_steps
+from engine.model.attachment import residual
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way, ways
+from engine.model.ties import Grip
+from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
+from engine.model.track import tabulate_ties
+from engine.observation import kinks
+from engine.observation.contact_forces import ContactForce
+from engine.observation.readings import Sensor
+from engine.observation.signals import Signal, build_signals, last_signals, tabulate_missed, tabulate_watch
+from engine.statics.static_response import static_readings
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+SegmentKey = tuple[float, float, int, tuple[bool, ...]]
+Missed = list[Array]  # of one segment: residual flexibility between ties, and of the signals; or empty
+
+KEPT_BYTES = 96 * 2**20  # tables kept per scene; those beyond are built again
+STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
+SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
+
+
+class SegmentTable(NamedTuple):
+    """What the march needs of one segment besides its lanes."""
+
+    ties: Ties
+    watch: Watch
+    guard: Watch
+
+    @property
+    def bytes(self) -> int:
+        """Size in memory."""
+        return sum(array.nbytes for part in self for array in part)
+
+
+class StaticUnit(NamedTuple):
+    """Static readings at some stations: per unit force of each carriage (H, J, C), and per unit gravity (H, J)."""
+
+    force: Array
+    gravity: Array
+
+
+@dataclass(eq=False)
+class SceneTables:
+    """Timeline, signals and tables of a scene at ``steps`` per unit of scene time.
+
+    refinement: every step of a timeline with so many times fewer steps is cut into so many. stops: what falls on step
+    boundaries: events, and in whole runs where loads pass sensors whose influence lines have a kink there. companions:
+    of the marches with the same steps that watch envelopes. kept_bytes: of tables that are kept for other marches or
+    cycles; the memory of those that are not is used again, which takes an eighth of the time.
+    """
+
+    model: SceneModel
+    steps: int
+    window: Window
+    readings: Literal["sensors", "contacts", "accelerations"] = "contacts"
+    refinement: int = 1
+    stops: Literal["events", "kinks"] = "events"
+    companions: tuple[SceneTables, ...] = ()
+    kept_bytes: int = KEPT_BYTES
+    _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
+    _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @cached_property
+    def timeline(self) -> Timeline:
+        """The scene cut into segments."""
+        return refined(self._unrefined, self.refinement)
+
+    @cached_property
+    def _unrefined(self) -> Timeline:
+        free = free_steps(self.model)
+        if self.refinement > 1:
+            free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
+        steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
+        stops = kinks.stops(self.model, self.sensors) if self.stops == "kinks" and self.window == "whole" else ()
+        return build_timeline(self.model.riders, steps, self.window, free, stops)
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """Sensors, then contact forces unless only sensors are read; between them every carriage's acceleration across,
+        where that is read."""
+        signals = build_signals(self.model, self.model.carriages if self.readings == "accelerations" else ())
+        return tuple(s for s in signals if self.readings != "sensors" or isinstance(s, Sensor))
+
+    @cached_property
+    def coarser(self) -> SceneTables:
+        """The same with half the steps, for a Richardson pair; ``refinement`` must be even."""
+        if self.refinement % 2:
+            raise ValueError(f"refinement: expected an even number, received {self.refinement}")
+        found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
+        found.timeline = coarsened(self.timeline, 2)
+        return found
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The study's sensors."""
+        return tuple(signal for signal in self.signals if isinstance(signal, Sensor))
+
+    @cached_property
+    def kinks(self) -> tuple[kinks.Side, ...]:
+        """Kinks of the study's sensors between the stations of a cycle."""
+        own = self.sensors[: len(self.model.study.sensor)]
+        return kinks.sides(self.model, own, self.timeline) if self.window == "last-cycle" else ()
+
+    @cached_property
+    def scheme(self) -> Newmark | Alpha:
+        """The scheme's coefficients."""
+        return self.model.scheme.coefficients
+
+    @property
+    def free_seconds(self) -> float:
+        """How long the free vibration lasts, s."""
+        periods = self.timeline.free_periods
+        return periods * (2.0 * math.pi / self.model.first_omega) if periods > 0.0 else 0.0
+
+    @property
+    def cycle_bytes(self) -> int:
+        """Size of the rows of all ties over one unit of scene time."""
+        return 32 * self.steps * self.model.omega.size * self.model.ties
+
+    def table(self, segment: Segment) -> SegmentTable:
+        """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
+        unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
+        key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.steps, segment.active)
+        with self._lock:
+            found = self._kept.get(key)
+            if found is None:
+                shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
+                found = self._build(shifted, self._missed_of(key))
+                if sum(table.bytes for table in self._kept.values()) + found.bytes <= self.kept_bytes:
+                    self._kept[key] = found  # and no other goes: marches ask for all in turn, the oldest first
+        return found
+
+    def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
+        along = self._ways(segment)
+        if not missed:
+            found = residual(self.model, along), tabulate_missed(self.model, self.signals, along)
+            if self.timeline.repeats:
+                missed.extend(found)
+        else:
+            found = missed[0], missed[1]
+        watch = tabulate_watch(self.model, self.signals, along, found[1])
+        contacts = sum(isinstance(signal, ContactForce) for signal in self.signals)
+        guard = last_signals(watch, contacts) if contacts else watch
+        return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, guard)
+
+    def _missed_of(self, key: SegmentKey) -> Missed:
+        """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate
+        than the rows, and much less memory. Empty where they are not known."""
+        found = self._missed.get(key, [])
+        if sum(part.nbytes for one in self._missed.values() for part in one) <= KEPT_BYTES:
+            self._missed[key] = found
+        return found
+
+    def _ways(self, segment: Segment) -> tuple[Way, ...]:
+        """The ways of all carriages along a segment."""
+        return ways(self.model, segment)
+
+    def forget(self) -> None:
+        """Drop the tables, when no chunk needs them any more."""
+        with self._lock:
+            self._kept.clear()
+            self._missed.clear()
+        for companion in self.companions:
+            companion.forget()
+        self.__dict__.pop("coarser", None)
+
+    @cached_property
+    def static_counts(self) -> Array:
+        """Stations, by their count, spread over the recorded part, and where a carriage passes a sensor, as influence
+        lines have their kinks there."""
+        first, last = self.timeline.window
+        last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
+        counts = np.linspace(first, last, STATIC_STATIONS)
+        places = {sensor.at for sensor in self.sensors if sensor.under is None}
+        ways = [self.timeline.positions(rider, counts) for rider in range(len(self.model.carriages)) if places]
+        passing = [_crossings(counts, way, at) for way in ways for at in places]
+        bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
+        return np.unique(np.concatenate([counts, bounds, *passing]))
+
+    @cached_property
+    def static_over_window(self) -> StaticUnit:
+        """Static readings at `static_counts`."""
+        return self.static_at(self.static_counts)
+
+    @cached_property
+    def static_scales(self) -> Array:
+        """(sensors,) a sensor's largest static reading per unit force anywhere on its body; of a rate that of the
+        displacement times powers of the highest frequency kept."""
+        found = []
+        for sensor in self.sensors:
+            body = self.model.bodies[sensor.body].modal
+            s = np.linspace(0.0, body.length, 65)
+            everywhere = Way(s, np.zeros_like(s), np.zeros_like(s), True)
+            reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
+            if sensor.under is not None:
+                reader = replace(reader, under=0)
+            largest = np.abs(reader.unit_reading(self.model, (everywhere,), Grip(1.0, sensor.body, 0))).max()
+            found.append(largest * body.omega.max() ** sensor.offset_order)
+        return np.array(found)
+
+    def ways_at(self, counts: Array | Counts) -> tuple[Way, ...]:
+        """Places of all riders at stations by their count; ``active`` says whether it is on its body at any of them."""
+        found = []
+        for rider in range(len(self.model.riders)):
+            place = self.timeline.positions(rider, counts)
+            here = np.isfinite(place)
+            nowhere = np.zeros_like(place)
+            found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any()), here))
+        return tuple(found)
+
+    def static_at(self, counts: Array | Counts) -> StaticUnit:
+        """Static readings of every sensor with the carriages where they are at stations by their count."""
+        along = self.ways_at(counts)
+        readings = self._readings(along)
+        return StaticUnit(readings[:, :, :-1], readings[:, :, -1])
+
+    def static_slope_at(self, counts: Array | Counts) -> Array:
+        """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""
+        along = self.ways_at(counts)
+        first = along[0]
+        assert first.here is not None
+        if not first.active:
+            return np.zeros((counts.size, len(self.sensors)))
+        return np.where(first.here[:, None], self._slope(along), 0.0)
+
+    def _readings(self, along: tuple[Way, ...]) -> Array:
+        """(S, J, C + 1) static readings of every sensor per unit weight of each carriage, and last per unit gravity."""
+        return static_readings(self.model, self.sensors, along)
+
+    def _slope(self, along: tuple[Way, ...]) -> Array:
+        """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
+        apart, which it reaches with all its contacts."""
+        riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
+        own = {0, *(rider for rider, _ in self.model.carriages[0].loads)}
+        lowest = np.minimum.reduce([along[r].s for r in own])
+        highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
+        before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)
+        left, right = (
+            tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
+            for shift in (before, after)
+        )
+        change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
+        return np.asarray(change / (after - before)[:, None])
+
+
+def _crossings(counts: Array, places: Array, at: float) -> Array:
+    """Fractional counts at which a carriage passes a place, by interpolation between stations."""
+    gap = places - at
+    before = np.flatnonzero(gap[:-1] * gap[1:] < 0.0)
+    part = gap[before] / (gap[before] - gap[before + 1])
+    return np.asarray(counts[before] + part * (counts[before + 1] - counts[before]))

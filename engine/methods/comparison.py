@@ -1,0 +1,317 @@
+"""Schemes to compare the march with: over the same scenes, observed in the same way, never chosen by a study.
+
+They march scenes of exactly one carriage without dampers. Each asks for the track where its own stages stand, and what
+they do is in `engine.kernels.stepping.comparison`. Nothing here is in the fast path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import CURVE, FORCE, LANES, MARKS, RATE, Alpha, Lanes, Newmark, Record, State, Ties, Watch
+from engine.kernels.schemes import NewmarkScheme
+from engine.kernels.stepping.comparison import (
+    Carried,
+    Coupling,
+    RigidTie,
+    RungeKutta,
+    Track,
+    WilsonTheta,
+    march_by_rule,
+)
+from engine.kernels.stepping.comparison_steps import ITERATIONS, KEPT, OWN_A, OWN_Q, OWN_V, UNCONVERGED
+from engine.march.march import March, Marched, prepare
+from engine.march.tables import SceneTables
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.ties import CarriageTie
+from engine.model.timeline import Segment
+from engine.model.track import tabulate_ties
+from engine.model.variant_values import LaneValues, from_blocks
+from results_schema.errors import BadInput
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Rule = Coupling | WilsonTheta | RungeKutta | RigidTie
+
+AVERAGE_ACCELERATION = Newmark(0.25, 0.5)
+MOST_ITERATIONS = 50
+ITERATED_TO = 1e-12  # of the weight or of the force itself, the larger
+_NO_IMPLICIT_PART = Newmark(0.0, 0.0)  # the rows' column w then holds P alone
+
+
+@dataclass(frozen=True)
+class ComparisonScheme:
+    """A scheme that is offered for comparison only.
+
+    order: of its error on smooth, resolved scenes. stability_limit: largest omega h of an undamped oscillator without
+    a carriage, infinite where there is none. offsets: the places of a step, 0 its beginning and 1 its end, where the
+    track is asked for. rule: what the kernels know of it.
+    """
+
+    name: str
+    order: int
+    stability_limit: float
+    offsets: tuple[float, ...]
+    rule: Rule
+
+
+def wilson_theta(theta: float = 1.4) -> ComparisonScheme:
+    """Wilson (1968): linear acceleration over theta h, equilibrium at its end.
+
+    Raises BadInput for a theta below 1.37, from which on it is stable at every step.
+    """
+    if not theta >= 1.37:
+        raise BadInput("Wilson-theta has a limit here", where="theta", expected="1.37 or more", received=f"{theta:g}")
+    rule = WilsonTheta(theta, theta**2 / 6.0, 0.5 * theta)
+    return ComparisonScheme("wilson-theta", 2, math.inf, (theta, 1.0), rule)
+
+
+def runge_kutta() -> ComparisonScheme:
+    """The classic method of order 4; its limit is sqrt(8)."""
+    return ComparisonScheme("rk4", 4, math.sqrt(8.0), (0.5, 1.0), RungeKutta(0.5))
+
+
+def lagged_inertia(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """Staggered coupling: the contact force m (g - D2w) of the last step. Stable iff m phi.phi < 1 (section 7.1)."""
+    rule = Coupling(scheme, 0.0, 0.0, 0, 0.0, 0.0)
+    return ComparisonScheme("lagged-inertia", 1, _limit(scheme), (0.0, 1.0), rule)
+
+
+def lagged_convective(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """Implicit inertia, the convective terms of the last step: stable and of first order."""
+    rule = Coupling(scheme, 1.0, 0.0, 0, 0.0, 0.0)
+    return ComparisonScheme("lagged-convective", 1, _limit(scheme), (0.0, 1.0), rule)
+
+
+def picard(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """The implicit step by fixed-point iteration of the contact force, which contracts where r < 1 (section 7.1);
+    a variant whose iteration does not converge within 50 ends as NaN."""
+    rule = Coupling(scheme, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 0.0)
+    return ComparisonScheme("picard", 2, _limit(scheme), (0.0, 1.0), rule)
+
+
+def picard_relaxed(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """The same with the changes divided by 1 + r."""
+    rule = Coupling(scheme, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 1.0)
+    return ComparisonScheme("picard-relaxed", 2, _limit(scheme), (0.0, 1.0), rule)
+
+
+def rigid_tie(scheme: Newmark | Alpha = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """The mass is a body of its own that has the contact point's place at every station (section 4, kappa = 0).
+
+    Raises BadInput for an explicit scheme, in which no force of the new step moves the new place.
+    """
+    if not scheme.beta > 0.0:
+        raise BadInput("an explicit scheme cannot hold a place", where="scheme", expected="a scheme with beta > 0")
+    return ComparisonScheme("rigid-tie", 2, _limit(scheme), (0.0, 1.0), RigidTie(scheme))
+
+
+def _limit(scheme: Newmark | Alpha) -> float:
+    """Largest omega h of a scheme of the march; the alpha schemes have none."""
+    return math.inf if isinstance(scheme, Alpha) else NewmarkScheme("newmark", *scheme).stability_limit
+
+
+#: Every comparison scheme by its name, the implicit ones with average acceleration.
+COMPARISON: Mapping[str, ComparisonScheme] = {
+    scheme.name: scheme
+    for scheme in (
+        wilson_theta(),
+        runge_kutta(),
+        lagged_inertia(),
+        lagged_convective(),
+        picard(),
+        picard_relaxed(),
+        rigid_tie(),
+    )
+}
+
+
+class Effort(NamedTuple):
+    """Fixed-point iterations of V variants: their mean number per step in contact, and the number of steps whose
+    iteration did not converge; zero for schemes that do not iterate."""
+
+    iterations: Array
+    unconverged: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Compared(Marched):
+    """What a march by a comparison scheme leaves: as `Marched`, and its effort."""
+
+    effort: Effort
+
+
+class Propagated(NamedTuple):
+    """A state after steps without loads, and the effort, its iterations per step (lanes that fill a block too)."""
+
+    state: State
+    effort: Effort
+
+
+def march_comparison(
+    scheme: ComparisonScheme,
+    tables: SceneTables,
+    values: LaneValues,
+    counts: Counts,
+    size: int,
+    halted: Callable[[], bool] = lambda: False,
+    sampled: int | None = None,
+) -> Compared:
+    """March the first ``size`` variants of a scene as `engine.march.march.march` does, by a comparison scheme.
+
+    Raises BadInput where the scene has not exactly one carriage or has dampers, and Halted.
+    """
+    going = prepare_comparison(scheme, tables, values, counts, sampled)
+    going.go(halted)
+    steps = sum(segment.steps for segment in tables.timeline.segments if segment.active[0])
+    return Compared(**vars(going.result(size)), effort=_effort(going.kept, steps, size))
+
+
+def prepare_comparison(
+    scheme: ComparisonScheme, tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None = None
+) -> ComparisonMarch:
+    """Set up a march by a comparison scheme as `engine.march.march.prepare` does. Raises BadInput."""
+    check_comparison(scheme, tables.model)
+    ready = prepare(tables, values, counts, sampled)
+    kept = np.zeros((ready.lanes.gravity.shape[0], KEPT, LANES))
+    return ComparisonMarch(**vars(ready), scheme=scheme, kept=kept)
+
+
+def propagate_comparison(scheme: ComparisonScheme, track: Track, lanes: Lanes, state: State) -> Propagated:
+    """The state after all steps of a track, without loads and gravity; the given one is left as it is.
+
+    lanes, state: blocks as the kernels take them, SI units; the accelerations are taken as they are. A rigidly tied
+    mass starts with the contact point.
+    """
+    free = lanes._replace(load=np.zeros_like(lanes.load), gravity=np.zeros_like(lanes.gravity))
+    moved = State(*(part.copy() for part in state))
+    steps, modes = track.rows.shape[1:3]
+    blocks = free.step.shape[0]
+    kept = np.zeros((blocks, KEPT, LANES))
+    start_own(kept, track, free, moved)
+    record = Record(
+        np.zeros((blocks, 0, MARKS, LANES)), np.full(steps + 1, -1, dtype=np.int64), np.zeros((blocks, 0, 0, LANES))
+    )
+    march_by_rule(scheme.rule, track, free, Carried(*moved, kept), _nothing_watched(modes), record, 0)
+    return Propagated(moved, _effort(kept, steps, blocks * LANES))
+
+
+def frozen_track(scheme: ComparisonScheme, model: SceneModel, place: float, steps: int, advance: float = 0.0) -> Track:
+    """The track of a carriage that is held at a place (m), with the terms of a speed of ``advance`` m per step.
+
+    Raises BadInput as `march_comparison`.
+    """
+    check_comparison(scheme, model)
+    still = np.zeros(steps)
+    way = Way(still + place, still + advance, still, active=True)
+    return _tabulated(model, tuple(way for _ in scheme.offsets))
+
+
+def moving_track(scheme: ComparisonScheme, model: SceneModel, segment: Segment) -> Track:
+    """The track along one segment; beyond its end the way goes on with its last acceleration, within the body.
+
+    Raises BadInput as `march_comparison`.
+    """
+    check_comparison(scheme, model)
+    key = segment._replace(first=0, fresh=False, strikes=(), recorded=False)
+    return _moving_track(model, key, scheme.offsets)
+
+
+@lru_cache(maxsize=16)
+def _moving_track(model: SceneModel, segment: Segment, offsets: tuple[float, ...]) -> Track:
+    return _tabulated(model, tuple(_way(model.carriages[0], segment, offset) for offset in offsets))
+
+
+def check_comparison(scheme: ComparisonScheme, model: SceneModel) -> None:
+    """Refuse a scene that a comparison scheme cannot march. Raises BadInput."""
+    if model.ties != 1:
+        raise BadInput(
+            f"{scheme.name} is for comparison only",
+            where=model.study.source.where("carriage"),
+            expected="one carriage, no dampers and no springs",
+            received=f"{len(model.carriages)} carriages, {len(model.dampers)} dampers, {len(model.springs)} springs",
+        )
+    carriage = model.carriages[0]
+    if isinstance(scheme.rule, RigidTie) and (carriage.inertia != "mass" or model.bodies[carriage.body].own_weight):
+        raise BadInput(
+            f"{scheme.name} is for comparison only",
+            where=model.study.source.where(f"carriage.{carriage.name}.kind"),
+            expected="a mass in full on a body whose own weight does not act",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ComparisonMarch(March):
+    """A march by a comparison scheme; kept (blocks, KEPT, LANES) is what its rule keeps besides the modes."""
+
+    scheme: ComparisonScheme
+    kept: Array
+
+    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Watch, record: Record) -> None:
+        """The steps of a segment by the rule; only those in contact count for its effort."""
+        track = moving_track(self.scheme, self.tables.model, self._unit(segment))
+        if segment.fresh:
+            start_own(self.kept, track, stepped, self.state)
+        kept = self.kept if segment.active[0] else self.kept.copy()
+        march_by_rule(self.scheme.rule, track, stepped, Carried(*self.state, kept), watch, record, segment.first)
+
+    def _unit(self, segment: Segment) -> Segment:
+        """The segment in the first unit of scene time, where the path repeats itself."""
+        unit = np.floor(segment.start + 1e-9) if self.tables.timeline.repeats else 0.0
+        return segment._replace(start=round(segment.start - unit, 12), end=round(segment.end - unit, 12))
+
+
+def start_own(kept: Array, track: Track, lanes: Lanes, state: State) -> None:
+    """Put the mass's own place, velocity and acceleration where the contact point's are, in place."""
+    row = track.rows[0, 0]
+    h = lanes.step
+
+    def over(column: int, modal: Array) -> Array:
+        return np.asarray(np.einsum("n,bnj->bj", row[:, column], modal))
+
+    kept[:, OWN_Q:] = 0.0
+    kept[:, OWN_Q] = over(FORCE, state.q)
+    kept[:, OWN_V] = over(FORCE, state.v) + 0.5 * over(RATE, state.q) / h
+    kept[:, OWN_A] = over(FORCE, state.a) + over(RATE, state.v) / h + over(CURVE, state.q) / h**2
+
+
+def _way(carriage: CarriageTie, segment: Segment, offset: float) -> Way:
+    """The way of a carriage at the same place of every step of a segment."""
+    tau = segment.start + (np.arange(segment.steps) + offset) * segment.step
+    if not segment.active[0]:
+        nowhere = np.zeros_like(tau)
+        return Way(nowhere, nowhere, nowhere, active=False)
+    inside = np.minimum(tau, segment.end)
+    path, beyond = carriage.rider.path(inside, segment.start, segment.end), tau - inside
+    place = path.S + path.dS * beyond + 0.5 * path.ddS * beyond**2
+    speed = path.dS + path.ddS * beyond
+    place = np.clip(place, 0.0, carriage.rider.length)
+    return Way(place, speed * segment.step, path.ddS * segment.step**2, active=True)
+
+
+def _tabulated(model: SceneModel, along: tuple[Way, ...]) -> Track:
+    """Rows of the one tie along a way per offset."""
+    ties = [tabulate_ties(model, (way,), _NO_IMPLICIT_PART) for way in along]
+    rows = np.ascontiguousarray(np.stack([tie.rows[:, :, 0] for tie in ties]))
+    return Track(rows, np.ascontiguousarray(np.stack([tie.drive[:, 0] for tie in ties])))
+
+
+def _effort(kept: Array, steps: int, size: int) -> Effort:
+    found = from_blocks(kept, size)
+    return Effort(found[ITERATIONS] / max(1, steps), found[UNCONVERGED])
+
+
+def _nothing_watched(modes: int) -> Watch:
+    """A watch without signals."""
+    rows, none = np.zeros((1, 0, 4 * -(-modes // 4))), np.zeros(0, dtype=np.int64)
+    still = np.zeros((1, 0))
+    never = still.astype(np.bool_)
+    return Watch(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, never, never[0])

@@ -1,0 +1,68 @@
+"""The distinct scenes of a sweep, and which variants share each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.model.scene_model import SceneModel, build_model
+from engine.model.variant_values import LANE_KEYS, LaneValues
+from engine.scene.study import Study
+from engine.scene.sweep import Cases
+
+Counts = NDArray[np.int64]
+
+
+def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
+    """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
+    for variants in split(chosen, structure(cases, chosen)):
+        own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
+        values = LaneValues(own, cases.columns_of(variants), variants.size)
+        timing = values.timing()
+        columns = np.stack([column for pair in timing.values() for column in pair])
+        codes = np.zeros(variants.size, dtype=np.int64)
+        if np.any(columns != columns[:, :1]):
+            codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
+        for part in split(np.arange(variants.size), codes):
+            yield build_model(own, *_timing_of(values, int(part[0])), cases.paths), variants[part]
+
+
+def base_scene(study: Study) -> SceneModel:
+    """The scene of a study without its sweep."""
+    return build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
+
+
+def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
+    """Paces and delays of one lane, by carriage."""
+    timing = values.timing()
+    return (
+        {name: float(pace[lane]) for name, (pace, _) in timing.items()},
+        {name: float(delay[lane]) for name, (_, delay) in timing.items()},
+    )
+
+
+def _structural(cases: Cases) -> list[str]:
+    """Swept keys that change the scene itself."""
+    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
+
+
+def structure(cases: Cases, variants: Counts) -> Counts:
+    """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
+    positions = cases.positions(variants)
+    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(_structural(cases))}
+    code = np.zeros(variants.size, dtype=np.int64)
+    for dim, size in zip(cases.dims, cases.shape, strict=True):
+        if dim in dims:
+            code = code * size + positions[dim]
+    return code
+
+
+def split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
+    """Items by equal codes, both in ascending order."""
+    if items.size and np.all(codes == codes[0]):
+        yield items
+        return
+    order = np.argsort(codes, kind="stable")
+    yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)

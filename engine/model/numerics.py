@@ -1,0 +1,48 @@
+"""What a variant is computed with: a value that stands beside the study and changes nothing in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from engine.bodies.modal.description import Body
+from engine.kernels.schemes import Scheme
+from engine.scene.carriages import BodyCarriage
+from engine.scene.study import Study
+
+
+class Numerics(NamedTuple):
+    """Which terms act, how many modes are kept, how time is stepped.
+
+    fidelity: as `solver.fidelity` ("auto" and "full": all terms that the carriages have). modes: of every body whose
+    number is left open; 0: as the study says. more: times the modes of all other bodies, as far as they have them.
+
+    >>> study = Study(kind="passage", solver={"fidelity": "force"})
+    >>> Numerics.of(study).fidelity, Numerics.of(study).scheme.name
+    ('force', 'average-acceleration')
+    """
+
+    fidelity: str
+    scheme: Scheme
+    static_correction: bool
+    modes: int = 0
+    more: int = 1
+
+    @classmethod
+    def of(cls, study: Study) -> Numerics:
+        """What the study says."""
+        solver = study.solver
+        return cls(solver.fidelity, solver.integration, solver.static_correction)
+
+    def body(self, study: Study, name: str) -> Body:
+        """A body of the study with as many modes as it keeps."""
+        body = study.body[name]
+        if name in open_bodies(study):
+            return body.with_modes(self.modes) if self.modes else body
+        return body.with_more_modes(self.more) if self.more > 1 else body
+
+
+def open_bodies(study: Study) -> tuple[str, ...]:
+    """Bodies whose number of modes is left open: those that carry loads, ride on nothing, and name none."""
+    ridden = {carriage.on for carriage in study.carriage.values()}
+    riding = {carriage.body for carriage in study.carriage.values() if isinstance(carriage, BodyCarriage)}
+    return tuple(name for name, body in study.body.items() if name in ridden - riding and body.modes_are_open)

@@ -1,0 +1,314 @@
+"""From a study's scene to arrays of modes: every body in modal coordinates, every carriage a tie, every damper a tie.
+
+A `SceneModel` is what variants share that differ only in mass, force, pace, damping and gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.build import build_body
+from engine.bodies.modal.description import Body
+from engine.bodies.modal.modal_body import ModalBody
+from engine.kernels.schemes import Scheme
+from engine.model.numerics import Numerics
+from engine.model.support_reactions import Place, Standing, stand
+from engine.model.ties import CarriageTie, DamperTie, Grip, Inertia, SpringTie
+from engine.model.timeline import Rider
+from engine.scene.carriages import BodyCarriage, OscillatorCarriage
+from engine.scene.settings import SPRUNG
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from results_schema.status import Fidelity
+
+Array = NDArray[np.float64]
+
+PROBED = 65  # places along a track at which it is looked for what a mode moves
+UNFELT = 1e-6  # of the largest: a mode that moves its track less is none of the loads' business
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPart:
+    """A body's place in the scene's modal coordinates.
+
+    modes: its slice of all modes. fibre_distance: m, NaN where it is not known. own_weight: gravity acts on it too.
+    """
+
+    name: str
+    modal: ModalBody
+    modes: slice
+    second_moment: float
+    fibre_distance: float
+    own_weight: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SceneModel:
+    """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
+    them. numerics: what it is computed with. contacts: the ways of the contacts of bodies that ride. swept: keys of
+    numbers that differ from variant to variant."""
+
+    study: Study
+    numerics: Numerics
+    bodies: tuple[BodyPart, ...]
+    carriages: tuple[CarriageTie, ...]
+    dampers: tuple[DamperTie, ...]
+    springs: tuple[SpringTie, ...] = ()
+    contacts: tuple[Rider, ...] = ()
+    swept: tuple[str, ...] = ()
+
+    @property
+    def ties(self) -> int:
+        """Number of ties: carriages first, then dampers, then springs."""
+        return len(self.carriages) + len(self.dampers) + len(self.springs)
+
+    @property
+    def body_modes(self) -> int:
+        """Number of modes of all bodies."""
+        return sum(part.modal.omega.size for part in self.bodies)
+
+    @cached_property
+    def omega(self) -> Array:
+        """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass."""
+        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(len(self.sprung))])
+
+    @property
+    def sprung(self) -> tuple[SpringTie, ...]:
+        """The springs under sprung masses."""
+        return tuple(spring for spring in self.springs if spring.mode is not None)
+
+    @property
+    def scheme(self) -> Scheme:
+        """The time integration scheme."""
+        return self.numerics.scheme
+
+    @property
+    def leading_body(self) -> BodyPart:
+        """The body of the first carriage, whose first period and length make ratios; where that is rigid and rides,
+        the first one below it that bends."""
+        below = {carriage.rides: carriage.body for carriage in self.carriages}
+        body = self.carriages[0].body
+        while not self.bodies[body].modal.omega.any():
+            body = below[body]
+        return self.bodies[body]
+
+    @cached_property
+    def first_omega(self) -> float:
+        """Lowest elastic natural frequency of the leading body that moves its track along the load, rad/s."""
+        modal = self.leading_body.modal
+        size = np.abs(modal.shape(np.linspace(0.0, modal.length, PROBED))).max(axis=0)
+        felt = (modal.omega > 0.0) & (size > UNFELT * size.max())
+        return float(modal.omega[felt if felt.any() else modal.omega > 0.0][0])
+
+    @property
+    def riders(self) -> tuple[Rider, ...]:
+        """The ways of all carriages, then of all contacts of bodies that ride."""
+        return (*(carriage.rider for carriage in self.carriages), *self.contacts)
+
+    @property
+    def timing(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Paces and delays of all carriages by name, as `build_model` takes them."""
+        riders = {carriage.name: carriage.rider for carriage in self.carriages}
+        return {name: r.pace for name, r in riders.items()}, {name: r.delay for name, r in riders.items()}
+
+    @property
+    def first_spring(self) -> int:
+        """Number of the first spring among all ties."""
+        return len(self.carriages) + len(self.dampers)
+
+    @cached_property
+    def grips(self) -> tuple[tuple[Grip, ...], ...]:
+        """Where every tie acts on the bodies."""
+        springs = (spring.grips(self.carriages[spring.carriage].body) for spring in self.springs)
+        return (*(c.grips for c in self.carriages), *(d.grips for d in self.dampers), *springs)
+
+    def springs_of(self, carriage: int) -> dict[int, SpringTie]:
+        """The springs of a carriage by their number among all ties."""
+        numbered = enumerate(self.springs, start=self.first_spring)
+        return {r: spring for r, spring in numbered if spring.carriage == carriage}
+
+    def contact_names(self, carriage: int) -> dict[int, str]:
+        """The contacts of a body that rides by the numbers of their riders; empty for other carriages."""
+        tie = self.carriages[carriage]
+        if tie.rides is None:
+            return {}
+        spec = self.study.carriage[tie.name]
+        assert isinstance(spec, BodyCarriage)
+        return {rider: name for (rider, _), name in zip(tie.loads, spec.contacts, strict=True)}
+
+    def reacts(self, carriage: int) -> bool:
+        """Whether the contact force of a carriage depends on how its body moves."""
+        return self.carriages[carriage].inertia != "force" or bool(self.springs_of(carriage))
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """The model that this scene marches: the fullest of its carriages'."""
+        if self.numerics.fidelity == "static":
+            return Fidelity.STATIC
+        if self.springs:
+            return Fidelity.TIED
+        kinds = {carriage.inertia for carriage in self.carriages}
+        if "mass" in kinds:
+            return Fidelity.MASS
+        return Fidelity.MASS_WITHOUT_CONVECTIVE if "mass-without-convective" in kinds else Fidelity.FORCE
+
+    def sag(self, body: int, x: Array, derivative: int) -> Array:
+        """d^j/dx^j of a body's deflection under its own weight per unit gravity, zero where that does not act."""
+        part = self.bodies[body]
+        if not part.own_weight:
+            return np.zeros_like(x)
+        return part.modal.own_weight_deflection(x, derivative)
+
+
+def build_model(
+    study: Study,
+    paces: Mapping[str, float],
+    delays: Mapping[str, float],
+    swept: Collection[str] = (),
+    numerics: Numerics | None = None,
+) -> SceneModel:
+    """The model of a study without sweep.
+
+    paces: per carriage, the first carriage's time scale over its own. delays: per carriage, in the first one's time
+    scale. swept: keys of numbers that differ between the variants that share the model. numerics: as the study says if
+    not given. Raises BadInput where the scene cannot be marched.
+    """
+    numerics = Numerics.of(study) if numerics is None else numerics
+    used = [name for name in study.body if _in_use(study, name)]
+    parts: list[BodyPart] = []
+    first = 0
+    for name in used:
+        part = _body_part(study, name, numerics.body(study, name), first)
+        parts.append(part)
+        first = part.modes.stop
+    carriages = []
+    for number, (name, carriage) in enumerate(study.carriage.items()):
+        body = used.index(carriage.on)
+        rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
+        carriages.append(CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), ((number, 1.0),)))
+    dampers = [
+        DamperTie(number, at, f"body.{name}.{key}")
+        for number, name in enumerate(used)
+        for key, at, coefficient in study.body[name].dampers()
+        if coefficient > 0.0 or f"body.{name}.{key}" in swept
+    ]
+    standing = _standing(study, numerics, carriages, parts, swept)
+    contacts = tuple(rider for stands in standing.values() for rider in stands.riders)
+    on_contacts = tuple(spring for stands in standing.values() for spring in stands.springs)
+    springs = (*_springs(study, numerics, first, swept), *on_contacts)
+    carried = tuple(standing[n].carried(tie) if n in standing else tie for n, tie in enumerate(carriages))
+    model = SceneModel(study, numerics, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
+    _check_rigid_modes(model)
+    return model
+
+
+def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
+    """The same scene computed with something else. Raises BadInput."""
+    if numerics == model.numerics:
+        return model
+    return build_model(model.study, *model.timing, model.swept, numerics)
+
+
+def check_moves(study: Study) -> None:
+    """Refuse a study without a carriage. Raises BadInput."""
+    if not study.carriage:
+        where = study.source.where("carriage")
+        raise BadInput("nothing moves", where=where, expected="at least one table [carriage.name]")
+
+
+def _in_use(study: Study, body: str) -> bool:
+    """Whether a body carries a carriage, a sensor or an envelope."""
+    rides = (carriage.body for carriage in study.carriage.values() if isinstance(carriage, BodyCarriage))
+    ridden = (carriage.on for carriage in study.carriage.values())
+    read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
+    return body in (*rides, *ridden, *read)
+
+
+def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]) -> Inertia:
+    """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
+    fidelity, carriage = numerics.fidelity, study.carriage[name]
+    if fidelity in ("force", "static") or not carriage.inertial or isinstance(carriage, BodyCarriage):
+        return "force"
+    if _sprung(study, numerics, name):
+        wheel = f"carriage.{name}.wheel_mass"
+        return "mass" if study.value(wheel) > 0.0 or wheel in swept else "force"
+    return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
+
+
+def _sprung(study: Study, numerics: Numerics, name: str) -> bool:
+    """Whether a carriage's spring acts; below the full fidelity it is locked."""
+    return isinstance(study.carriage[name], OscillatorCarriage) and numerics.fidelity in SPRUNG
+
+
+def _springs(study: Study, numerics: Numerics, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
+    """The springs of all sprung masses, whose modes are counted from ``first``."""
+    found: list[SpringTie] = []
+    for number, name in enumerate(study.carriage):
+        if _sprung(study, numerics, name):
+            key = f"carriage.{name}"
+            damped = study.value(f"{key}.damping") > 0.0 or f"{key}.damping" in swept
+            found.append(SpringTie(number, number, key, None, first + len(found), damped))
+    return tuple(found)
+
+
+def _standing(
+    study: Study, numerics: Numerics, carriages: list[CarriageTie], parts: list[BodyPart], swept: Collection[str]
+) -> dict[int, Standing]:
+    """The bodies that ride, by the number of their carriage."""
+    found: dict[int, Standing] = {}
+    names, first = [part.name for part in parts], len(carriages)
+    for number, tie in enumerate(carriages):
+        carriage = study.carriage[tie.name]
+        if isinstance(carriage, BodyCarriage):
+            rides = names.index(carriage.body)
+            place = Place(number, tie, parts[tie.body].modal, rides, first)
+            found[number] = stand(study, numerics, place, parts[rides].modal, swept)
+            first += len(carriage.contacts)
+    return found
+
+
+def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
+    """A body of the study in modal coordinates, its modes counted from ``first``."""
+    try:
+        built = build_body(body)
+    except BadInput as error:
+        where = study.source.where(f"body.{name}.{error.where}")
+        raise BadInput(
+            error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
+        ) from None
+    modes = slice(first, first + built.modal.omega.size)
+    return BodyPart(name, built.modal, modes, built.second_moment, built.fibre_distance, body.own_weight)
+
+
+def _check_rigid_modes(model: SceneModel) -> None:
+    """A body that nothing holds has no static equilibrium and no sag, and needs a mode that bends."""
+    riding = {carriage.rides for carriage in model.carriages}
+    for number, part in enumerate(model.bodies):
+        where = model.study.source.where(f"body.{part.name}.supports")
+        if part.modal.rigid_modes and part.own_weight:
+            raise BadInput(
+                "nothing holds this body fully, so its own weight has no static state",
+                where=where,
+                remedy='supports that hold every direction, such as supports.NODE = ["x"] of a frame that may slide; '
+                "bodies that ride take own_weight = false",
+            )
+        if number in riding:
+            continue
+        if part.modal.rigid_modes == len(part.modal.omega):
+            raise BadInput(
+                "only rigid-body modes are kept",
+                where=model.study.source.where(f"body.{part.name}.modes"),
+                expected=f"more than {part.modal.rigid_modes} modes",
+            )
+        if part.modal.rigid_modes and model.study.start == "equilibrium":
+            raise BadInput(
+                "nothing holds this body, so it has no static equilibrium to start from",
+                where=where,
+                expected="supports that hold it in every direction",
+                remedy='hold it, a frame that may slide by supports.NODE = ["x"], or set initial = "rest"',
+            )

@@ -1,0 +1,85 @@
+"""Where every rider is at the stations of a segment.
+
+Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene time (mechanics section 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.modal.modal_body import ModalBody
+from engine.model.scene_model import SceneModel
+from engine.model.timeline import Rider, Segment
+
+Array = NDArray[np.float64]
+
+NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One rider along one segment, station by station: place (m), its first and second change per step, and whether
+    it touches the body; where it does not, its rows are zero. here: at which stations, where that differs. highest:
+    derivative of the mode shapes that its ties read."""
+
+    s: Array
+    ds: Array
+    dds: Array
+    active: bool
+    here: NDArray[np.bool_] | None = None
+    highest: int = 0
+    _shapes: dict[int, Array] = field(default_factory=dict)
+
+    def shape(self, body: ModalBody, derivative: int = 0) -> Array:
+        """(S, N) mode shapes of its body along the way."""
+        return np.asarray(self.shapes(body, derivative)[derivative])
+
+    def shapes(self, body: ModalBody, highest: int) -> Array:
+        """(``highest`` + 1 or more, S, N) the same with their derivatives, evaluated together once."""
+        found = self._shapes.get(id(body))
+        if found is None or len(found) <= highest:
+            found = body.shape_derivatives(self.s, range(max(highest, self.highest) + 1))
+            self._shapes[id(body)] = found
+        return found
+
+
+def ways(model: SceneModel, segment: Segment) -> tuple[Way, ...]:
+    """The ways of all riders at the stations 0..steps of a segment."""
+    tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
+    tau[-1] = segment.end
+    parts = zip(model.riders, segment.active, _highest(model), strict=True)
+    return tuple(_way(rider, segment, tau, active, highest) for rider, active, highest in parts)
+
+
+def _highest(model: SceneModel) -> list[int]:
+    """Per rider, the highest derivative that its ties read: convection needs two, dampers one."""
+    found = [2 if carriage.inertia == "mass" else 0 for carriage in model.carriages] + [0] * len(model.contacts)
+    for spring in model.springs:
+        found[spring.rider] = max(found[spring.rider], 2 if spring.rigid else int(spring.damped))
+    return found
+
+
+def frozen(model: SceneModel, places: Array) -> tuple[Way, ...]:
+    """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track and every other one
+    where it starts; whoever is off the body does not touch it."""
+    starts = [np.full_like(places, float(c.rider.motion.path(0.0).S)) for c in model.carriages]
+    along = [places, *starts[1:]]
+    owners = {rider: number for number, carriage in enumerate(model.carriages) for rider, _ in carriage.loads}
+    still, found = np.zeros_like(places), []
+    for number, rider in enumerate(model.riders):
+        place = along[number if number < len(along) else owners[number]] + rider.offset
+        here = (place >= -NEAR * rider.length) & (place <= rider.length * (1.0 + NEAR))
+        found.append(Way(np.where(here, np.clip(place, 0.0, rider.length), 0.0), still, still, bool(here.any()), here))
+    return tuple(found)
+
+
+def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> Way:
+    if not active:
+        nowhere = np.zeros_like(tau)
+        return Way(nowhere, nowhere, nowhere, active)
+    path = rider.path(tau, segment.start, segment.end)
+    place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
+    return Way(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)

@@ -1,0 +1,230 @@
+"""How a body that rides stands on its contacts: where they are, and what each carries at rest on level rigid ground."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.modal.modal_body import ModalBody
+from engine.model.numerics import Numerics
+from engine.model.ties import CarriageTie, Grip, SpringTie
+from engine.model.timeline import AT_END, Rider
+from engine.scene.carriages import BodyCarriage, Contact
+from engine.scene.settings import SPRUNG
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+
+Array = NDArray[np.float64]
+
+LIFTS = 1e-9  # of its weight: a contact that pulls more at rest would lift
+CLASH = 1e-7  # of a shape, per contact: rigid contacts that the modes cannot tell apart any better are one
+HELD = 1e-6  # part of a body's mass that its elastic modes may take of a uniform acceleration
+
+
+class Place(NamedTuple):
+    """Whose contacts: the carriage's number and tie, what it rides on, the number of the body that rides, and of its
+    first contact among all riders."""
+
+    number: int
+    tie: CarriageTie
+    below: ModalBody
+    rides: int
+    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and the shares of its
+    weight that they carry."""
+
+    rides: int
+    mass: float
+    reference: float
+    first: int
+    riders: tuple[Rider, ...]
+    springs: tuple[SpringTie, ...]
+    shares: tuple[float, ...]
+
+    def carried(self, tie: CarriageTie) -> CarriageTie:
+        """The carriage with its weight on the contacts."""
+        loads = tuple((self.first + number, share) for number, share in enumerate(self.shares))
+        return replace(tie, loads=loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
+
+
+def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swept: Collection[str]) -> Standing:
+    """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
+    name = place.tie.name
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
+    _check_fidelity(study, name)
+    _check_points(study, name, carriage, modal)
+    reference = 0.5 * modal.length if carriage.reference is None else carriage.reference
+    riders = tuple(replace(place.tie.rider, offset=_offset(c, reference)) for c in carriage.contacts.values())
+    _check_ways(study, name, carriage, riders)
+    _check_joints(study, name, _joints(carriage, riders, place.below, modal))
+    shares = _shares(study, numerics, name, modal)
+    springs = []
+    for number, (word, contact) in enumerate(carriage.contacts.items()):
+        key = f"carriage.{name}.contacts.{word}"
+        held = Grip(-1.0, place.rides, None, _held_at(contact))
+        damped = contact.damping > 0.0 or f"{key}.damping" in swept
+        rigid = contact.stiffness == "rigid"
+        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
+    acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
+    return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
+
+
+def _held_at(contact: Contact) -> float | str:
+    """Where it holds the body that rides: m along its track, or a point's name."""
+    return contact.at if contact.at is not None else f"point.{contact.point}"
+
+
+def _offset(contact: Contact, reference: float) -> float:
+    """m ahead of the carriage's reference."""
+    return contact.at - reference if contact.at is not None else float(contact.offset or 0.0)
+
+
+def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tuple[float, ...]:
+    """Parts of the weight at rest on level rigid ground.
+
+    N/k + C N = rigid-body motion at the contacts, and N balances the weight; C is the body's flexibility between its
+    contacts. Its own weight bends it only through the contacts: a uniform acceleration moves rigid-body modes alone.
+    """
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
+    grips = [Grip(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
+    places = [grip.at if isinstance(grip.at, str) else np.array([grip.at]) for grip in grips]
+    shapes = np.stack([grip.fixed_row(modal) for grip in grips])
+    rigid = modal.omega == 0.0
+    pull = modal.participation / modal.mass
+    if not float(np.sum(pull[rigid] ** 2) * modal.mass) > 1.0 - HELD:
+        raise BadInput(
+            "something holds this body: it cannot ride",
+            where=study.source.where(f"carriage.{name}.body"),
+            expected="a body that is free to move along gravity",
+            remedy="no supports, or only such as leave it free along gravity, and rigid-body modes kept",
+        )
+    soft = (shapes * modal.modal_flexibility) @ shapes.T
+    if numerics.static_correction:
+        soft = _flexibility(modal, places)
+    own = [0.0 if c.stiffness == "rigid" else 1.0 / float(c.stiffness) for c in carriage.contacts.values()]
+    soft = soft + np.diag(own)
+    unit = max(float(np.trace(soft)), 1e-30)
+    free = shapes[:, rigid] / np.abs(shapes[:, rigid]).max()
+    count = len(places)
+    matrix = np.block([[soft / unit, -free], [free.T, np.zeros((free.shape[1],) * 2)]])
+    wanted = np.concatenate([np.zeros(count), pull[rigid] / np.abs(shapes[:, rigid]).max()])
+    found = np.linalg.lstsq(matrix, wanted, rcond=1e-12)[0]
+    _check_stands(study, name, (free, wanted[count:]), found[:count])
+    return tuple(float(share) for share in found[:count])
+
+
+def _flexibility(modal: ModalBody, places: Sequence[Array | str]) -> Array:
+    """(C, C) deflection at every contact per unit force at every other one, m/N; places (1,) or names of points."""
+    count = len(places)
+    along = [place for place in places if not isinstance(place, str)]
+    if len(along) == count:  # all at once
+        at = np.concatenate(along)
+        return modal.flexibility_between(np.repeat(at, count), np.tile(at, count)).reshape(count, count)
+    return np.array([[modal.flexibility_between(one, other)[0] for other in places] for one in places])
+
+
+def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares: Array) -> None:
+    """Refuse contacts that cannot carry the body at rest."""
+    free, pull = balance
+    tips = np.abs(free.T @ shares - pull).max() > 1e-9 * np.abs(pull).max()
+    if tips or shares.min() < -LIFTS:
+        raise BadInput(
+            "this body would tip over: its contacts cannot carry its weight at rest",
+            where=study.source.where(f"carriage.{name}.contacts"),
+            expected="contacts on both sides of its centre of mass",
+            received=_places_in_words(study, name),
+            remedy="a contact further out on the side to which it tips, or another one",
+        )
+
+
+def _places_in_words(study: Study, name: str) -> str:
+    """Where the contacts of a carriage stand on the body that rides."""
+    carriage = study.carriage[name]
+    assert isinstance(carriage, BodyCarriage)
+    places = [
+        f"{word} at {c.at:g} m" if c.at is not None else f"{word} at {c.point}" for word, c in carriage.contacts.items()
+    ]
+    return ", ".join(places)
+
+
+def _check_fidelity(study: Study, name: str) -> None:
+    if study.solver.fidelity in ("mass", "mass-without-convective"):
+        raise BadInput(
+            f'carriage {name} is a body on contacts, for which fidelity = "{study.solver.fidelity}" has no meaning',
+            where=study.source.where("solver.fidelity"),
+            expected='"auto", or "force" for its weight alone',
+        )
+
+
+def _check_points(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -> None:
+    known = (
+        [] if modal.points is None else [p.partition(".")[2] for p in modal.points.numbers if p.startswith("point.")]
+    )
+    for word, contact in carriage.contacts.items():
+        if contact.point is not None and contact.point not in known:
+            raise BadInput(
+                f"body {carriage.body} has no such point",
+                where=study.source.where(f"carriage.{name}.contacts.{word}.point"),
+                expected=f"one of {', '.join(known)}" if known else "at = metres along its track: it has no points",
+                received=contact.point,
+            )
+
+
+def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[Rider, ...]) -> None:
+    """Contacts stay on what they ride unless the carriage only passes; rigid ones never meet a shock."""
+    low, high = carriage.motion.range()
+    for rider, (word, contact) in zip(riders, carriage.contacts.items(), strict=True):
+        where = study.source.where(f"carriage.{name}.contacts.{word}")
+        slack = AT_END * rider.length
+        stays = low + rider.offset >= -slack and high + rider.offset <= rider.length + slack
+        if rider.stays and not stays:
+            raise BadInput(
+                "this contact leaves the body that it rides",
+                where=where,
+                expected=f"a way within 0 to {rider.length:.6g} m",
+                received=f"{low + rider.offset:.6g} to {high + rider.offset:.6g} m",
+            )
+        alone = len(study.carriage) == 1  # then the scene ends where its motion does
+        jumps = [t for t in rider.speed_jumps[0] if 0.0 < t < rider.end or not (alone or t == 0.0)]
+        shocks = bool(jumps) or rider.delay > 0.0 or getattr(rider.motion, "after", 0.0) > 0.0
+        if contact.stiffness == "rigid" and (not stays or shocks):
+            raise BadInput(
+                "a rigid contact would meet a shock",
+                where=f"{where}.stiffness",
+                expected="a way that stays on the body, without jumps of speed, delay or free vibration afterwards",
+                remedy="a stiffness in N/m",
+            )
+
+
+def _joints(carriage: BodyCarriage, riders: tuple[Rider, ...], below: ModalBody, above: ModalBody) -> Array:
+    """(J, N) rows of the rigid contacts over the modes of both bodies, in the middle of the way."""
+    joints = [(r, c) for r, c in zip(riders, carriage.contacts.values(), strict=True) if c.stiffness == "rigid"]
+    middle, rows = 0.5 * sum(carriage.motion.range()), []
+    for rider, contact in joints:
+        under = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0]
+        held = Grip(1.0, 0, None, _held_at(contact)).fixed_row(above)
+        rows.append(np.concatenate([under * np.sqrt(below.mass), held * np.sqrt(above.mass)]))
+    return np.array(rows)
+
+
+def _check_joints(study: Study, name: str, rows: Array) -> None:
+    """Refuse more rigid contacts than the kept modes of both bodies can meet."""
+    met = int(np.linalg.matrix_rank(rows, tol=CLASH * len(rows))) if rows.size else 0
+    if met < len(rows):
+        raise BadInput(
+            "the kept modes of both bodies cannot meet so many rigid contacts",
+            where=study.source.where(f"carriage.{name}.contacts"),
+            expected=f"at most {met} of them rigid, at different places",
+            received=str(len(rows)),
+            remedy="more modes, or a stiffness in N/m",
+        )

@@ -1,0 +1,102 @@
+"""What couples a scene: carriages, discrete dampers and springs, and where each of them takes hold of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.modal.modal_body import ModalBody
+from engine.model.timeline import Rider
+
+Array = NDArray[np.float64]
+
+Inertia = Literal["force", "mass", "mass-without-convective"]
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A place where a tie acts on a body with ``factor`` times its force: where a rider is (its number), or a fixed
+    place of the body's track (m) or a point of it (by name)."""
+
+    factor: float
+    body: int
+    rider: int | None = None
+    at: float | str = 0.0
+
+    @property
+    def unit(self) -> Grip:
+        """The same place with the factor 1."""
+        return replace(self, factor=1.0)
+
+    def fixed_row(self, modal: ModalBody) -> Array:
+        """(N,) what every mode of its body moves a fixed place by."""
+        if isinstance(self.at, str):
+            assert modal.points is not None
+            return modal.points.row(self.at)
+        return np.asarray(modal.shape_at(self.at)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class CarriageTie:
+    """A carriage as the march sees it: its body's number, its way, and which inertia terms act at its contact.
+
+    loads: riders that carry its weight on level ground, with their shares of it; itself but for a body on its contacts.
+    rides: number of the body that rides, with its mass (kg) and the place of its own track that the motion moves (m).
+    """
+
+    name: str
+    body: int
+    rider: Rider
+    inertia: Inertia
+    loads: tuple[tuple[int, float], ...]
+    rides: int | None = None
+    own_mass: float = 0.0
+    reference: float = 0.0
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        """Where its weight acts."""
+        return tuple(Grip(share, self.body, rider) for rider, share in self.loads)
+
+
+@dataclass(frozen=True, eq=False)
+class SpringTie:
+    """The spring and damper between a body and a sprung mass, or a contact of a body that rides on it.
+
+    What rides counts from where its springs carry it on level rigid ground, so the tie's force is what the spring has
+    beyond that, which stays with the carriage; off the body it stands on such ground.
+
+    carriage, rider: numbers. key: dotted key of the table with its stiffness and damping. held: of the body that rides,
+    where it holds it; None for a sprung mass, whose mode is ``mode``. damped: whether there is a damper. rigid: whether
+    it is a rigid joint instead.
+    """
+
+    carriage: int
+    rider: int
+    key: str
+    held: Grip | None
+    mode: int | None
+    damped: bool
+    rigid: bool = False
+
+    def grips(self, body: int) -> tuple[Grip, ...]:
+        """Where its force acts; ``body`` is ridden."""
+        below = Grip(1.0, body, self.rider)
+        return (below,) if self.held is None else (below, self.held)
+
+
+@dataclass(frozen=True, eq=False)
+class DamperTie:
+    """A damper at a place of a body's track (m) or a point of it (by name): force -c w', c at the dotted key, N s/m."""
+
+    body: int
+    at: float | str
+    key: str
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        """Where its force acts."""
+        return (Grip(1.0, self.body, None, self.at),)

@@ -1,0 +1,155 @@
+"""The track tabulated along the path: one row of every tie per station, shared by all variants of a scene.
+
+Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene time (mechanics section 3).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import FORCE, RATE, Alpha, Blow, Newmark, Ties
+from engine.kernels.rows import add_grip, close_rows
+from engine.model.attachment import holds, residual, shape_derivatives
+from engine.model.attachment import rows as shape_rows
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.ties import Grip, SpringTie
+from engine.model.timeline import Segment
+
+Array = NDArray[np.float64]
+
+
+def tabulate_ties(
+    model: SceneModel, along: tuple[Way, ...], scheme: Newmark | Alpha, missed: Array | None = None
+) -> Ties:
+    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
+    `grips.residual`, where it is known."""
+    stations, modes = along[0].s.size, model.omega.size
+    rows, reaches = np.zeros((stations, modes, model.ties, 4)), np.zeros((modes, model.ties), dtype=np.bool_)
+    drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
+    for r, grips in enumerate(model.grips):
+        for grip in grips:
+            if holds(grip, along):
+                motion = _motion(model, r, grip, along)
+                shapes = shape_derivatives(model, grip, along, motion.highest)
+                add_grip(rows, r, model.bodies[grip.body].modes.start, grip.factor, shapes, motion.factors)
+    for r, carriage in enumerate(model.carriages):
+        if along[r].active and carriage.inertia == "mass":
+            drive[:, r] = _curved_sag(model, carriage.grips[0], along)
+    for r, spring in enumerate(model.springs, start=model.first_spring):
+        if spring.mode is not None:
+            rows[:, spring.mode, r, FORCE] = -1.0
+            rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
+        if along[spring.rider].active:
+            drive[:, r], level[:, r] = _sag_under(model, spring, model.grips[r][0], along)
+    inertial, springs = _kinds(model)
+    close_rows(rows, inertial, scheme.beta, scheme.gamma, reaches)
+    damped = [False] * len(model.carriages) + [True for _ in model.dampers] + [s.damped for s in model.springs]
+    moves = inertial | np.array(damped, dtype=np.bool_)
+    given, reacting = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
+    unity = np.ones(model.ties)
+    unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
+    missed = residual(model, along) if missed is None else missed
+    return Ties(rows, drive, level, reacting, given, moves, springs, missed, unity, reaches)
+
+
+def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Per tie, whether its acceleration enters its force, and whether its gap does."""
+    inertial = [carriage.inertia != "force" for carriage in model.carriages]
+    inertial += [False for _ in model.dampers] + [spring.rigid for spring in model.springs]
+    springs = [False] * model.first_spring + [not spring.rigid for spring in model.springs]
+    return np.array(inertial, dtype=np.bool_), np.array(springs, dtype=np.bool_)
+
+
+class _Motion(NamedTuple):
+    """How a grip moves along its body: the highest derivative of shapes that its ties read, and `add_grip`'s motion."""
+
+    highest: int
+    factors: Array
+
+
+def _motion(model: SceneModel, r: int, grip: Grip, along: tuple[Way, ...]) -> _Motion:
+    """Of a grip of the tie r. Of a mass or rigid joint A = 2 s' phi', B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28); of
+    a damper A = phi, B = s' phi' (mechanics section 4)."""
+    stations, number = along[0].s.size, r - model.first_spring
+    way = None if grip.rider is None else along[grip.rider]
+    if number < 0:
+        convected = r < len(model.carriages) and model.carriages[r].inertia == "mass"
+        damped = r >= len(model.carriages)
+    else:
+        convected, damped = model.springs[number].rigid, model.springs[number].damped
+    if way is not None and convected:
+        return _Motion(2, np.stack([np.zeros(stations), 2.0 * way.ds, way.dds, way.ds**2]))
+    if not damped or convected:
+        return _Motion(0, np.zeros((4, 0)))
+    factors = np.zeros((4, stations))
+    factors[0] = 1.0
+    if way is None:
+        return _Motion(0, factors)
+    factors[2] = way.ds
+    return _Motion(1, factors)
+
+
+def _curved_sag(model: SceneModel, grip: Grip, along: tuple[Way, ...]) -> Array:
+    """(stations,) what the curve of the body's own sag accelerates a mass by on its way, per unit gravity."""
+    assert grip.rider is not None
+    way = along[grip.rider]
+    return np.asarray(way.ds**2 * model.sag(grip.body, way.s, 2) + way.dds * model.sag(grip.body, way.s, 1))
+
+
+def _sag_under(model: SceneModel, spring: SpringTie, below: Grip, along: tuple[Way, ...]) -> tuple[Array, Array]:
+    """(stations,) rate, of a rigid joint acceleration, and gap of a spring by the sag of the body that it stands on."""
+    way = along[spring.rider]
+    if spring.rigid:
+        return _curved_sag(model, below, along), np.zeros_like(way.s)
+    level = model.sag(below.body, way.s, 0)
+    return (way.ds * model.sag(below.body, way.s, 1) if spring.damped else np.zeros_like(level)), level
+
+
+def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tuple[Array, Array, Array]:
+    """p and s' phi' (N, R) of springs or joints at the first station, and s' times the slope of the body's own sag (R,)
+    per unit gravity; s' as the ways have it."""
+    force, slope, sag = (
+        np.zeros((model.omega.size, len(ties))),
+        np.zeros((model.omega.size, len(ties))),
+        np.zeros(len(ties)),
+    )
+    for place, r in enumerate(ties):
+        for grip in model.grips[r]:
+            if holds(grip, along):
+                force[model.bodies[grip.body].modes, place] += grip.factor * shape_rows(model, grip, along)[0]
+        below = model.grips[r][0]
+        if below.rider is not None and along[below.rider].active:
+            way = along[below.rider]
+            slope[model.bodies[below.body].modes, place] = way.ds[0] * shape_rows(model, below, along, 1)[0]
+            sag[place] = way.ds[0] * model.sag(below.body, way.s, 1)[0]
+    return force, slope, sag
+
+
+def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: Array) -> Blow:
+    """The impulse at the beginning of a segment.
+
+    mass (blocks, ties, LANES): kg, zero for ties without inertia;  time_scale (blocks, LANES): s per scene time.
+    """
+    ties, modes = model.ties, model.omega.size
+    shape, slope, sag_slope, arrives = np.zeros((ties, modes)), np.zeros((ties, modes)), np.zeros(ties), np.zeros(ties)
+    speed = np.zeros_like(mass)
+    at = np.array([segment.start])
+    for r, carriage in enumerate(model.carriages):
+        if segment.active[r] and carriage.inertia != "force":
+            place = np.clip(carriage.rider.path(at, segment.start, segment.end).S, 0.0, carriage.rider.length)
+            part = model.bodies[carriage.body]
+            shape[r, part.modes] = part.modal.shape(place)[0]
+            slope[r, part.modes] = part.modal.shape(place, 1)[0]
+            sag_slope[r] = model.sag(carriage.body, place, 1)[0]
+    for strike in segment.strikes:
+        if strike.rider >= len(model.carriages):  # a contact on a spring meets no shock
+            continue
+        inertia = model.carriages[strike.rider].inertia
+        arrives[strike.rider] = float(strike.kind == "arrival" and inertia != "force")
+        if inertia == "mass":
+            speed[:, strike.rider] = strike.speed / time_scale
+    return Blow(shape, slope, sag_slope, arrives, mass, speed)

@@ -1,0 +1,118 @@
+"""Contact forces: of a carriage, or at every contact of a body that rides, and where on the way they count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.ties import Grip
+from engine.model.timeline import Rider
+from engine.observation.readings import Channel, Sensor
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForce:
+    """The force (N) between a carriage (its number) and its body, or at one contact of a body that rides (the number of
+    its rider)."""
+
+    carriage: int
+    contact: int | None = None
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        return []
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+    @property
+    def offset_order(self) -> int:
+        return 0
+
+    def rides(self, model: SceneModel) -> int:
+        """The rider whose place it is."""
+        return self.carriage if self.contact is None else self.contact
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+        """Whether the carriage is on the body and off the last part of the span towards a held end."""
+        rider = self.rides(model)
+        way, body = along[rider], model.carriages[self.carriage].body
+        if not way.active:
+            return np.zeros(way.s.size, dtype=np.bool_)
+        low, high = span_counted(model, model.riders[rider], body)
+        return np.asarray((way.s >= low) & (way.s <= high))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSensor(Sensor):
+    """The force at one contact of a body that rides (the number of its rider), or at all contacts of a carriage
+    together, as a sensor with its history. It counts wherever the carriage's contact is on its body."""
+
+    carriage: int
+    contact: int | None
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        return []
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
+
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return self.missed(model, along)
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((1, model.omega.size))
+
+    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
+        return np.ones(1)
+
+    def rides(self, model: SceneModel) -> int:
+        return ContactForce(self.carriage, self.contact).rides(model)
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+        return np.full(along[0].s.size, along[self.rides(model)].active)
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+
+def contact_row(model: SceneModel, carriage: int, contact: int | None = None) -> Array:
+    """(ties,) parts of all ties' forces that make the contact force of a carriage, or that at one of its contacts."""
+    found, springs = np.zeros(model.ties), model.springs_of(carriage)
+    if contact is None:
+        found[[carriage, *springs]] = 1.0
+    else:
+        found[carriage] = dict(model.carriages[carriage].loads)[contact]
+        found[[r for r, spring in springs.items() if spring.rider == contact]] = 1.0
+    return found
+
+
+def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
+    """The contact force of every carriage; of a body that rides, that of every contact."""
+    found: list[ContactForce] = []
+    for number, carriage in enumerate(model.carriages):
+        contacts = [None] if carriage.rides is None else [rider for rider, _ in carriage.loads]
+        found += [ContactForce(number, contact) for contact in contacts]
+    return tuple(found)
+
+
+def span_counted(model: SceneModel, rider: Rider, body: int) -> tuple[float, float]:
+    """Places between which a contact force counts: an end that is held along the load is left out where the way leads
+    to it."""
+    length = rider.length
+    left, right = model.bodies[body].modal.held_ends
+    low, high = (1.0 - SPAN_COUNTED) * length, SPAN_COUNTED * length
+    forward = rider.stays or float(rider.motion.path(0.0).dS) > 0.0
+    backward = rider.stays or not forward
+    return (low if left and backward else 0.0), (high if right and forward else length)

@@ -1,0 +1,251 @@
+"""What a sensor reads at every step, and the rows of numbers that make it: at a place, under a carriage, aboard one.
+
+Displacement, section forces, stress and strain are linear in w and its derivatives along the track and carry the static
+residual of the modes left out (mechanics section 7.8): influence line minus kept modes, times the actual contact force.
+Velocity and acceleration are those of the kept modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.modal.modal_body import ModalBody, Sections
+from engine.model.attachment import holds, place
+from engine.model.attachment import rows as shape_rows
+from engine.model.scene_model import BodyPart, SceneModel
+from engine.model.station_path import Way
+from engine.model.ties import Grip
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# of w along the track, for what statics make; axial forces are those of `ModalBody.sections` alone
+DERIVATIVE = {"displacement": 0, "axial_force": 1, "bending_moment": 2, "stress": 2, "strain": 2, "shear_force": 3}
+OF_SECTIONS = ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+RATE_ORDER = {"velocity": 1, "acceleration": 2}
+
+
+class Channel(NamedTuple):
+    """A sum over the modes: what it multiplies ("q", "v", "a"), the power of 1/h, and rows (1 or S, N)."""
+
+    of: str
+    order: int
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A quantity on a body, at a fixed place or under a carriage (its number)."""
+
+    name: str
+    quantity: str
+    body: int
+    at: float
+    under: int | None
+
+    def places(self, along: tuple[Way, ...]) -> Array:
+        """Where it reads, m: one place, or one per station."""
+        return np.array([self.at]) if self.under is None else along[self.under].s
+
+    def shape(self, model: SceneModel, along: tuple[Way, ...], derivative: int) -> Array:
+        """(1 or stations, modes of its body) mode shapes where it reads."""
+        body = model.bodies[self.body].modal
+        return body.shape_at(self.at, derivative) if self.under is None else along[self.under].shape(body, derivative)
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        """Its sums over the modes."""
+        part = model.bodies[self.body]
+        if self.quantity in DERIVATIVE:
+            return [Channel("q", 0, _spread(model, part, self._rows(model, along)))]
+        order, shape = RATE_ORDER[self.quantity], self.shape(model, along, 0)
+        if self.under is None:
+            return [Channel("qva"[order], order, _spread(model, part, shape))]
+        way = along[self.under]
+        ds, dds = way.ds[:, None], way.dds[:, None]
+        slope = self.shape(model, along, 1)
+        if order == RATE_ORDER["velocity"]:
+            material = {"q": ds * slope, "v": shape}
+        else:
+            material = {"q": ds**2 * self.shape(model, along, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
+        return [Channel(of, order, _spread(model, part, rows)) for of, rows in material.items()]
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations, ties): static response per unit force of each tie that the kept modes miss."""
+        found = np.zeros((along[0].s.size, model.ties))
+        if self.quantity not in DERIVATIVE or not model.numerics.static_correction:
+            return found
+        known = dict[Grip, Array]()
+        for r, grip in self._felt(model, along):
+            if grip.unit not in known:  # a carriage's weight and its springs hold the same places
+                kept = self._kept(model, along, shape_rows(model, grip, along))
+                known[grip.unit] = self._full(model, along, place(grip, along)) - kept
+            found[:, r] += grip.factor * known[grip.unit]
+        return found
+
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations, ties) static reading per unit force of each tie, by what the march tends to when it is slow: the
+        whole influence line with the static correction, else the kept modes."""
+        found = np.zeros((along[0].s.size, model.ties))
+        if self.offset_order == 0:
+            for r, grip in self._felt(model, along):
+                found[:, r] += grip.factor * self.unit_reading(model, along, grip)
+        return found
+
+    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
+        """(1 or stations,) static reading per unit force where a grip holds its body."""
+        if not model.numerics.static_correction:
+            return self._kept(model, along, shape_rows(model, grip, along))
+        whole = self._full(model, along, place(grip, along))
+        here = None if grip.rider is None else along[grip.rider].here
+        return whole if here is None else np.where(here, whole, 0.0)
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(1 or stations, N) what it reads of the coordinates that only contacts hold (`statics.loose_modes`)."""
+        if self.offset_order:
+            return np.zeros((1, model.omega.size))
+        return _spread(model, model.bodies[self.body], self._rows(model, along))
+
+    def shown(self, model: SceneModel, places: Array) -> Array:
+        """(P,) the most that one of its body's modes would show, to some scale, if it read at other places (m)."""
+        sections = self._sections(model)
+        if sections is not None:
+            rows = sections.rows(self.quantity, places)
+        else:
+            rows = self._modal(model).shape(places, DERIVATIVE.get(self.quantity, 0))
+        return np.asarray(np.abs(rows).max(axis=1))
+
+    def rides(self, model: SceneModel) -> int | None:
+        """The rider that it moves with."""
+        return self.under
+
+    def _felt(self, model: SceneModel, along: tuple[Way, ...]) -> Iterator[tuple[int, Grip]]:
+        """The grips of all ties on its body, with the ties' numbers."""
+        for r, grips in enumerate(model.grips):
+            for grip in grips:
+                if grip.body == self.body and holds(grip, along):
+                    yield r, grip
+
+    def _modal(self, model: SceneModel) -> ModalBody:
+        return model.bodies[self.body].modal
+
+    def _sections(self, model: SceneModel) -> Sections | None:
+        """What reads section forces where the body is not one uniform beam."""
+        return self._modal(model).sections if self.quantity in OF_SECTIONS else None
+
+    def _rows(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(1 or stations, modes of its body) what it reads of every mode."""
+        sections = self._sections(model)
+        if sections is not None:
+            return sections.rows(self.quantity, self.places(along))
+        shape = self.shape(model, along, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(model.bodies[self.body], self.quantity) * shape)
+
+    def _full(self, model: SceneModel, along: tuple[Way, ...], loaded: Array | str) -> Array:
+        """Static reading per unit force at places of the track (m), or at a point (its name)."""
+        part, sections = model.bodies[self.body], self._sections(model)
+        if isinstance(loaded, str):
+            return self._under_point(model, along, loaded)
+        if sections is not None:
+            return sections.influence_at(self.quantity, self.places(along), loaded)
+        line = part.modal.influence_at(self.places(along), loaded, DERIVATIVE[self.quantity])
+        return np.asarray(_factor(part, self.quantity) * line)
+
+    def _under_point(self, model: SceneModel, along: tuple[Way, ...], point: str) -> Array:
+        """Static reading per unit force at a point."""
+        part, x = model.bodies[self.body], self.places(along)
+        assert part.modal.points is not None
+        if self._sections(model) is not None:
+            return part.modal.points.section_influence(self.quantity, point, x)
+        return np.asarray(
+            _factor(part, self.quantity) * part.modal.points.influence(point, x, DERIVATIVE[self.quantity])
+        )
+
+    def _kept(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
+        """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
+        return np.asarray(np.sum(self._rows(model, along) * loaded * self._modal(model).modal_flexibility, axis=1))
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations,): what the body's own weight adds per unit gravity, in step units."""
+        stations = along[0].s.size
+        x = self.places(along)
+        if not model.bodies[self.body].own_weight:
+            return np.zeros(stations)
+        sections = self._sections(model)
+        if sections is not None:
+            return np.broadcast_to(sections.own_weight(self.quantity, x), stations)
+        if self.quantity in DERIVATIVE:
+            factor = _factor(model.bodies[self.body], self.quantity)
+            return np.broadcast_to(factor * model.sag(self.body, x, DERIVATIVE[self.quantity]), stations)
+        if self.under is None:
+            return np.zeros(stations)
+        way = along[self.under]
+        slope = model.sag(self.body, x, 1)
+        if self.quantity == "velocity":
+            return way.ds * slope
+        return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
+
+    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        """(stations,): its static reading by the body's own weight per unit gravity."""
+        return self.offset(model, along) if self.offset_order == 0 else np.zeros(along[0].s.size)
+
+    @property
+    def offset_order(self) -> int:
+        """The power of 1/h that makes the offset SI."""
+        return RATE_ORDER.get(self.quantity, 0)
+
+    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+        """(stations,) bool: whether it reads anything there."""
+        return np.full(along[0].s.size, self.under is None or along[self.under].active)
+
+
+@dataclass(frozen=True, eq=False)
+class SprungSensor(Sensor):
+    """The motion of a carriage's sprung mass, whose coordinate stands at ``mode``; its static reading is the deflection
+    under its carriage by the kept modes, which its spring touches."""
+
+    mode: int
+
+    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+        row = np.zeros((1, model.omega.size))
+        row[0, self.mode] = 1.0
+        return [Channel("qva"[self.offset_order], self.offset_order, row)]
+
+    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((along[0].s.size, model.ties))
+
+    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros((along[0].s.size, model.ties))
+
+    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        found = np.zeros((1, model.omega.size))
+        found[0, self.mode] = float(self.offset_order == 0)
+        return found
+
+    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+        return np.zeros(along[0].s.size)
+
+
+def _factor(part: BodyPart, quantity: str) -> float:
+    """What a derivative of w is multiplied by: M = -E I w'', V = dM/ds; of the extreme fibre strain -c w'', stress
+    M c / I."""
+    if quantity == "displacement":
+        return 1.0
+    if quantity == "strain":
+        return -part.fibre_distance
+    factor = -part.modal.bending_stiffness
+    return factor * part.fibre_distance / part.second_moment if quantity == "stress" else factor
+
+
+def _spread(model: SceneModel, part: BodyPart, rows: Array) -> Array:
+    """Rows of one body in the row of all modes."""
+    found = np.zeros((rows.shape[0], model.omega.size))
+    found[:, part.modes] = rows
+    return found

@@ -1,0 +1,123 @@
+"""What is observed of a scene, and its tables along a segment: sensors, accelerations across, contact forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import Watch
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.ties import CarriageTie
+from engine.observation.contact_forces import ContactForce, ContactSensor, contact_forces
+from engine.observation.readings import Sensor, SprungSensor
+
+Array = NDArray[np.float64]
+
+Signal = Sensor | ContactForce
+
+SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
+
+
+def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
+    """The sensors in the study's order, the acceleration across of some carriages, then all contact forces."""
+    names = [carriage.name for carriage in model.carriages]
+    sensors: list[Signal] = [_sensor(model, name, names) for name in model.study.sensor]
+    for carriage in accelerated:
+        name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
+        if carriage.rides is None:
+            sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))
+        else:
+            sensors.append(Sensor(name, "acceleration", carriage.rides, carriage.reference, None))
+    return (*sensors, *contact_forces(model))
+
+
+def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
+    """A sensor of the study."""
+    spec, study = model.study.sensor[name], model.study
+    under = None if spec.rides is None else carriages.index(spec.rides)
+    body = [part.name for part in model.bodies].index(study.body_of(name))
+    at = 0.0 if spec.at is None else spec.at
+    if spec.carriage is None or under is None:
+        return Sensor(name, spec.quantity, body, at, under)
+    springs = model.springs_of(under)
+    if spec.quantity == "contact_force":
+        chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]
+        return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)
+    mode = next((spring.mode for spring in springs.values()), None)
+    return (
+        Sensor(name, spec.quantity, body, at, under)
+        if mode is None
+        else SprungSensor(name, spec.quantity, body, at, under, mode)
+    )
+
+
+def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Array:
+    """(stations, signals, ties) static responses per unit force of each tie that the kept modes miss."""
+    return np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1))
+
+
+def tabulate_watch(
+    model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...], missed: Array | None = None
+) -> Watch:
+    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known."""
+    channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
+    ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
+    rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
+    modes = 4 * -(-model.omega.size // 4)
+    counted = np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1))
+    return Watch(
+        on_q=_stacked(rows["q"], modes),
+        on_v=_stacked(rows["v"], modes),
+        on_a=_stacked(rows["a"], modes),
+        signal=np.array([number for number, _ in ordered], dtype=np.int64),
+        order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
+        static=tabulate_missed(model, signals, along) if missed is None else missed,
+        offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
+        offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
+        counted=counted,
+        summed=np.array([isinstance(s, Sensor) for s in signals], dtype=np.bool_) & counted.all(axis=0),
+    )
+
+
+def last_signals(watch: Watch, count: int) -> Watch:
+    """The last so many signals of a watch, which have no channels, such as contact forces."""
+    part = slice(watch.counted.shape[1] - count, None)
+    return Watch(
+        on_q=_stacked([], watch.on_q.shape[2]),
+        on_v=_stacked([], watch.on_v.shape[2]),
+        on_a=_stacked([], watch.on_a.shape[2]),
+        signal=watch.signal[:0],
+        order=watch.order[:0],
+        static=np.ascontiguousarray(watch.static[:, part]),
+        offset=np.ascontiguousarray(watch.offset[:, part]),
+        offset_order=watch.offset_order[part],
+        counted=np.ascontiguousarray(watch.counted[:, part]),
+        summed=watch.summed[part],
+    )
+
+
+def _stacked(rows: list[Array], modes: int) -> Array:
+    """(1 or stations, channels, modes), the modes filled up with zeros to whole fours."""
+    stations = max((row.shape[0] for row in rows), default=1)
+    found = np.zeros((stations, len(rows), modes))
+    for channel, row in enumerate(rows):
+        found[:, channel, : row.shape[1]] = row
+    return found
+
+
+def silent(model: SceneModel, sensors: Iterable[Sensor]) -> NDArray[np.bool_]:
+    """(J,) sensors where no mode of their body says anything, such as the deflection at a support: what they read is
+    rounding, and has no relative error."""
+    return np.array(
+        [type(sensor) is Sensor and sensor.under is None and _says_nothing(model, sensor) for sensor in sensors],
+        dtype=np.bool_,
+    )
+
+
+def _says_nothing(model: SceneModel, sensor: Sensor) -> bool:
+    places = np.linspace(0.0, model.bodies[sensor.body].modal.length, PLACES)
+    here, *elsewhere = sensor.shown(model, np.array([sensor.at, *places]))
+    return bool(here <= SILENT * max(elsewhere))

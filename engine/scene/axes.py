@@ -1,0 +1,154 @@
+"""One axis of a sweep as values: read through the fields that they are meant for, generated, and checked."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from engine.scene.settings import SweepAxis
+from engine.scene.study import FIXED, Scene, Study, value_in, with_value
+from engine.study_file.document import shortened
+from engine.study_file.spec import bad_input, nearest
+from results_schema.errors import BadInput
+
+CHECKED_ONE_BY_ONE = 1000  # longer lists of plain numbers are checked at their ends: every field's limits are intervals
+SOBOL_SEED = 0
+
+Number = int | float
+Values = NDArray[Any]
+
+
+class Range(NamedTuple):
+    """Ends of an axis in SI; integers where the swept field holds integers."""
+
+    low: Number
+    high: Number
+
+    @property
+    def whole(self) -> bool:
+        """Whether the axis counts."""
+        return isinstance(self.low, int) and isinstance(self.high, int)
+
+
+def listed(study: Study, name: str, axis: SweepAxis) -> Values:
+    """Values (V,) of an axis that lists them, SI, int64 or float64. Raises BadInput with key and index."""
+    given = axis.values or ()
+    plain = [value for value in given if not isinstance(value, str)]
+    if len(given) > CHECKED_ONE_BY_ONE and len(plain) == len(given):
+        for extreme in (min(plain), max(plain)):
+            read(study, name, axis, extreme, f"values.{given.index(extreme)}")
+        whole = isinstance(read(study, name, axis, given[0], "values.0"), int)
+        return np.array(given, dtype=np.int64 if whole else np.float64)
+    values = [read(study, name, axis, value, f"values.{index}") for index, value in enumerate(given)]
+    return np.array(values)
+
+
+def ranged(study: Study, name: str, axis: SweepAxis) -> Values:
+    """Values (count,) of an axis with equal or proportional spacing, both ends exact. Raises BadInput."""
+    ends, count = _ends(study, name, axis), axis.count or 0
+    if count == 1 and ends.low != ends.high:
+        raise _bad(study, f"{name}.count", "one value cannot have two ends", "count >= 2, or values = [...]", "1")
+    spread = np.linspace if axis.spacing == "linear" else np.geomspace
+    values = np.asarray(spread(ends.low, ends.high, count), dtype=np.float64)
+    if ends.whole:
+        rounded = np.rint(values)
+        if np.abs(values - rounded).max() > 1e-9 * max(1.0, np.abs(values).max()):
+            odd = f"{values[np.abs(values - rounded).argmax()]:g}"
+            raise _bad(study, f"{name}.count", "the axis counts, and this gives fractions", "whole numbers", odd)
+        values = rounded.astype(np.int64)
+    return values
+
+
+def sampled(study: Study, name: str, axis: SweepAxis, parts: NDArray[np.float64]) -> Values:
+    """Values (V,) of a sampled axis from numbers (V,) in [0, 1); integers are equally likely."""
+    low, high = _ends(study, name, axis)
+    if isinstance(low, int) and isinstance(high, int):
+        low, high = min(low, high), max(low, high)
+        return (low + np.floor(parts * (high - low + 1))).astype(np.int64)
+    if axis.spacing == "log":
+        exponents = np.log(low) + parts * (np.log(high) - np.log(low))
+        return np.asarray(np.clip(np.exp(exponents), min(low, high), max(low, high)))
+    return np.asarray(np.clip(low + parts * (high - low), min(low, high), max(low, high)))
+
+
+def sobol_points(size: int, dimensions: int) -> NDArray[np.float64]:
+    """The first points (size, dimensions) of the scrambled Sobol sequence of seed 0, each in [0, 1)."""
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(SOBOL_SEED))
+    return np.asarray(sequence.random_base2(max(size - 1, 0).bit_length())[:size], dtype=np.float64)
+
+
+def read(study: Study, name: str, axis: SweepAxis, amount: Any, entry: str) -> Number:
+    """One value in SI, as all fields that the axis sets read it. Raises BadInput that names axis and entry."""
+    numbers = [_read_at(study, path, amount, f"sweep.{name}.{entry}") for path in axis.of]
+    if any(number != numbers[0] for number in numbers):
+        raise _bad(study, f"{name}.of", "these keys read a value differently", "keys of one dimension", str(amount))
+    whole = [number for number in numbers if isinstance(number, int)]
+    return whole[0] if whole else numbers[0]
+
+
+def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
+    """Every key of the axis is a number of the study, or an optional one. Raises BadInput with the nearest key."""
+    for path in axis.of:
+        where = study.source.where(f"sweep.{name}.of")
+        if any(path == fixed or path.startswith(f"{fixed}.") for fixed in FIXED):
+            raise BadInput("this number is not part of the model", where=where, received=shortened(path))
+        try:
+            current = study.value(path)
+        except KeyError:
+            current = study
+        open_ = current in (None, "auto") and path != "solver.fidelity"  # which is a word whatever it says
+        if isinstance(current, bool) or not (open_ or isinstance(current, int | float)):
+            remedy = nearest(path, list(study.numbers()))
+            raise BadInput(
+                "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy
+            )
+
+
+def _ends(study: Study, name: str, axis: SweepAxis) -> Range:
+    """Both ends in SI; a logarithmic axis needs them on one side of zero."""
+    low = read(study, name, axis, axis.from_, "from")
+    high = read(study, name, axis, axis.to, "to")
+    if axis.spacing == "log" and not (low > 0 and high > 0):
+        raise _bad(study, f"{name}.spacing", "log needs positive ends", "from > 0 and to > 0", f"{low:g}, {high:g}")
+    return Range(low, high)
+
+
+def _read_at(study: Study, path: str, amount: Any, entry: str) -> Number:
+    data = with_value(_table_around(study, path), path, amount)
+    try:
+        number: Number = value_in(Scene(**data), path)
+    except ValidationError as error:
+        problem = bad_input(error.errors(include_url=False)[0], Scene, data, study.source)
+        what, received = f"{path}: {problem.what}", problem.received or shortened(amount)
+        where = study.source.where(entry)
+        raise BadInput(what, where=where, expected=problem.expected, received=received, remedy=problem.remedy) from None
+    return number
+
+
+def _table_around(study: Study, path: str) -> dict[str, Any]:
+    """The least data that make a scene in which the key can be set."""
+    top, *rest = path.split(".")
+    data = study.data
+    if top not in data:
+        return {"kind": study.kind}
+    named = isinstance(data[top], dict) and top in ("body", "carriage", "sensor")
+    return {"kind": study.kind, top: {rest[0]: data[top][rest[0]]} if named else data[top]}
+
+
+def check_distinct(study: Study, name: str, values: Values) -> None:
+    """Refuse an axis of a grid that has a value twice."""
+    found, first, counts = np.unique(values, return_index=True, return_counts=True)
+    if len(found) < len(values):
+        twice = int(np.flatnonzero(counts > 1)[0])
+        place = int(np.flatnonzero(values == found[twice])[1])
+        what = f"entry {place} repeats entry {first[twice]}"
+        raise _bad(study, name, what, "different values", f"{found[twice]:g} {counts[twice]} times")
+
+
+def _bad(study: Study, key: str, what: str, expected: str, received: str) -> BadInput:
+    return BadInput(what, where=study.source.where(f"sweep.{key}"), expected=expected, received=received)

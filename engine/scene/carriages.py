@@ -1,0 +1,157 @@
+"""What rides on a body: a force, a mass, a mass on a spring or a body on its shoes, with its motion and its start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from engine.scene.motions import AnyMotion
+from engine.study_file.checks import Check, on_body
+from engine.study_file.spec import NUMBER, WORD, KindOf, Spec, form_of_amount
+from engine.study_file.units import Damping, Force, Length, Mass, Stiffness, Time, fault
+
+MAX_CONTACTS = 12
+
+
+class Carriage(Spec):
+    """Base of all carriages.
+
+    on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
+    headway: instead of a delay, the metres of its own way by which it trails a carriage that sets off at time 0.
+    masses: keys that hold parts of its mass in kg.
+    """
+
+    masses: ClassVar[tuple[str, ...]] = ()
+
+    on: str
+    motion: AnyMotion
+    delay: Time | None = Field(default=None, ge=0)
+    headway: Length | None = Field(default=None, ge=0)
+
+    @property
+    def moving_mass(self) -> float:
+        """kg of the whole carriage."""
+        return float(sum(getattr(self, key) for key in self.masses))
+
+    def weight(self, gravity: float) -> float:
+        """Force along gravity on a body at rest, N, by the masses or the force of its own keys; gravity in m/s2."""
+        return self.moving_mass * gravity
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the contact force depends on the body's acceleration."""
+        return self.moving_mass > 0.0
+
+    @property
+    def start_time(self) -> float:
+        """s after time 0 at which the carriage sets off."""
+        if self.headway is None:
+            return self.delay or 0.0
+        return self.headway * self.motion.time_scale / self.motion.max_speed
+
+    @model_validator(mode="after")
+    def _one_start(self) -> Carriage:
+        if self.headway is None:
+            return self
+        if self.delay is not None:
+            raise fault("a carriage has a delay or a headway, not both", expected="delay (s) or headway (m)")
+        if not hasattr(self.motion, "speed"):
+            raise fault("a headway needs a motion with a constant speed", expected="delay (s)")
+        return self
+
+
+class ForceCarriage(Carriage):
+    """A constant force in N along gravity; negative lifts."""
+
+    kind: Literal["force"]
+    force: Force
+
+    def weight(self, gravity: float) -> float:
+        return self.force
+
+
+class MassCarriage(Carriage):
+    """A rigid mass in kg that stays in contact; its weight acts."""
+
+    masses: ClassVar[tuple[str, ...]] = ("mass",)
+
+    kind: Literal["mass"]
+    mass: Mass = Field(gt=0)
+
+
+class OscillatorCarriage(Carriage):
+    """A sprung mass (kg) on a spring (N/m) and a damper (N s/m) over a wheel (kg) that stays in contact; the weights of
+    both masses act."""
+
+    masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
+
+    kind: Literal["oscillator"]
+    mass: Mass = Field(gt=0)
+    wheel_mass: Mass = Field(default=0.0, ge=0)
+    stiffness: Stiffness = Field(gt=0)
+    damping: Damping = Field(default=0.0, ge=0)
+
+
+by_rigid_or_amount = Discriminator(lambda value: WORD if value == "rigid" else form_of_amount(value))
+ContactStiffness = Annotated[
+    Annotated[Literal["rigid"], Tag(WORD)] | Annotated[Annotated[Stiffness, Field(gt=0)], Tag(NUMBER)],
+    by_rigid_or_amount,
+]
+
+
+class Contact(Spec):
+    """A shoe or wheel under a body: a spring (N/m, or "rigid") and a damper (N s/m) between the body and what it rides.
+
+    at: m along the track of the body that rides. point: instead, one of that body's points by name, `offset` m ahead
+    of the carriage's reference (negative: behind).
+    """
+
+    at: Length | None = Field(default=None, ge=0)
+    point: str | None = None
+    offset: Length | None = None
+    stiffness: ContactStiffness
+    damping: Damping = Field(default=0.0, ge=0)
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Contact:
+        if (self.at is None) == (self.point is None):
+            raise fault("a contact has exactly one place", expected='at = metres, or point = "a point" with an offset')
+        if (self.point is None) != (self.offset is None):
+            raise fault("offset and point belong together", expected='point = "a point" and offset = metres')
+        if self.stiffness == "rigid" and self.damping > 0.0:
+            raise fault("a rigid contact has no damper", expected="damping = 0, or a stiffness in N/m")
+        return self
+
+
+class BodyCarriage(Carriage):
+    """Another body of the study, which nothing else holds, on shoes or wheels; its weight acts.
+
+    reference: m along its own track, the place that the motion moves; the middle of its track if not given. Its track
+    points the way of the track that it rides. contacts: by name.
+    """
+
+    kind: Literal["body"]
+    body: str
+    reference: Length | None = None
+    contacts: dict[str, Contact] = Field(min_length=1, max_length=MAX_CONTACTS)
+
+    def places(self, here: str, length: str) -> Iterator[Check]:
+        """Conditions on places along its own track, whose length stands at the dotted key `length`."""
+        keys = [f"contacts.{name}.at" for name, contact in self.contacts.items() if contact.at is not None]
+        for key in keys if self.reference is None else ["reference", *keys]:
+            yield on_body(f"{here}.{key}", (f"{here}.{key}", length), "a place off the track of the body that rides")
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+
+CARRIAGES: Mapping[str, type[Spec]] = {
+    "force": ForceCarriage,
+    "mass": MassCarriage,
+    "oscillator": OscillatorCarriage,
+    "body": BodyCarriage,
+}
+AnyCarriage = Annotated[Carriage, KindOf("carriage", CARRIAGES)]

@@ -1,0 +1,110 @@
+"""What every motion has: a path in normalised time with exact derivatives.
+
+Every motion is a path S(tau), tau = t/time_scale, that does not depend on its speed or frequency (mechanics.md,
+section 3). It lasts from tau = 0 to `duration`; before, the carriage waits at the start; afterwards it is gone.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.study_file.checks import Check
+from engine.study_file.spec import Spec
+
+Array = NDArray[np.float64]
+Side = Literal["left", "right"]
+
+ROUNDING = 1e-12  # tau may pass the end by this part of the duration, as sums of steps do
+
+
+class Path(NamedTuple):
+    """Position S in m and its derivatives by tau, arrays of one shape; NaN where the carriage is gone."""
+
+    S: Array
+    dS: Array
+    ddS: Array
+
+
+class Reversal(NamedTuple):
+    """An instant change of the speed: tau, and dS/dtau in m before and after."""
+
+    tau: float
+    before: float
+    after: float
+
+
+class Motion(Spec):
+    """Base of all motions. Positions in m along the body's track, tau without unit."""
+
+    family: ClassVar[float] = 0.0  # first number of the shape's key
+    period: ClassVar[float | None] = None  # tau after which the path repeats
+
+    @property
+    @abstractmethod
+    def time_scale(self) -> float:
+        """Seconds per unit of tau."""
+
+    @property
+    @abstractmethod
+    def duration(self) -> float:
+        """Length of the motion in tau."""
+
+    @property
+    @abstractmethod
+    def max_speed(self) -> float:
+        """Largest |dS/dtau| in m."""
+
+    @abstractmethod
+    def shape_key(self) -> tuple[float, ...]:
+        """Numbers that decide the whole path as a function of tau; equal keys mean equal paths."""
+
+    @abstractmethod
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest position in m."""
+
+    @abstractmethod
+    def checks(self, here: str, length: str) -> list[Check]:
+        """Conditions on this motion at the dotted key `here` on a body whose length has the key `length`."""
+
+    @abstractmethod
+    def _inside(self, tau: Array, side: Side) -> Path:
+        """The law for 0 <= tau <= duration."""
+
+    def breaks(self) -> Array:
+        """tau inside (0, duration), ascending, where dS or ddS jumps."""
+        return np.array([reversal.tau for reversal in self.reversals()])
+
+    def reversals(self) -> tuple[Reversal, ...]:
+        """The breaks at which dS jumps."""
+        return ()
+
+    def path(self, tau: ArrayLike, side: Side = "right") -> Path:
+        """The path at any tau; at a break the limit from `side`, at 0 and at the end the limit from inside.
+
+        >>> from engine.scene.motions import Cruise
+        >>> Cruise(kind="cruise", start=1.0, end=3.0, speed=5.0).path([-1.0, 0.0, 0.5, 1.0, 2.0]).S
+        array([ 1.,  1.,  2.,  3., nan])
+        """
+        times = np.asarray(tau, dtype=np.float64)
+        inside = self._inside(np.clip(times, 0.0, self.duration), side)
+        waiting, gone = times < 0.0, times > self.duration * (1.0 + ROUNDING)
+        if not (waiting.any() or gone.any()):
+            return inside
+        moves = (np.where(waiting, 0.0, part) for part in inside[1:])
+        return Path(*(np.where(gone, np.nan, part) for part in (inside.S, *moves)))
+
+    def path_on(self, tau: ArrayLike, segment_start: float, segment_end: float) -> Path:
+        """The path on a segment without a break inside, with one-sided limits at the segment's ends.
+
+        tau outside the segment is evaluated at the nearer end.
+        """
+        times = np.clip(np.asarray(tau, dtype=np.float64), segment_start, segment_end)
+        found, last = self.path(times, "right"), times == segment_end
+        if segment_end < self.duration and last.any():  # at its own end a motion has one limit
+            for part, at_end in zip(found, self.path(times[last], "left"), strict=True):
+                part[last] = at_end
+        return found

@@ -1,0 +1,281 @@
+"""The motions that a carriage can have: cruise, out and back, sinusoidal, waypoints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import reduce
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, Strict, model_validator
+
+from engine.scene.motion_base import Array, Motion, Path, Reversal, Side
+from engine.study_file.checks import Check, on_body
+from engine.study_file.spec import Hint, KindOf, Spec
+from engine.study_file.splines import spline_at_rest, spline_range, spline_touches
+from engine.study_file.units import Dimensionless, Frequency, Length, Speed, Time, fault
+
+
+class Cruise(Motion):
+    """Constant speed from start to end; either may lie off the body. tau = 1 is one passage.
+
+    after: free vibration afterwards, in first periods of the body.
+    """
+
+    family = 1.0
+    kind: Literal["cruise"]
+    start: Length
+    end: Length
+    speed: Annotated[Speed, Hint("end < start runs backward")] = Field(gt=0)
+    after: Dimensionless = Field(default=0.0, ge=0, le=1e6)
+
+    @property
+    def time_scale(self) -> float:
+        return abs(self.end - self.start) / self.speed
+
+    @property
+    def duration(self) -> float:
+        return 1.0
+
+    @property
+    def max_speed(self) -> float:
+        return abs(self.end - self.start)
+
+    def shape_key(self) -> tuple[float, ...]:
+        return (self.family, self.start, self.end)
+
+    def range(self) -> tuple[float, float]:
+        return min(self.start, self.end), max(self.start, self.end)
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        start, end = f"{here}.start", f"{here}.end"
+        return [_stroke_check(start, end), _touch_check(here, (length, start, end), np.minimum, np.maximum)]
+
+    def _inside(self, tau: Array, side: Side) -> Path:
+        velocity = np.full_like(tau, self.end - self.start)
+        return Path((1.0 - tau) * self.start + tau * self.end, velocity, np.zeros_like(tau))
+
+
+class OutAndBack(Motion):
+    """From start to end and back, `cycles` times, at constant speed v but for smooth turns. tau = 1 is one cycle.
+
+    With d = turn |end - start| and t_r = pi d/v it starts at rest in the middle of a turn, s = start + d (1 -
+    cos(pi u/t_r)) for 0 <= u <= t_r/2, cruises until d before the end, turns likewise, comes back, and ends at rest
+    at the start (references.md, "Asymmetry"). A cycle takes 2 (pi d + stroke - 2 d)/v and is symmetric about its
+    middle. turn = 0 reverses at an instant.
+    """
+
+    family = 2.0
+    period = 1.0
+    kind: Literal["out-and-back"]
+    start: Length
+    end: Length
+    speed: Speed = Field(gt=0)
+    turn: Dimensionless = Field(ge=0, le=0.5)
+    cycles: int = Field(ge=1, le=1_000_000)
+
+    @property
+    def stroke(self) -> float:
+        """Distance between the ends, m."""
+        return abs(self.end - self.start)
+
+    @property
+    def time_scale(self) -> float:
+        return self.max_speed / self.speed
+
+    @property
+    def duration(self) -> float:
+        return float(self.cycles)
+
+    @property
+    def max_speed(self) -> float:
+        return 2.0 * ((math.pi - 2.0) * self.turn + 1.0) * self.stroke
+
+    @property
+    def half_turn(self) -> float:
+        """tau from the middle of a turn to the cruise."""
+        return 0.5 * math.pi * self.turn * self.stroke / self.max_speed
+
+    def cruise_part(self) -> tuple[float, float]:
+        """tau at the beginning and end of the forward cruise in a cycle; backward it is 1 minus these."""
+        return self.half_turn, 0.5 - self.half_turn
+
+    def shape_key(self) -> tuple[float, ...]:
+        return (self.family, self.start, self.end, self.turn, float(self.cycles))
+
+    def range(self) -> tuple[float, float]:
+        return min(self.start, self.end), max(self.start, self.end)
+
+    def reversals(self) -> tuple[Reversal, ...]:
+        if self.turn > 0.0:
+            return ()
+        there = math.copysign(self.max_speed, self.end - self.start)
+        halves = range(1, 2 * self.cycles)
+        return tuple(Reversal(k / 2, there, -there) if k % 2 else Reversal(k / 2, -there, there) for k in halves)
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        start, end = f"{here}.start", f"{here}.end"
+        return [
+            _stroke_check(start, end),
+            on_body(start, (start, length), "an out-and-back path must stay on its body"),
+            on_body(end, (end, length), "an out-and-back path must stay on its body"),
+        ]
+
+    def _inside(self, tau: Array, side: Side) -> Path:
+        phase = np.mod(tau, 1.0)
+        if side == "left":
+            phase = np.where((phase == 0.0) & (tau > 0.0), 1.0, phase)
+            back = phase > 0.5
+        else:
+            phase = np.where((phase == 0.0) & (tau >= self.duration), 1.0, phase)
+            back = phase >= 0.5
+        folded = self._there(np.where(back, 1.0 - phase, phase))
+        way = math.copysign(1.0, self.end - self.start)
+        velocity = np.where(back, -way * folded.dS, way * folded.dS)
+        position = np.clip(self.start + way * folded.S, *self.range())  # rounding must not leave the body
+        return Path(position, velocity, way * folded.ddS)
+
+    def _there(self, tau: Array) -> Path:
+        """Way gone on the way out, 0 <= tau <= 1/2; the three branches of the law."""
+        depth, fast, half = self.turn * self.stroke, self.max_speed, self.half_turn
+        way, speed, change = depth + fast * (tau - half), np.full_like(tau, fast), np.zeros_like(tau)
+        if depth == 0.0:
+            return Path(way, speed, change)
+        near, far = tau < half, tau > 0.5 - half
+        angle = fast / depth * np.where(near, tau, 0.5 - tau)
+        bow, sine, cosine = 2.0 * depth * np.sin(0.5 * angle) ** 2, np.sin(angle), fast**2 / depth * np.cos(angle)
+        return Path(
+            np.where(near, bow, np.where(far, self.stroke - bow, way)),
+            np.where(near | far, fast * sine, speed),
+            np.where(near, cosine, np.where(far, -cosine, change)),
+        )
+
+
+class Sinusoidal(Motion):
+    """s = centre + amplitude sin(2 pi f t). tau = 1 is one cycle."""
+
+    family = 3.0
+    period = 1.0
+    kind: Literal["sinusoidal"]
+    centre: Length
+    amplitude: Length = Field(gt=0)
+    frequency: Frequency = Field(gt=0)
+    cycles: int = Field(ge=1, le=1_000_000)
+
+    @property
+    def time_scale(self) -> float:
+        return 1.0 / self.frequency
+
+    @property
+    def duration(self) -> float:
+        return float(self.cycles)
+
+    @property
+    def max_speed(self) -> float:
+        return 2.0 * math.pi * self.amplitude
+
+    def shape_key(self) -> tuple[float, ...]:
+        return (self.family, self.centre, self.amplitude, float(self.cycles))
+
+    def range(self) -> tuple[float, float]:
+        return self.centre - self.amplitude, self.centre + self.amplitude
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        needs = (f"{here}.centre", f"{here}.amplitude", length)
+        what = "a sinusoidal path must stay on its body"
+        return [Check(here, needs, lambda c, a, el: (c - a >= 0) & (c + a <= el), what, "0 to the body's length")]
+
+    def _inside(self, tau: Array, side: Side) -> Path:
+        angle, rate = 2.0 * np.pi * np.mod(tau, 1.0), 2.0 * np.pi
+        sine = self.amplitude * np.sin(angle)
+        return Path(self.centre + sine, rate * self.amplitude * np.cos(angle), -(rate**2) * sine)
+
+
+Places = Annotated[tuple[Length, ...], Strict(False)]
+Times = Annotated[tuple[Time, ...], Strict(False)]
+
+
+class Waypoints(Motion):
+    """The C2 cubic spline through positions at times, at rest at both ends. tau = 1 is the whole way."""
+
+    family = 4.0
+    kind: Literal["waypoints"]
+    times: Times = Field(min_length=2, max_length=1000)
+    positions: Places = Field(min_length=2, max_length=1000)
+
+    @model_validator(mode="after")
+    def _equal_lengths(self) -> Waypoints:
+        if len(self.times) != len(self.positions):
+            lengths = f"{len(self.times)} times, {len(self.positions)} positions"
+            raise fault("times and positions must be equally many", received=lengths)
+        return self
+
+    @property
+    def time_scale(self) -> float:
+        return self.times[-1]
+
+    @property
+    def duration(self) -> float:
+        return 1.0
+
+    @property
+    def max_speed(self) -> float:
+        knots, slopes, curvatures = self._derivatives()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = curvatures[:-1] / (curvatures[:-1] - curvatures[1:])
+        inner = knots[:-1] + np.where((part > 0.0) & (part < 1.0), part, 0.0) * np.diff(knots)
+        return float(max(np.abs(slopes).max(), np.abs(self.path(inner).dS).max()))
+
+    def shape_key(self) -> tuple[float, ...]:
+        return (self.family, *(time / self.times[-1] for time in self.times), *self.positions)
+
+    def range(self) -> tuple[float, float]:
+        low, high = spline_range(np.array(self.times), np.array(self.positions)[:, None])
+        return float(low[0]), float(high[0])
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        count = len(self.times)
+        times = tuple(f"{here}.times.{index}" for index in range(count))
+        places = tuple(f"{here}.positions.{index}" for index in range(count))
+        return [
+            Check(f"{here}.times.0", times[:1], lambda t: t == 0.0, "the first time must be 0", "0 s"),
+            Check(f"{here}.times", times, _ascending, "times must ascend", "each later than the one before"),
+            Check(f"{here}.positions", (length, *places, *times), spline_touches, _NO_TOUCH, _TOUCHING),
+        ]
+
+    def _inside(self, tau: Array, side: Side) -> Path:
+        spline = spline_at_rest(np.array(self.times) / self.times[-1], np.array(self.positions))
+        return Path(*(np.asarray(spline(tau, order), dtype=np.float64) for order in range(3)))
+
+    def _derivatives(self) -> tuple[Array, Array, Array]:
+        knots = np.array(self.times) / self.times[-1]
+        return knots, *self.path(knots)[1:]
+
+
+MOTIONS: Mapping[str, type[Spec]] = {
+    "cruise": Cruise,
+    "out-and-back": OutAndBack,
+    "sinusoidal": Sinusoidal,
+    "waypoints": Waypoints,
+}
+AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS, planned=("free",))]
+
+_NO_TOUCH = "the path never touches its body"
+_TOUCHING = "a path with a part between 0 and the body's length"
+
+
+def _stroke_check(start: str, end: str) -> Check:
+    return Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
+
+
+def _touch_check(here: str, needs: tuple[str, ...], low: Any, high: Any) -> Check:
+    def touches(length: Any, start: Any, end: Any) -> Any:
+        return (high(start, end) > 0.0) & (low(start, end) < length)
+
+    return Check(here, needs, touches, _NO_TOUCH, _TOUCHING)
+
+
+def _ascending(*times: Any) -> Any:
+    return reduce(np.logical_and, (later > earlier for earlier, later in pairwise(times)))

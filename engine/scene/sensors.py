@@ -1,0 +1,95 @@
+"""What is read, and where."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from engine.study_file.spec import NUMBER, WORD, Spec, form_of_amount, one_of
+from engine.study_file.units import Dimensionless, Length, fault
+
+OF_A_MASS = ("displacement", "velocity", "acceleration")
+OF_A_BODY = (*OF_A_MASS, "bending_moment", "shear_force", "axial_force", "stress", "strain")
+OF_A_CARRIAGE = (*OF_A_MASS, "contact_force")
+_MEANT = {
+    "deflection": "displacement",
+    "moment": "bending_moment",
+    "shear": "shear_force",
+    "normal_force": "axial_force",
+}
+MOST_PLACES = 201
+
+
+OwnTolerance = Annotated[
+    Annotated[Literal["told"], Tag(WORD)] | Annotated[Annotated[Dimensionless, Field(gt=0, lt=1)], Tag(NUMBER)],
+    Discriminator(lambda value: WORD if value == "told" else form_of_amount(value)),
+]
+
+
+class Sensor(Spec):
+    """A quantity at a fixed place `at` (m along the track) of a body, at the point that a carriage touches (`under`),
+    of a carriage's own sprung mass (`carriage`), or the contact force of a carriage (of a body that rides, that at one
+    `contact`).
+
+    With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
+    of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
+    forces where nothing is given.
+    """
+
+    body: str | None = None
+    at: Length | None = Field(default=None, ge=0)
+    under: str | None = None
+    carriage: str | None = None
+    contact: str | None = None
+    quantity: Annotated[str, AfterValidator(one_of(*OF_A_BODY, "contact_force", meant=_MEANT))] = "displacement"
+    tolerance: OwnTolerance | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Sensor:
+        if [self.at, self.under, self.carriage].count(None) != 2:
+            expected = 'at = metres, under = "a carriage", or carriage = "a carriage"'
+            raise fault("a sensor has exactly one place", expected=expected)
+        if self.at is not None and self.body is None:
+            raise fault("a sensor at a fixed place needs its body", expected='body = "a body"')
+        if self.carriage is not None and self.quantity not in OF_A_CARRIAGE:
+            raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {', '.join(OF_A_CARRIAGE)}")
+        if self.quantity == "contact_force" and self.carriage is None:
+            raise fault("a contact force is that of a carriage", expected='carriage = "a carriage"')
+        if self.contact is not None and self.quantity != "contact_force":
+            raise fault("only contact forces are read at a contact", expected='quantity = "contact_force"')
+        return self
+
+    @property
+    def rides(self) -> str | None:
+        """The carriage that it moves with, if any."""
+        return self.carriage if self.under is None else self.under
+
+
+class Envelope(Spec):
+    """The extremes of a quantity at equally spaced places of a body: from `from` to `to`, both included, m along its
+    track, or its ends where they are not given.
+
+    >>> Envelope(body="bed", places=5).along(8.0).tolist()
+    [0.0, 2.0, 4.0, 6.0, 8.0]
+    """
+
+    body: str
+    quantity: Annotated[str, AfterValidator(one_of(*OF_A_BODY, meant=_MEANT))] = "displacement"
+    places: int = Field(default=51, ge=2, le=MOST_PLACES)
+    from_: Length | None = Field(default=None, alias="from", ge=0)
+    to: Length | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _ascending(self) -> Envelope:
+        if self.from_ is not None and self.to is not None and self.from_ >= self.to:
+            received = f"from = {self.from_:.10g}, to = {self.to:.10g}"
+            raise fault("an envelope goes forward along its body", expected="from < to", received=received)
+        return self
+
+    def along(self, length: float) -> NDArray[np.float64]:
+        """(places,) m along a track of this length (m)."""
+        first = 0.0 if self.from_ is None else self.from_
+        return np.linspace(first, length if self.to is None else self.to, self.places)

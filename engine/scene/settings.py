@@ -1,0 +1,153 @@
+"""The parts of a study file that say how to compute, what to keep and what to vary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
+
+from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme
+from engine.study_file.document import shortened
+from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
+from engine.study_file.units import Dimensionless, fault
+
+#: Parameters that a scheme takes from the study file, with what to write; the others take none.
+PARAMETERS: Mapping[str, Mapping[str, str]] = {
+    "newmark": {"beta": "0.3025, say, from 0 to 1", "gamma": "0.6, say, from 0.5 to 1.5"},
+    "hht-alpha": {"alpha": "-0.05, say, from -1/3 to 0"},
+    "generalized-alpha": {"rho_inf": "0.8, say, from 0 to 1"},
+}
+FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "full")
+SPRUNG = ("auto", "static", "full")  # those that know the springs of carriages
+MAX_STEPS = 100_000_000
+
+SchemeName = Annotated[str, AfterValidator(one_of("auto", *SCHEMES))]
+Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES))]
+
+
+class Solver(Spec):
+    """How to march.
+
+    scheme: "auto" chooses between average acceleration and Fox-Goodwin with the steps, and is the former where the
+    study says how many. beta, gamma: of the scheme "newmark" only, gamma >= 1/2 (smaller values grow at any step).
+    alpha: of "hht-alpha", rho_inf: of "generalized-alpha".
+    steps: over one whole passage or one whole cycle. tolerance: wanted where something is "auto".
+    audit: number of variants that are run again with all terms, more modes and more steps; "auto" is 1 % of
+    them, 16 to 256, or fewer where that would take long.
+    """
+
+    scheme: SchemeName = "auto"
+    beta: Dimensionless | None = Field(default=None, ge=0, le=1)
+    gamma: Dimensionless | None = Field(default=None, ge=0.5, le=1.5)
+    alpha: Dimensionless | None = Field(default=None, ge=-1 / 3, le=0)
+    rho_inf: Dimensionless | None = Field(default=None, ge=0, le=1)
+    fidelity: Chosen = "auto"
+    steps: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_STEPS)], by_form] = "auto"
+    tolerance: Dimensionless = Field(default=1e-3, gt=0, lt=1)
+    static_correction: bool = True
+    audit: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=0)], by_form] = "auto"
+
+    @property
+    def integration(self) -> Scheme:
+        """The scheme with its parameters; the usual one where it is left open."""
+        name = USUAL_SCHEME if self.scheme == "auto" else self.scheme
+        return SCHEMES[name]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, {})})
+
+    @model_validator(mode="after")
+    def _fitting_keys(self) -> Solver:
+        for scheme, parameters in PARAMETERS.items():
+            given = [name for name in parameters if getattr(self, name) is not None]
+            if scheme != self.scheme and given:
+                expected, received = f'scheme = "{scheme}"', f'scheme = "{self.scheme}"'
+                raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
+        wanted = PARAMETERS.get(self.scheme, {})
+        if any(getattr(self, name) is None for name in wanted):
+            named, shown = " and ".join(wanted), "; ".join(f"{name} = {text}" for name, text in wanted.items())
+            raise fault(f'the scheme "{self.scheme}" needs {named}', expected=shown)
+        return self
+
+
+class Every(Spec):
+    """Histories thinned to every n-th station."""
+
+    every: int = Field(ge=1, le=MAX_STEPS)
+
+
+class Output(Spec):
+    """What the archive keeps of the histories.
+
+    unreduced: number of variants, spread over the sweep, that are computed again by the unreduced finite-element model.
+    """
+
+    histories: Annotated[
+        Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
+    ] = "auto"
+    unreduced: int = Field(default=0, ge=0, le=1000)
+
+
+def read_amount(value: Any) -> float | int | str:
+    """A number of a sweep, whose dimension only its path decides: finite number, or text with a unit."""
+    if isinstance(value, str) or (isinstance(value, int) and not isinstance(value, bool)):
+        return value
+    if isinstance(value, float) and isfinite(value):
+        return value
+    raise fault("a number is wanted here", expected='a number, or a string such as "15 m"', received=shortened(value))
+
+
+def as_tuple(value: Any) -> Any:
+    """One path as a list of one."""
+    return (value,) if isinstance(value, str) else value
+
+
+Amount = Annotated[float | int | str, PlainValidator(read_amount)]
+Amounts = Annotated[tuple[Amount, ...], Strict(False), Field(min_length=1)]
+Paths = Annotated[tuple[str, ...], Strict(False), BeforeValidator(as_tuple), Field(min_length=1, max_length=100)]
+
+
+class SweepAxis(Spec):
+    """One varied number, or several that vary together: listed values, a range, or a sample of a range.
+
+    of: dotted key or keys, all of which get the same value. sobol: size of the sample (scrambled, seed 0).
+    """
+
+    of: Paths
+    values: Amounts | None = None
+    from_: Amount | None = Field(default=None, alias="from")
+    to: Amount | None = None
+    count: int | None = Field(default=None, ge=1)
+    sobol: int | None = Field(default=None, ge=1)
+    spacing: Literal["linear", "log"] = "linear"
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return next(n for n in (self.count, self.sobol, len(self.values or ())) if n is not None)
+
+    @model_validator(mode="after")
+    def _one_form(self) -> SweepAxis:
+        forms = [name for name in ("values", "count", "sobol") if getattr(self, name) is not None]
+        if len(forms) != 1:
+            received = " and ".join(forms) or "none of them"
+            raise fault("an axis is written in exactly one way", expected="values, count or sobol", received=received)
+        ranged = [name for name in ("from_", "to") if getattr(self, name) is not None]
+        if forms == ["values"] and (ranged or "spacing" in self.model_fields_set):
+            raise fault("from, to and spacing do not go with values", expected="values alone")
+        if forms != ["values"] and len(ranged) < 2:
+            raise fault(f"{forms[0]} needs from and to", expected="from = ..., to = ...")
+        return self
+
+
+class Sweep(Spec):
+    """All axes by name. zip: axes of equal length are paired instead of spanning a grid."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, SweepAxis]
+    entry_class = SweepAxis
+    zip: bool = False
+
+    @property
+    def axes(self) -> dict[str, SweepAxis]:
+        """Axes by name, in the order of the file."""
+        return dict(self.__pydantic_extra__)

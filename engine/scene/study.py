@@ -1,0 +1,360 @@
+"""A study as the user describes it: validated, frozen, in SI units."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
+
+from engine.bodies import BODIES, AnyBody
+from engine.bodies.modal.description import Recorded
+from engine.scene.carriages import AnyCarriage, BodyCarriage
+from engine.scene.motions import Cruise
+from engine.scene.sensors import OF_A_BODY, Envelope, Sensor
+from engine.scene.settings import Output, Solver, Sweep
+from engine.study_file.checks import Check, on_body
+from engine.study_file.document import Document, Source, document_of, read_document, shortened
+from engine.study_file.spec import Keys, Spec, field_at, nearest, refuse
+from engine.study_file.units import Acceleration, Unit, fault
+from results_schema.errors import BadInput
+from results_schema.variables import RESERVED, expand, sensor_unit
+
+SCHEMA_VERSION = 1
+STANDARD_GRAVITY = 9.80665
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
+# numbers that do not belong to the model
+FIXED = ("schema_version", "sweep", "output", "question", "solver.audit", "envelope")
+
+
+def _known_version(version: int) -> int:
+    if version != SCHEMA_VERSION:
+        remedy = "a newer wanderlast may read it" if version > SCHEMA_VERSION else ""
+        raise fault("unknown version", expected=str(SCHEMA_VERSION), received=str(version), remedy=remedy)
+    return version
+
+
+def _kind_name(kind: str) -> str:
+    if not KIND.fullmatch(kind):
+        raise fault("not a name of a kind of study", expected='a name such as "asymmetry"', received=shortened(kind))
+    return kind
+
+
+class Scene(Spec):
+    """Every table of a study file, each valid by itself; `Study` adds what must hold between them."""
+
+    schema_version: Annotated[int, AfterValidator(_known_version)] = SCHEMA_VERSION
+    title: str = Field(default="", max_length=500)
+    kind: Annotated[str, AfterValidator(_kind_name)]
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
+    initial: Literal["rest", "equilibrium"] | None = None
+    body: dict[str, AnyBody] = Field(default_factory=dict)
+    carriage: dict[str, AnyCarriage] = Field(default_factory=dict)
+    sensor: dict[str, Sensor] = Field(default_factory=dict)
+    envelope: dict[str, Envelope] = Field(default_factory=dict)
+    sweep: Sweep = Field(default_factory=lambda: Sweep.model_validate({}))
+    solver: Solver = Field(default_factory=Solver)
+    output: Output = Field(default_factory=Output)
+    question: dict[str, Any] = Field(default_factory=dict)  # of the kind of study, which validates it
+
+
+class Study(Scene):
+    """A whole study; from keywords as in the file, or from a file by `load`.
+
+    Raises BadInput with the file's name, the dotted key, what was found and what is wanted. The first parameter is
+    only for `load`.
+
+    >>> Study(kind="passage", gravity="1 km/s^2").gravity
+    1000.0
+    """
+
+    _source: Source = PrivateAttr()
+    _data: dict[str, Any] = PrivateAttr()
+
+    def __init__(self, document: Document | None = None, /, **keywords: Any) -> None:
+        given = document if document is not None else document_of(keywords)
+        try:
+            super().__init__(**given.data)
+        except ValidationError as error:
+            refuse(error, Scene, given.data, given.source)
+        self._source, self._data = given.source, given.data
+        _check_names(self)
+        _check_references(self)
+        verify(self)
+
+    @property
+    def source(self) -> Source:
+        """Text and SHA-256 of the study file; for keywords the same study written as TOML."""
+        return self._source
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The tables as they were written, without defaults; not to be changed."""
+        return self._data
+
+    @property
+    def start(self) -> Literal["rest", "equilibrium"]:
+        """How the march starts: as given, else from rest if every carriage cruises, else from equilibrium."""
+        if self.initial is not None:
+            return self.initial
+        return "rest" if all(isinstance(c.motion, Cruise) for c in self.carriage.values()) else "equilibrium"
+
+    def body_of(self, sensor: str) -> str:
+        """Name of the body that a sensor reads."""
+        place = self.sensor[sensor]
+        return self.carriage[place.rides].on if place.rides is not None else str(place.body)
+
+    def value(self, path: str) -> Any:
+        """The value at a dotted key, SI, defaults included. KeyError where there is none.
+
+        >>> Study(kind="passage").value("gravity")
+        9.80665
+        """
+        return value_in(self, path)
+
+    def numbers(self) -> dict[str, float]:
+        """Every number of the model by its dotted key, SI, defaults included."""
+        return dict(_numbers("", self))
+
+    def unit(self, path: str) -> Unit | None:
+        """Dimension of the number at a dotted key; None for integers such as a number of modes."""
+        place = field_at(Scene, self._data, path.split("."))
+        return place.unit if place else None
+
+    def with_values(self, values: Mapping[str, Any]) -> Study:
+        """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML."""
+        data = self._data
+        for path, value in values.items():
+            try:
+                data = with_value(data, path, value)
+            except KeyError:
+                raise BadInput("no such key", where=self._source.where(path)) from None
+        return Study(document_of(data, self._source.name))
+
+    def without_sweep(self) -> Study:
+        """The base scene alone."""
+        data = {key: table for key, table in self._data.items() if key != "sweep"}
+        return Study(document_of(data, self._source.name))
+
+
+def load(path_or_text: str | Path) -> Study:
+    """The study of a file, or of TOML text with line breaks. Raises BadInput."""
+    document = read_document(path_or_text)
+    _check_version(document)
+    return Study(document)
+
+
+def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:
+    """The study of an archive from its text: bodies out of files are as recorded, and no file is opened.
+
+    recorded: by the names of bodies; one that is missing, as of a body that nothing uses, has no length. Raises
+    BadInput.
+    """
+    document = read_document(f"{text}\n")
+    _check_version(document)
+    tables = document.data.get("body")
+    if not isinstance(tables, dict):
+        return Study(document)
+    bodies = {name: _beside(table, recorded.get(name, Recorded(math.nan))) for name, table in tables.items()}
+    return Study(Document(document.data | {"body": bodies}, document.source))
+
+
+def _beside(table: Any, recorded: Recorded) -> Any:
+    """The table of a body with what is recorded of it, if it is one that is made of files."""
+    kind = table.get("kind") if isinstance(table, dict) else None
+    made_of_files = isinstance(kind, str) and getattr(BODIES.get(kind), "names_files", False)
+    return table | {"recorded": recorded} if made_of_files else table
+
+
+def _check_version(document: Document) -> None:
+    if "schema_version" not in document.data:
+        where = document.source.where("schema_version")
+        raise BadInput("this key is missing", where=where, expected=f"schema_version = {SCHEMA_VERSION}")
+
+
+def value_in(scene: Scene, path: str) -> Any:
+    """The value at a dotted key of a scene. KeyError where there is none."""
+    found: Any = scene
+    for key in path.split("."):
+        try:
+            if isinstance(found, Spec):
+                known = (*type(found).model_fields, *type(found).derived)
+                found = {name: getattr(found, name) for name in known}[key]
+            else:
+                found = found[int(key) if isinstance(found, tuple) else key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            raise KeyError(path) from None
+    return found
+
+
+def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """Plain data with another value at a dotted key; what is not on the way is shared. KeyError where it cannot be."""
+    return _replaced(data, path.split("."), value, path)  # type: ignore[no-any-return]
+
+
+def verify(study: Study) -> None:
+    """Every check of the study for its own numbers. Raises BadInput."""
+    for check in checks(study):
+        values = {key: study.value(key) for key in check.needs}
+        if not check.met(values).all():
+            where, received = study.source.where(check.where), check.received(values)
+            raise BadInput(check.what, where=where, expected=check.expected, received=received)
+
+
+def checks(study: Study) -> Iterator[Check]:
+    """All conditions between numbers of a study, in the order in which they make sense."""
+    for name, body in study.body.items():
+        yield from body.checks(f"body.{name}")
+    for name, carriage in study.carriage.items():
+        yield from carriage.motion.checks(f"carriage.{name}.motion", f"body.{carriage.on}.length")
+        if isinstance(carriage, BodyCarriage):
+            yield from carriage.places(f"carriage.{name}", f"body.{carriage.body}.length")
+    for name, sensor in study.sensor.items():
+        if sensor.at is not None:
+            here = f"sensor.{name}.at"
+            yield on_body(here, (here, f"body.{sensor.body}.length"), "a sensor off its body")
+    for name, envelope in study.envelope.items():
+        for key, field in (("from", "from_"), ("to", "to")):
+            if getattr(envelope, field) is not None:
+                here, needs = f"envelope.{name}.{key}", (f"envelope.{name}.{field}", f"body.{envelope.body}.length")
+                yield on_body(here, needs, "an envelope off its body")
+
+
+def _replaced(data: Any, keys: Keys, value: Any, path: str) -> Any:
+    if not keys:
+        return value
+    key, rest = keys[0], keys[1:]
+    if isinstance(data, list):
+        if not (str(key).isdigit() and int(key) < len(data)):
+            raise KeyError(path)
+        index = int(key)
+        return [*data[:index], _replaced(data[index], rest, value, path), *data[index + 1 :]]
+    if not isinstance(data, dict):
+        raise KeyError(path)
+    return {**data, key: _replaced(data.get(str(key), {}), rest, value, path)}
+
+
+def _numbers(here: str, value: Any) -> Iterator[tuple[str, float]]:
+    if here in FIXED or isinstance(value, bool):
+        return
+    if isinstance(value, int | float):
+        yield here, value
+    inside: Iterable[tuple[Any, Any]] = ()
+    if isinstance(value, Spec):
+        inside = [(name, getattr(value, name)) for name in type(value).model_fields]
+    elif isinstance(value, dict):
+        inside = value.items()
+    elif isinstance(value, tuple):
+        inside = enumerate(value)
+    for key, item in inside:
+        yield from _numbers(f"{here}.{key}" if here else str(key), item)
+
+
+def _check_names(study: Study) -> None:
+    """Names that can stand in an archive, and results that do not collide."""
+    tables: dict[str, Iterable[str]]
+    tables = {
+        "body": study.body,
+        "carriage": study.carriage,
+        "sensor": study.sensor,
+        "envelope": study.envelope,
+        "sweep": study.sweep.axes,
+    }
+    for table, names in tables.items():
+        for name in names:
+            where = study.source.where(f"{table}.{name}")
+            if not NAME.fullmatch(name):
+                raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
+            if table != "body" and name in RESERVED:
+                raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
+    sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+    envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
+    try:
+        results = expand("march", sensors, list(study.carriage), envelopes)
+    except BadInput as error:
+        where = study.source.where(error.where)
+        raise BadInput(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
+    for name in study.sweep.axes:
+        if name in results:
+            where = study.source.where(f"sweep.{name}")
+            raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
+
+
+def _check_references(study: Study) -> None:
+    """Every name that is mentioned exists, and sensors suit their bodies."""
+    for name, carriage in study.carriage.items():
+        _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
+        if isinstance(carriage, BodyCarriage):
+            _check_rider(study, name, carriage)
+    for name, sensor in study.sensor.items():
+        here = f"sensor.{name}"
+        if sensor.rides is not None:
+            _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
+        if sensor.carriage is not None:
+            _check_of_carriage(study, here, sensor)
+        if sensor.body is not None:
+            _must_exist(study, f"{here}.body", sensor.body, "body")
+        body = study.body_of(name)
+        if sensor.body not in (None, body):
+            where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
+            raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
+        _check_quantity(study, here, body, sensor.quantity)
+    for name, envelope in study.envelope.items():
+        _must_exist(study, f"envelope.{name}.body", envelope.body, "body")
+        _check_quantity(study, f"envelope.{name}", envelope.body, envelope.quantity)
+
+
+def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
+    """A body has the quantity that is read of it, and the keys that this needs."""
+    body = study.body[name]
+    if quantity in body.untold:
+        expected = f"one of {', '.join(told for told in OF_A_BODY if told not in body.untold)}"
+        raise BadInput(
+            f"the body {name} tells no {quantity}", where=study.source.where(f"{here}.quantity"), expected=expected
+        )
+    if quantity in ("stress", "strain") and (missing := body.lacks_for_stress):
+        where = study.source.where(f"body.{name}.{missing}")
+        raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
+
+
+def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
+    """A carriage has what a sensor of its own reads."""
+    carriage = study.carriage[str(sensor.carriage)]
+    if sensor.quantity == "contact_force":
+        contacts = carriage.contacts if isinstance(carriage, BodyCarriage) else {}
+        if sensor.contact is not None and sensor.contact not in contacts:
+            where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"
+            missing = "none: leave this key out" if not contacts else expected
+            raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
+    elif not hasattr(carriage, "stiffness"):
+        remedy = f'under = "{sensor.carriage}" reads the body where the carriage touches it'
+        if isinstance(carriage, BodyCarriage):
+            remedy = f'body = "{carriage.body}" and at = metres along its track read the body that rides'
+        where = study.source.where(f"{here}.carriage")
+        raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
+
+
+def _check_rider(study: Study, name: str, carriage: BodyCarriage) -> None:
+    """A body that rides is another one, rides once, and has the points that its contacts name."""
+    here = f"carriage.{name}.body"
+    _must_exist(study, here, carriage.body, "body")
+    riding = [(c.body, c.on) for c in study.carriage.values() if isinstance(c, BodyCarriage)]
+    below, on = [carriage.body], dict(riding)
+    while below[-1] in on and below.count(below[-1]) == 1:
+        below.append(on[below[-1]])
+    alone = [body for body, _ in riding].count(carriage.body) == 1
+    if carriage.body in below[1:] or not alone:
+        what = "a body cannot ride on itself" if alone else "this body rides twice"
+        raise BadInput(what, where=study.source.where(here), received=shortened(carriage.body), remedy="another body")
+
+
+def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carriage"]) -> None:
+    names: list[str] = list(getattr(study, table))
+    if name not in names:
+        expected = f"one of {', '.join(names)}" if names else f"a table such as [{table}.name]; there is none"
+        where, received, remedy = study.source.where(key), shortened(name), nearest(name, names)
+        raise BadInput(f"no such {table}", where=where, expected=expected, received=received, remedy=remedy)

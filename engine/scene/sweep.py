@@ -1,0 +1,205 @@
+"""From the axes of a sweep to its cases, by index arithmetic: a million cases cost their axes only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import prod
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.scene.axes import Values, check_distinct, check_targets, listed, ranged, sampled, sobol_points
+from engine.scene.settings import SweepAxis
+from engine.scene.study import Study, checks
+from engine.study_file.checks import Check
+from results_schema.errors import BadInput
+
+MAX_VARIANTS = 2**31
+MAX_AXIS = 2**24
+CHECKED_AT_ONCE = 2**18
+VARIANT = "variant"
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One named axis: its values (int64 or float64, SI) along one dimension, and the keys that it sets.
+
+    units: UDUNITS text, "" without dimension. noun: the dimension in words, "" for counts.
+    """
+
+    name: str
+    dim: str
+    paths: tuple[str, ...]
+    values: Values
+    units: str
+    noun: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """All variants of a study. Variant i has the index np.unravel_index(i, shape): the last dimension is fastest.
+
+    Without a sweep there is one case and no dimension.
+    """
+
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    axes: tuple[Axis, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of variants."""
+        return prod(self.shape)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted keys of all swept numbers."""
+        return tuple(path for axis in self.axes for path in axis.paths)
+
+    @property
+    def coordinates(self) -> dict[str, Axis]:
+        """Axes by name; several share a dimension where they are zipped or sampled."""
+        return {axis.name: axis for axis in self.axes}
+
+    def positions(self, indices: ArrayLike) -> dict[str, Indices]:
+        """Index along each dimension of variants given by their flat numbers (V,)."""
+        unravelled = np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape) if self.dims else ()
+        return dict(zip(self.dims, unravelled, strict=True))
+
+    def columns_of(self, indices: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Swept numbers (V,) of variants given by their flat numbers (V,), by dotted key."""
+        positions = self.positions(indices)
+        return {
+            path: np.asarray(axis.values[positions[axis.dim]], dtype=np.float64)
+            for axis in self.axes
+            for path in axis.paths
+        }
+
+    def column(self, path: str) -> NDArray[np.float64]:
+        """One swept number of all variants (size,). KeyError if it is not swept."""
+        axis = next((axis for axis in self.axes if path in axis.paths), None)
+        if axis is None:
+            raise KeyError(path)
+        place = self.dims.index(axis.dim)
+        shape = [1] * place + [-1] + [1] * (len(self.dims) - place - 1)
+        return np.broadcast_to(axis.values.astype(np.float64).reshape(shape), self.shape).reshape(-1)
+
+    def values_of(self, index: int) -> dict[str, int | float]:
+        """Swept numbers of one variant by dotted key; integers stay integers."""
+        positions = self.positions([index])
+        return {path: axis.values[positions[axis.dim][0]].item() for axis in self.axes for path in axis.paths}
+
+    def study_of(self, study: Study, index: int) -> Study:
+        """One variant as a study of its own, without a sweep."""
+        return study.without_sweep().with_values(self.values_of(index))
+
+
+def expand(study: Study) -> Cases:
+    """All cases of a study, checked as a whole. Raises BadInput (faults 9, 10, 14, 15)."""
+    axes = study.sweep.axes
+    _check_sizes(study)
+    _check_paths(study)
+    sampled_values = dict(_sampled(study))
+    dims: dict[str, int] = {}
+    found = []
+    for name, axis in axes.items():
+        dim = VARIANT if study.sweep.zip or axis.sobol is not None else name
+        values = sampled_values[name] if name in sampled_values else _listed_or_ranged(study, name, axis)
+        unit = study.unit(axis.of[0])
+        found.append(Axis(name, dim, axis.of, values, unit.symbol if unit else "", unit.noun if unit else ""))
+        dims.setdefault(dim, len(values))
+    cases = Cases(tuple(dims), tuple(dims.values()), tuple(found))
+    _check_repeats(study, cases)
+    for check in checks(study):
+        _verify(study, cases, check)
+    return cases
+
+
+def _listed_or_ranged(study: Study, name: str, axis: SweepAxis) -> Values:
+    return listed(study, name, axis) if axis.values is not None else ranged(study, name, axis)
+
+
+def _sampled(study: Study) -> Iterator[tuple[str, Values]]:
+    """Values of all sampled axes, which form one joint sequence."""
+    axes = {name: axis for name, axis in study.sweep.axes.items() if axis.sobol is not None}
+    if axes:
+        points = sobol_points(next(iter(axes.values())).size, len(axes))
+        for column, (name, axis) in zip(points.T, axes.items(), strict=True):
+            yield name, sampled(study, name, axis, column)
+
+
+def _check_sizes(study: Study) -> None:
+    """Sizes as Python's integers, before anything is allocated."""
+    axes, where = study.sweep.axes, study.source.where("sweep")
+    sizes = {name: axis.size for name, axis in axes.items()}
+    together = {name: size for name, size in sizes.items() if study.sweep.zip or axes[name].sobol is not None}
+    if len(set(together.values())) > 1:
+        what = "zipped axes differ in length" if study.sweep.zip else "sampled axes differ in size"
+        raise BadInput(what, where=where, expected="one length", received=_product(together, ", "))
+    for name, size in sizes.items():
+        if size > MAX_AXIS:
+            here = study.source.where(f"sweep.{name}")
+            raise BadInput("the axis is too long", where=here, expected=f"at most {MAX_AXIS}", received=str(size))
+    factors = {name: size for name, size in sizes.items() if name not in together}
+    total = prod(factors.values()) * (next(iter(together.values())) if together else 1)
+    if total > MAX_VARIANTS:
+        received = f"{_product(sizes, ' x ')} = {total}"
+        raise BadInput("too many variants", where=where, expected=f"at most {MAX_VARIANTS}", received=received)
+
+
+def _product(sizes: Mapping[str, int], sign: str) -> str:
+    return sign.join(f"{size} ({name})" for name, size in sizes.items())
+
+
+def _check_paths(study: Study) -> None:
+    """Every key exists, and no number is set by two axes."""
+    owners: dict[str, str] = {}
+    for name, axis in study.sweep.axes.items():
+        check_targets(study, name, axis)
+        for path in axis.of:
+            clash = next((other for other in owners if f"{path}.".startswith(f"{other}.")), None)
+            if clash is not None:
+                where = study.source.where(f"sweep.{name}.of")
+                raise BadInput("this number is set twice", where=where, received=f"{path}, also by {owners[clash]}")
+            owners[path] = name
+
+
+def _check_repeats(study: Study, cases: Cases) -> None:
+    """No value twice on an axis of the grid, no row of values twice where axes are zipped; samples may repeat."""
+    for axis in cases.axes:
+        if axis.dim != VARIANT:
+            check_distinct(study, axis.name, axis.values)
+    rows = np.array([axis.values for axis in cases.axes]) if study.sweep.zip and cases.axes else np.zeros((1, 0))
+    counts = np.unique(rows, axis=1, return_counts=True)[1]
+    if (counts > 1).any():
+        where = study.source.where("sweep")
+        raise BadInput("zipped axes repeat a variant", where=where, received=f"{int((counts > 1).sum())} repeated")
+
+
+def _verify(study: Study, cases: Cases, check: Check) -> None:
+    """A check on the grid of just the axes that it depends on, in blocks."""
+    touched = [axis for axis in cases.axes if set(axis.paths) & set(check.needs)]
+    if not touched:
+        return  # the study itself was checked
+    base = {key: study.value(key) for key in check.needs}
+    sizes = {axis.dim: len(axis.values) for axis in touched}
+    total = prod(sizes.values())
+    for start in range(0, total, CHECKED_AT_ONCE):
+        flat = np.arange(start, min(start + CHECKED_AT_ONCE, total))
+        positions = dict(zip(sizes, np.unravel_index(flat, tuple(sizes.values())), strict=True))
+        columns = {path: axis.values[positions[axis.dim]] for axis in touched for path in axis.paths}
+        met = np.broadcast_to(check.met(base | columns), flat.shape)
+        if not met.all():
+            worst = int(np.flatnonzero(~met)[0])
+            entries = {axis.name: int(positions[axis.dim][worst]) for axis in touched}
+            _refuse(study, check, base | {key: column[worst] for key, column in columns.items()}, entries)
+
+
+def _refuse(study: Study, check: Check, values: Mapping[str, Any], entries: Mapping[str, int]) -> NoReturn:
+    places = ", ".join(f"sweep.{name} entry {entry}" for name, entry in entries.items())
+    where, received = study.source.where(check.where), f"{check.received(values)} ({places})"
+    raise BadInput(check.what, where=where, expected=check.expected, received=received)

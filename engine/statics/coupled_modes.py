@@ -1,0 +1,169 @@
+"""Natural frequencies of a whole scene with its carriages frozen at given places: bodies, what rides on them, masses.
+
+Nothing moves along the track, so there are no convective terms, and nothing is damped. Coordinates x are the modes of
+all bodies, the sprung masses, and one more for every mass that touches its body. Masses, springs and rigid joints are
+ties: each pulls the rows of G together with a force h over a compliance,
+
+    M x'' + K x + G h = 0,    G^T x = S h,    S = diag(1/k) + R,
+
+with M and K diagonal, R the static flexibility between ties that the kept modes miss (`grips.missed_flexibility`), and
+1/k = 0 for masses and joints. S may be singular, so the inverse is what is computed, shifted by sigma M, as rigid-body
+motions have no stiffness: with D = (K + sigma M)^-1
+
+    (K + sigma M + G S^-1 G^T)^-1 = D - D G (S + G^T D G)^-1 G^T D,
+
+whose eigenvalues in the metric of M are 1/(omega^2 + sigma).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import LANES
+from engine.model.attachment import holds, missed_flexibility, rows, shared
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Way
+from engine.model.variant_values import LaneValues, from_blocks, lane_table
+
+Array = NDArray[np.float64]
+Along = tuple[Way, ...]
+
+UNRESISTED = 1e-10  # of the shift: omega^2 below it is a motion that nothing resists, and rounding
+ENDLESS = 1e-13  # of the largest: what no force moves, as a joint or a massless wheel forbids it
+MASSLESS = 1e-12  # of the body's mass: wheels without mass, which follow the track
+MOST_BYTES = 32 * 2**20  # of matrices at a time
+
+
+class CoupledModes(NamedTuple):
+    """omega (V, S, K) in rad/s, ascending, and shapes (V, S, N, K) over the modes of all bodies and the sprung masses,
+    of unit modal mass. Motions that nothing resists are left out, and NaN stands where there are no more."""
+
+    omega: Array
+    shapes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """stiffness (n,), mass (V, n), rows (S, n, T), missed (S, T, T), compliance (V, T), shift sigma in 1/s2."""
+
+    stiffness: Array
+    mass: Array
+    rows: Array
+    missed: Array
+    compliance: Array
+    shift: float
+
+    def inverse(self, variants: slice) -> Array:
+        """(V, S, n, n) of some variants, scaled by the root of the mass."""
+        mass = self.mass[variants]
+        soft = 1.0 / (self.stiffness + self.shift * mass)
+        wide = soft[:, None, :, None] * self.rows
+        small = np.swapaxes(self.rows, 1, 2) @ wide + self.missed
+        small += self.compliance[variants, None, None, :] * np.eye(small.shape[-1])
+        wide = np.sqrt(mass)[:, None, :, None] * wide
+        found = -wide @ np.linalg.solve(small, np.swapaxes(wide, 2, 3))
+        diagonal = np.arange(self.stiffness.size)
+        found[:, :, diagonal, diagonal] += (mass * soft)[:, None, :]
+        return np.asarray(0.5 * (found + np.swapaxes(found, 2, 3)))
+
+
+def coupled_frequencies(model: SceneModel, values: LaneValues, along: Along, count: int) -> Array:
+    """(V, S, count) lowest natural frequencies in rad/s of some variants of a scene, with the riders at `along`."""
+    system = _system(model, values, along)
+    found = np.full((values.size, along[0].s.size, count), np.nan)
+    for variants in _parts(system, values.size):
+        inverse = np.asarray(np.linalg.eigvalsh(system.inverse(variants)), dtype=np.float64)
+        found[variants] = _lowest(inverse, system.shift, count)[0]
+    return found
+
+
+def coupled_modes(model: SceneModel, values: LaneValues, along: Along, count: int) -> CoupledModes:
+    """The same with their shapes, which are those of the kept modes."""
+    system, modes = _system(model, values, along), model.omega.size
+    omega = np.full((values.size, along[0].s.size, count), np.nan)
+    shapes = np.full((*omega.shape[:2], modes, count), np.nan)
+    for variants in _parts(system, values.size):
+        inverse, vectors = np.linalg.eigh(system.inverse(variants))
+        omega[variants], order = _lowest(inverse, system.shift, count)
+        lines = np.take_along_axis(vectors, order[:, :, None, :], axis=3)
+        lines = lines[:, :, :modes] / np.sqrt(system.mass[variants, None, :modes, None])
+        shapes[variants, :, :, : order.shape[2]] = np.where(
+            np.isnan(omega[variants, :, None, : order.shape[2]]), np.nan, lines
+        )
+    return CoupledModes(omega, shapes)
+
+
+def _lowest(inverse: Array, shift: float, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """The lowest omega (V, S, count), and which eigenvalues (V, S, up to count) they belong to."""
+    known = inverse > ENDLESS * inverse.max(axis=2, keepdims=True)
+    square = np.where(known, 1.0 / np.where(known, inverse, 1.0) - shift, np.inf)
+    square = np.where(square > UNRESISTED * shift, square, np.inf)
+    order = np.argsort(square, axis=2, kind="stable")[:, :, :count]
+    square = np.take_along_axis(square, order, axis=2)
+    found = np.full((*square.shape[:2], count), np.nan)
+    found[:, :, : order.shape[2]] = np.where(np.isfinite(square), np.sqrt(square), np.nan)
+    return found, order
+
+
+def _parts(system: _System, size: int) -> Iterator[slice]:
+    """Variants in parts of bounded memory."""
+    stations, unknowns = system.rows.shape[:2]
+    step = max(1, MOST_BYTES // (8 * 3 * stations * unknowns**2))
+    for first in range(0, size, step):
+        yield slice(first, min(first + step, size))
+
+
+def _system(model: SceneModel, values: LaneValues, along: Along) -> _System:
+    """The matrices of all variants at all stations."""
+    padding = (0, -values.size % LANES)
+    whole = LaneValues(
+        values.study,
+        {path: np.pad(column, padding, mode="edge") for path, column in values.columns.items()},
+        values.size + padding[1],
+    )
+    lanes = lane_table(model, whole)
+    masses = [number for number, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
+    ties = np.array([*masses, *range(model.first_spring, model.ties)], dtype=np.int64)
+    on_track = from_blocks(lanes.mass, values.size)[masses]
+    least = MASSLESS * model.leading_body.modal.mass
+    mass = np.concatenate([1.0 / from_blocks(lanes.mobility, values.size), np.maximum(on_track, least)])
+    spring = from_blocks(lanes.spring, values.size)[ties]
+    return _System(
+        stiffness=np.concatenate([model.omega**2, np.zeros(len(masses))]),
+        mass=np.ascontiguousarray(mass.T),
+        rows=_rows(model, along, ties, len(masses)),
+        missed=_missed(model, along, ties),
+        compliance=np.divide(1.0, spring, out=np.zeros_like(spring), where=spring > 0.0).T,
+        shift=model.first_omega**2,
+    )
+
+
+def _rows(model: SceneModel, along: Along, ties: NDArray[np.int64], masses: int) -> Array:
+    """(S, n, T) what every tie holds together: the track, and the mass or what rides."""
+    found = np.zeros((along[0].s.size, model.omega.size + masses, len(ties)))
+    for place, r in enumerate(ties):
+        for grip in model.grips[r]:
+            if holds(grip, along):
+                found[:, model.bodies[grip.body].modes, place] += grip.factor * rows(model, grip, along)
+        mode = model.springs[r - model.first_spring].mode if r >= model.first_spring else model.omega.size + place
+        if mode is not None:
+            found[:, mode, place] = -1.0
+    return found
+
+
+def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:
+    """(S, T, T) flexibility that the kept modes miss between ties, m/N; masses feel it here as springs do."""
+    found = np.zeros((along[0].s.size, len(ties), len(ties)))
+    if not model.numerics.static_correction:
+        return found
+    for i, r in enumerate(ties):
+        for j, s in enumerate(ties[: i + 1]):
+            for one, other in shared(model, int(r), int(s), along):
+                found[:, i, j] += missed_flexibility(model, one, other, along)
+            found[:, j, i] = found[:, i, j]
+    return found

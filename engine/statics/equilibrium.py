@@ -1,0 +1,130 @@
+"""The static state of a scene with its carriages at given places: forces of all ties, and what only contacts hold.
+
+Springs F and coordinates z that nothing but springs hold (sprung masses, rigid motion of bodies that ride):
+
+    F/k + C F + P z = -level g - C_d W,    P^T F = -P_d^T W
+
+with C the elastic flexibility between ties (kept modes, and what they miss), P the ties' rows of z, and W the weights
+of the carriages on the ties d. A body without supports that is ridden is balanced by its inertia, as in its influence
+lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.model.attachment import Along, residual, rows, shared
+from engine.model.scene_model import SceneModel
+
+Array = NDArray[np.float64]
+
+UNFELT = 1e-9  # of the largest row of a loose coordinate: what springs feel of one that they do not hold is rounding
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class StaticState:
+    """Per unit weight of each carriage, and last per unit gravity: forces of all ties (S or 1, ties, L), and the loose
+    coordinates (S or 1, m, L), whose numbers among all modes are ``loose``."""
+
+    force: Array
+    loose: Indices
+    coordinate: Array
+
+
+def loose_modes(model: SceneModel) -> Indices:
+    """Numbers of the coordinates that nothing but springs hold."""
+    found: list[int] = []
+    for carriage in model.carriages:
+        if carriage.rides is not None:
+            part = model.bodies[carriage.rides]
+            found += (part.modes.start + np.flatnonzero(part.modal.omega == 0.0)).tolist()
+    return np.array([*found, *(spring.mode for spring in model.sprung)], dtype=np.int64)
+
+
+def static_state(model: SceneModel, along: Along) -> StaticState:
+    """The static state at the stations of some ways."""
+    count = len(model.carriages)
+    weights = np.zeros((1, model.ties, count + 1))
+    weights[0, np.arange(count), np.arange(count)] = 1.0
+    loose = loose_modes(model)
+    if not model.springs:
+        return StaticState(weights, loose, np.zeros((1, len(loose), count + 1)))
+    stations, springs = along[0].s.size, np.arange(model.first_spring, model.ties)
+    held = np.zeros((stations, len(springs), len(loose)))
+    pushed = np.zeros((stations, count, len(loose)))
+    for place, mode in enumerate(loose):
+        held[:, :, place] = _row(model, springs, along, int(mode))
+        pushed[:, :, place] = _row(model, np.arange(count), along, int(mode))
+    soft = flexibility(model, along)
+    gap = np.zeros((stations, len(springs), count + 1))
+    gap[:, :, :count] = soft[:, model.first_spring :, :count]
+    gap[:, :, count] = _level(model, along)
+    own = np.array([0.0 if s.rigid else 1.0 / model.study.value(f"{s.key}.stiffness") for s in model.springs])
+    matrix = soft[:, model.first_spring :, model.first_spring :] + np.diag(own)
+    force, coordinate = _solved(matrix, held, gap, pushed)
+    whole = np.repeat(weights, stations, axis=0)
+    whole[:, model.first_spring :] = force
+    return StaticState(whole, loose, coordinate)
+
+
+def flexibility(model: SceneModel, along: Along) -> Array:
+    """(S, ties, ties) elastic flexibility between ties as the march has it, m/N; rows of springs only."""
+    found = np.zeros((along[0].s.size, model.ties, model.ties))
+    for r in range(model.first_spring, model.ties):
+        for s in range(model.ties):
+            for one, other in shared(model, r, s, along):
+                soft = model.bodies[one.body].modal.modal_flexibility
+                both = rows(model, one, along) * rows(model, other, along)
+                found[:, r, s] += one.factor * other.factor * np.sum(both * soft, axis=1)
+    missed = residual(model, along)
+    return found + missed if missed.size else found
+
+
+def _row(model: SceneModel, ties: Indices, along: Along, mode: int) -> Array:
+    """(S, R) how a coordinate moves some ties."""
+    found = np.zeros((along[0].s.size, len(ties)))
+    for place, r in enumerate(ties):
+        if r >= model.first_spring and model.springs[r - model.first_spring].mode == mode:
+            found[:, place] = -1.0
+        for grip in model.grips[r]:
+            modes = model.bodies[grip.body].modes
+            touches = grip.rider is None or along[grip.rider].active
+            if touches and modes.start <= mode < modes.stop:
+                found[:, place] += grip.factor * rows(model, grip, along)[:, mode - modes.start]
+    return found
+
+
+def _level(model: SceneModel, along: Along) -> Array:
+    """(S, R) gaps of the springs by the body's own sag, per unit gravity."""
+    found = np.zeros((along[0].s.size, len(model.springs)))
+    for place, spring in enumerate(model.springs):
+        way = along[spring.rider]
+        if way.active:
+            sag = model.sag(model.carriages[spring.carriage].body, way.s, 0)
+            found[:, place] = sag if way.here is None else np.where(way.here, sag, 0.0)
+    return found
+
+
+def _solved(matrix: Array, held: Array, gap: Array, pushed: Array) -> tuple[Array, Array]:
+    """Forces (S, R, L) and loose coordinates (S, m, L); what no spring feels stays at rest.
+
+    Rows and columns are scaled to one size, so that one small number tells what is not held.
+    """
+    springs, count, loads = matrix.shape[1], held.shape[2], gap.shape[2]
+    unit = np.maximum(np.trace(matrix, axis1=1, axis2=2), 1e-30)[:, None, None]
+    size = np.abs(held).max(axis=(0, 1), initial=0.0)
+    felt = size > UNFELT * size.max(initial=0.0)
+    held, size = np.where(felt, held, 0.0), np.where(felt, size, 1.0)
+    whole = np.zeros((len(matrix), springs + count, springs + count))
+    whole[:, :springs, :springs] = matrix / unit
+    whole[:, :springs, springs:] = held / size
+    whole[:, springs:, :springs] = np.swapaxes(held / size, 1, 2)
+    right = np.zeros((len(matrix), springs + count, loads))
+    right[:, :springs] = -gap / unit
+    right[:, springs:, : pushed.shape[1]] = -np.swapaxes(pushed / size, 1, 2)
+    found = np.linalg.pinv(whole, rcond=1e-11) @ right
+    return found[:, :springs], found[:, springs:] * unit / size[:, None]

@@ -1,0 +1,313 @@
+"""What all parts of a study file share: the strict base class, the choice by `kind`, and errors in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from types import UnionType
+from typing import Annotated, Any, ClassVar, Literal, NoReturn, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ConfigDict, Discriminator, GetCoreSchemaHandler, Tag, ValidationError
+from pydantic_core import CoreSchema, InitErrorDetails, core_schema
+
+from engine.study_file.document import Beside, Source, shortened
+from engine.study_file.units import Unit, fault
+from results_schema.errors import BadInput
+
+Keys = Sequence[str | int]
+
+NUMBER, WORD, LIST, TABLE = "<number>", "<word>", "<list>", "<table>"
+_TAGS = {NUMBER: "a number", WORD: "a word in quotes", LIST: "a list", TABLE: "a table"}
+_BOUNDS: tuple[tuple[type, str, str], ...] = ((Gt, "gt", ">"), (Ge, "ge", ">="), (Lt, "lt", "<"), (Le, "le", "<="))
+
+
+class Spec(BaseModel):
+    """Base of every table of a study file: strict types, no unknown keys, finite numbers, frozen."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
+    derived: ClassVar[tuple[str, ...]] = ()  # numbers that follow from others and can be asked for by their key
+    entry_class: ClassVar[Any] = None  # class of the tables under names of the user's choice, if there are such
+
+
+def form_of(value: Any) -> str:
+    """How a value is written, for fields that can be written in several ways; words count as words."""
+    if isinstance(value, list | tuple):
+        return LIST
+    if isinstance(value, dict | BaseModel):
+        return TABLE
+    return WORD if isinstance(value, str) else NUMBER
+
+
+def form_of_amount(value: Any) -> str:
+    """Like `form_of`, but a string is a number with a unit."""
+    form = form_of(value)
+    return NUMBER if form == WORD else form
+
+
+Auto = Annotated[Literal["auto"], Tag(WORD)]
+by_form = Discriminator(form_of)
+by_amount_form = Discriminator(form_of_amount)
+
+
+@dataclass(frozen=True, eq=False)
+class KindOf:
+    """Annotation of a table whose class is chosen by its key `kind`.
+
+    table: kind -> class, looked up when a study is read, so that a new kind is one new entry. What stands beside the
+    keys that a user wrote (`Beside`) reaches the validators as their context.
+    planned: kinds that the interface names and that are not built yet.
+    """
+
+    noun: str
+    table: Mapping[str, type[Spec]]
+    planned: tuple[str, ...] = ()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def read(self, value: Any) -> Spec:
+        """The validated table. Raises pydantic's errors."""
+        if not isinstance(value, dict):
+            raise fault("a table is wanted here", expected=f"the keys of a {self.noun}", received=shortened(value))
+        kind = value.get("kind")
+        if isinstance(kind, str) and kind in self.table:
+            beside = [item for item in value.values() if isinstance(item, Beside)]
+            written = {key: item for key, item in value.items() if not isinstance(item, Beside)}
+            return self.table[kind].model_validate(written, context=beside[0] if beside else None)
+        known = ", ".join(self.table)
+        if isinstance(kind, str) and kind in self.planned:
+            problem = fault(f'{self.noun} kind "{kind}" is not built yet', expected=known, received=shortened(kind))
+        elif "kind" not in value:
+            problem = fault("the kind is missing", expected=f"one of {known}")
+        else:
+            remedy = nearest(kind, [*self.table, *self.planned])
+            what = f"unknown {self.noun} kind"
+            problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
+        detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
+        raise ValidationError.from_exception_data(self.noun, [detail])
+
+
+def one_of(*words: str, planned: Sequence[str] = (), meant: Mapping[str, str] | None = None) -> Callable[[str], str]:
+    """Validator of a word out of a list, of which some are not built yet.
+
+    meant: words that others use -> the one of the list.
+    """
+    others = meant or {}
+
+    def check(word: str) -> str:
+        if word in words:
+            return word
+        expected = f"one of {', '.join(words)}"
+        if word in planned:
+            raise fault(f'"{word}" is not built yet', expected=expected, received=shortened(word))
+        known = others.get(word.lower().replace("_", "-").replace(" ", "-"))
+        remedy = f'did you mean "{known}"?' if known else nearest(word, [*words, *planned])
+        raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
+
+    return check
+
+
+def nearest(word: object, names: Sequence[str]) -> str:
+    """A hint at the name that was probably meant, or "".
+
+    >>> nearest("lenght", ["length", "area"])
+    'did you mean "length"?'
+    """
+    found = get_close_matches(str(word)[:100], list(names), n=1, cutoff=0.6)
+    return f'did you mean "{found[0]}"?' if found else ""
+
+
+@dataclass(frozen=True)
+class Hint:
+    """Annotation of a number: what to do where it is out of its bounds."""
+
+    remedy: str
+
+
+@dataclass(frozen=True)
+class FieldType:
+    """Type and annotations of the place that a dotted key names."""
+
+    annotation: Any
+    metadata: tuple[Any, ...]
+
+    @property
+    def unit(self) -> Unit | None:
+        """The unit of the number, if the place holds one."""
+        return next((note for note in _notes(self.annotation, self.metadata) if isinstance(note, Unit)), None)
+
+    @property
+    def hint(self) -> str:
+        """The remedy for a number out of its bounds, or ""."""
+        return next((note.remedy for note in _notes(self.annotation, self.metadata) if isinstance(note, Hint)), "")
+
+    def describe(self) -> str:
+        """What belongs there, in words, as far as annotations tell: "a length (m), > 0"."""
+        notes = list(_notes(self.annotation, self.metadata))
+        bounds = [_bound(note) for note in notes if isinstance(note, Gt | Ge | Lt | Le)]
+        noun = self.unit.article if self.unit else _type_words(self.annotation)
+        return ", ".join(part for part in (noun, *bounds) if part)
+
+
+def field_at(model: type[Spec], data: Any, keys: Keys) -> FieldType | None:
+    """The field of a study that dotted keys lead to; the data decide between kinds. None where there is none."""
+    return _descend(model, (), data, tuple(keys))
+
+
+def keys_at(model: type[Spec], data: Any, keys: Keys) -> list[str]:
+    """Names of the keys that the table at this place can have."""
+    place = field_at(model, data, keys) if keys else FieldType(model, ())
+    if place is None:
+        return []
+    cls = _class_of(place.annotation, place.metadata, value_at(data, keys))
+    return [field.alias or name for name, field in cls.model_fields.items()] if cls else []
+
+
+def value_at(data: Any, keys: Keys) -> Any:
+    """The value at a place of plain data; KeyError where there is none."""
+    for key in keys:
+        try:
+            data = data[int(key) if isinstance(data, list | tuple) else key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            raise KeyError(".".join(str(part) for part in keys)) from None
+    return data
+
+
+def refuse(error: ValidationError, model: type[Spec], data: Any, source: Source) -> NoReturn:
+    """Raise the one BadInput that helps most: an unknown key first, since it often explains a missing one."""
+    details = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
+    raise bad_input(details[0], model, data, source)
+
+
+def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadInput:
+    """One of pydantic's errors in the user's words: file, dotted key, what was found, what is wanted."""
+    keys = [key for key in detail["loc"] if key not in _TAGS]
+    where = source.where(".".join(str(key) for key in keys))
+    context = detail.get("ctx", {})
+    if detail["type"] == "wanderlast":
+        return BadInput(
+            context["what"], where=where, **{key: context[key] for key in ("expected", "received", "remedy")}
+        )
+    if detail["type"] == "extra_forbidden":
+        names = keys_at(model, data, keys[:-1])
+        remedy = nearest(keys[-1], names)
+        return BadInput("unknown key", where=where, expected=f"one of {', '.join(names)}", remedy=remedy)
+    place = field_at(model, data, keys)
+    expected = place.describe() if place else ""
+    if detail["type"] == "missing":
+        return BadInput("this key is missing", where=where, expected=expected)
+    try:
+        received = shortened(value_at(data, keys))
+    except KeyError:
+        received = shortened(detail["input"])
+    words = get_args(place.annotation) if place and get_origin(place.annotation) is Literal else ()
+    bound = any(name in context for _, name, _ in _BOUNDS)
+    remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
+    return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
+
+
+def _what(detail: Any) -> str:
+    kind, context = detail["type"], detail.get("ctx", {})
+    for _, name, sign in _BOUNDS:
+        if name in context:
+            return f"must be {sign} {context[name]:g}"
+    if kind == "string_too_long":
+        return f"longer than {context['max_length']} characters"
+    if kind in ("too_short", "too_long"):
+        limit = f"at least {context['min_length']}" if kind == "too_short" else f"at most {context['max_length']}"
+        return f"a list of {limit} entries is wanted here"
+    if kind == "literal_error":
+        return "unknown name"
+    if kind == "union_tag_invalid":
+        forms = " or ".join(words for tag, words in _TAGS.items() if tag in context["expected_tags"])
+        return f"{forms} is wanted here"
+    return "wrong type" if kind.endswith("_type") else str(detail["msg"])
+
+
+def _bound(note: Any) -> str:
+    for kind, name, sign in _BOUNDS:
+        if isinstance(note, kind):
+            return f"{sign} {getattr(note, name):g}"
+    return ""
+
+
+def _type_words(annotation: Any) -> str:
+    if get_origin(annotation) is Literal:
+        return " or ".join(shortened(word) for word in get_args(annotation))
+    if _is_union(annotation):
+        return " or ".join(part for part in (_type_words(_bare(arm)) for arm in get_args(annotation)) if part)
+    words = {bool: "true or false", int: "an integer", float: "a number", str: "text in quotes", type(None): ""}
+    if annotation in words:
+        return words[annotation]
+    return {tuple: "a list", dict: "a table"}.get(get_origin(annotation), "a table")
+
+
+def _bare(annotation: Any) -> Any:
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+
+
+def _is_union(annotation: Any) -> bool:
+    return get_origin(annotation) in (Union, UnionType)
+
+
+def _notes(annotation: Any, metadata: Sequence[Any]) -> Iterator[Any]:
+    """Annotations of a place and of the arms of its union, outermost first; not those of entries of lists."""
+    for note in metadata:
+        yield from getattr(note, "metadata", None) or (note,)
+    if get_origin(annotation) is Annotated:
+        inner, *own = get_args(annotation)
+        yield from _notes(inner, own)
+    elif _is_union(annotation):
+        for arm in get_args(annotation):
+            yield from _notes(arm, ())
+
+
+def _class_of(annotation: Any, metadata: Sequence[Any], value: Any) -> type[Spec] | None:
+    """The class of the table at a place, chosen by its kind where there are several."""
+    notes = list(_notes(annotation, metadata))
+    for kinds in (note for note in notes if isinstance(note, KindOf)):
+        kind = value.get("kind") if isinstance(value, dict) else None
+        return kinds.table.get(kind) if isinstance(kind, str) else None
+    arms = get_args(annotation) if _is_union(annotation) else (annotation,)
+    classes = [_bare(arm) for arm in arms]
+    return next((cls for cls in classes if isinstance(cls, type) and issubclass(cls, Spec)), None)
+
+
+def _descend(annotation: Any, metadata: Sequence[Any], value: Any, keys: tuple[str | int, ...]) -> FieldType | None:
+    if get_origin(annotation) is Annotated:
+        inner, *own = get_args(annotation)
+        return _descend(inner, (*metadata, *own), value, keys)
+    if not keys:
+        return FieldType(annotation, tuple(metadata))
+    key, rest = keys[0], keys[1:]
+    try:
+        inside = value_at(value, [key])
+    except KeyError:
+        inside = None
+    cls = _class_of(annotation, metadata, value)
+    if cls is not None and (step := _field_of(cls, str(key))) is not None:
+        return _descend(step.annotation, step.metadata, inside, rest)
+    if _is_union(annotation):
+        found = (_descend(arm, (), value, keys) for arm in get_args(annotation))
+        return next((place for place in found if place is not None), None)
+    entry = _entry_of(annotation, key)
+    return None if entry is None else _descend(entry, (), inside, rest)
+
+
+def _field_of(cls: type[Spec], key: str) -> FieldType | None:
+    for name, field in cls.model_fields.items():
+        if key == (field.alias or name):
+            return FieldType(field.annotation, tuple(field.metadata))
+    return FieldType(cls.entry_class, ()) if cls.entry_class is not None else None
+
+
+def _entry_of(annotation: Any, key: str | int) -> Any:
+    """Type of the entries of a dict or tuple annotation."""
+    args = get_args(annotation)
+    if get_origin(annotation) is dict:
+        return args[1]
+    if get_origin(annotation) is tuple and str(key).isdigit():
+        return args[0] if args[-1] is Ellipsis else (args[int(key)] if int(key) < len(args) else None)
+    return None

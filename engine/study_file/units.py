@@ -1,0 +1,208 @@
+"""Physical numbers in study files: SI floats, or strings with a unit that are turned into SI exactly.
+
+Each dimension is an annotated float: `length: Length = Field(gt=0)`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from engine.study_file.document import shortened
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+_FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|1(?=\s*/)")
+_OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
+_SUPERSCRIPTS = {"²": 2, "³": 3, "⁴": 4}
+_BASE = ("meter", "kilogram", "second")
+_COMMON = {
+    name: (Fraction(factor), base)
+    for base, names in (
+        ({}, {"%": "0.01"}),
+        ({"meter": 1}, {"m": "1", "mm": "1e-3", "cm": "1e-2", "km": "1e3"}),
+        ({"kilogram": 1}, {"kg": "1", "g": "1e-3", "t": "1e3"}),
+        ({"second": 1}, {"s": "1", "ms": "1e-3", "min": "60", "h": "3600"}),
+        ({"second": -1}, {"Hz": "1", "kHz": "1e3"}),
+        ({"kilogram": 1, "meter": 1, "second": -2}, {"N": "1", "kN": "1e3", "MN": "1e6"}),
+        ({"kilogram": 1, "meter": -1, "second": -2}, {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"}),
+        ({"radian": 1}, {"rad": "1"}),
+    )
+    for name, factor in names.items()
+}  # what pint says of them, which takes half a second to import
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Dimension of a field: its name, SI unit (UDUNITS text, "" for a plain number), exponents of m, kg, s.
+
+    angle: exponents of the radian that are the same dimension, besides 0. A frequency in rad/s or rpm is turned
+    into cycles per second.
+    """
+
+    noun: str
+    symbol: str
+    exponents: tuple[int, int, int]
+    angle: int = 0
+    per_turn: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def read(self, value: Any) -> Any:
+        """A string such as "210 GPa" as SI float; anything else unchanged. Raises PydanticCustomError."""
+        return self.si(value) if isinstance(value, str) else value
+
+    def si(self, text: str) -> float:
+        """The SI value of a number with a unit, rounded once.
+
+        >>> Unit("speed", "m s-1", (1, 0, -1)).si("200 km/h") == 200 / 3.6
+        True
+        """
+        number, unit = _split(text, self)
+        factor, exponents, angle = _unit_factor(unit)
+        if exponents != self.exponents or angle not in (0, self.angle):
+            found = _dimension_name(exponents, angle)
+            raise fault(f"{found} where {self.article} is wanted", expected=self.article, received=shortened(text))
+        if self.per_turn and angle == 1:
+            factor /= 2 * Fraction(math.pi)
+        try:
+            return float(Fraction(number) * factor)
+        except OverflowError:
+            raise fault("beyond the range of numbers", expected=self.article, received=shortened(text)) from None
+
+    @property
+    def article(self) -> str:
+        """The dimension in words, as an error names it."""
+        noun = f"{'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}"
+        return f"{noun} ({self.symbol})" if self.symbol else noun
+
+
+def fault(what: str, *, expected: str = "", received: str = "", remedy: str = "") -> PydanticCustomError:
+    """A refusal raised inside a pydantic validator; `engine.study_file.spec` turns it into BadInput."""
+    context = {"what": what, "expected": expected, "received": received, "remedy": remedy}
+    return PydanticCustomError("wanderlast", "{what}", context)
+
+
+def _split(text: str, wanted: Unit) -> tuple[str, str]:
+    """Number and unit of a string; a bare number in quotes is refused, as is an expression."""
+    match = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
+    example = f'a number, or a string such as "1.5 {wanted.symbol or "%"}"'
+    if match is None:
+        raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text))
+    if not match[2]:
+        raise fault("a number in quotes has no unit", expected=example, received=shortened(text))
+    return match[1], match[2]
+
+
+@lru_cache(maxsize=256)
+def _unit_factor(unit: str) -> tuple[Fraction, tuple[int, int, int], int]:
+    """Exact SI factor, exponents of (m, kg, s) and of the radian of a product of units such as "kN/m^2"."""
+    total, exponents, angle = Fraction(1), [0, 0, 0], 0
+    sign, place = 1, 0
+    while place < len(unit):
+        match = _FACTOR.match(unit, place)
+        if match is None or len(unit) > 40:
+            raise fault("no such unit", expected='a product such as "kN m/rad" or "kg/m^3"', received=shortened(unit))
+        if match[1]:
+            power = sign * (int(match[2] or 1) if not match[3] else _SUPERSCRIPTS[match[3]])
+            scale, base = _named_unit(match[1])
+            total *= scale**power
+            exponents = [old + power * base.get(name, 0) for old, name in zip(exponents, _BASE, strict=True)]
+            angle += power * base.get("radian", 0)
+        operator = _OPERATOR.match(unit, match.end())
+        if operator is None and match.end() < len(unit):
+            raise fault("no such unit", expected='a product such as "kN m/rad" or "kg/m^3"', received=shortened(unit))
+        place = operator.end() if operator else len(unit)
+        sign = -1 if operator and operator[1] == "/" else 1
+        if operator and place == len(unit):
+            raise fault("the unit breaks off", received=shortened(unit))
+    return total, (exponents[0], exponents[1], exponents[2]), angle
+
+
+def _named_unit(name: str) -> tuple[Fraction, Mapping[str, int]]:
+    """Exact SI factor and exponents of base units of one name such as "kN"."""
+    return _COMMON[name] if name in _COMMON else _named_by_pint(name)
+
+
+@lru_cache(maxsize=256)
+def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
+    """The same of any unit; pint is imported here."""
+    from pint import PintError
+
+    try:
+        quantity = _registry().Quantity(Fraction(1), name).to_base_units()
+    except (PintError, TypeError, ValueError, AssertionError):
+        raise fault(
+            "no such unit", expected="a unit such as m, mm, kN, GPa, km/h, Hz", received=shortened(name)
+        ) from None
+    base = {key: int(power) for key, power in dict(quantity._units).items()}
+    if not set(base) <= {*_BASE, "radian"} or not isinstance(quantity.magnitude, Fraction):
+        raise fault("not a mechanical unit", expected="a unit of metres, kilograms, seconds", received=shortened(name))
+    return quantity.magnitude, base
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    """pint's units with exact factors, so that "210 GPa" is 210e9 to the last bit."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Fraction)
+
+
+def _dimension_name(exponents: tuple[int, int, int], angle: int) -> str:
+    for unit in KNOWN:
+        if unit.exponents == exponents and angle in (0, unit.angle):
+            return unit.article
+    powers = zip(("m", "kg", "s", "rad"), (*exponents, angle), strict=True)
+    return f"a quantity in {' '.join(f'{name}{power}' for name, power in powers if power) or 'no unit'}"
+
+
+LENGTH = Unit("length", "m", (1, 0, 0))
+AREA = Unit("area", "m2", (2, 0, 0))
+SECOND_MOMENT = Unit("second moment of area", "m4", (4, 0, 0))
+PRESSURE = Unit("pressure", "Pa", (-1, 1, -2))
+DENSITY = Unit("density", "kg m-3", (-3, 1, 0))
+MASS = Unit("mass", "kg", (0, 1, 0))
+FORCE = Unit("force", "N", (1, 1, -2))
+SPEED = Unit("speed", "m s-1", (1, 0, -1))
+ACCELERATION = Unit("acceleration", "m s-2", (1, 0, -2))
+FREQUENCY = Unit("frequency", "Hz", (0, 0, -1), angle=1, per_turn=True)
+STIFFNESS = Unit("stiffness", "N m-1", (0, 1, -2))
+ROTATIONAL_STIFFNESS = Unit("rotational stiffness", "N m rad-1", (2, 1, -2), angle=-1)
+DAMPING = Unit("damping coefficient", "N s m-1", (0, 1, -1))
+ROTATIONAL_DAMPING = Unit("rotational damping coefficient", "N m s rad-1", (2, 1, -1), angle=-1)
+INERTIA = Unit("moment of inertia", "kg m2", (2, 1, 0))
+TIME = Unit("time", "s", (0, 0, 1))
+RATE = Unit("rate", "s-1", (0, 0, -1))
+DIMENSIONLESS = Unit("plain number", "", (0, 0, 0))
+KNOWN = (
+    LENGTH, AREA, SECOND_MOMENT, PRESSURE, DENSITY, MASS, FORCE, SPEED, ACCELERATION, FREQUENCY, STIFFNESS,
+    ROTATIONAL_STIFFNESS, DAMPING, ROTATIONAL_DAMPING, INERTIA, TIME, DIMENSIONLESS,
+)  # fmt: skip
+
+Length = Annotated[float, LENGTH]
+Area = Annotated[float, AREA]
+SecondMoment = Annotated[float, SECOND_MOMENT]
+Pressure = Annotated[float, PRESSURE]
+Density = Annotated[float, DENSITY]
+Mass = Annotated[float, MASS]
+Force = Annotated[float, FORCE]
+Speed = Annotated[float, SPEED]
+Acceleration = Annotated[float, ACCELERATION]
+Frequency = Annotated[float, FREQUENCY]
+Stiffness = Annotated[float, STIFFNESS]
+RotationalStiffness = Annotated[float, ROTATIONAL_STIFFNESS]
+Damping = Annotated[float, DAMPING]
+RotationalDamping = Annotated[float, ROTATIONAL_DAMPING]
+Inertia = Annotated[float, INERTIA]
+Time = Annotated[float, TIME]
+Rate = Annotated[float, RATE]
+Dimensionless = Annotated[float, DIMENSIONLESS]

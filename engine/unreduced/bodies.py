@@ -1,0 +1,297 @@
+"""Bodies of a study as whole finite-element models: sparse matrices and the rows of places on their tracks.
+
+What the march of modes leaves out by reduction is all here. A uniform beam is cut into elements for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.beam.beam import Beam, Spring
+from engine.bodies.frame.assembly import Assembly, assemble
+from engine.bodies.frame.body import frame_modes, kept_modes
+from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.points import point_loads
+from engine.bodies.frame.track import track_of
+from engine.bodies.modal.description import AUTO_MODES, Body
+from engine.bodies.modal.flexibility import Flexibility, factorised
+from engine.bodies.rigid.rigid import Rigid
+from engine.model.variant_values import LaneValues
+from engine.scene.study import Study
+from engine.unreduced.track import FrameTrack, Rows, no_rows
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+Array = NDArray[np.float64]
+
+BEAM_ELEMENTS = 64
+MOST_SUPPORTS = 50
+
+
+class FullTrack(Protocol):
+    """What places on a track read, as rows on the degrees of freedom of the body."""
+
+    def rows(self, s: Array, derivative: int = 0) -> Rows:
+        """d^j/ds^j of the deflection."""
+
+    def within(self, x: Array, s: Array) -> Array:
+        """Deflection at x that the element's own bending between its ends adds per unit force at s, m/N."""
+
+    def inside(self, s: Array) -> tuple[Array, Array]:
+        """Places on the same elements, off their ends by the steps that come with them, m."""
+
+    def under_weight(self, x: Array) -> Array:
+        """The same per unit gravity under own weight."""
+
+    def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
+        """A section force, stress or strain, from displacements and from accelerations."""
+
+    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
+        """What a unit force at s adds to it where it stands on the element of x."""
+
+    def sections_under_weight(self, quantity: str, x: Array) -> Array:
+        """What own weight on the element adds per unit gravity."""
+
+
+class Damping(NamedTuple):
+    """C = viscous + loads diag(rates) loads^T: (n, n) sparse; (n, k) and (k,) of modes."""
+
+    viscous: csc_array
+    loads: Array
+    rates: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FullBody:
+    """A body with all its n degrees of freedom.
+
+    rigid (n, r): rigid-body motions of unit mass; pull (n,): own weight per unit gravity; flexibility: the elastic
+    answer to loads, None where nothing bends; points: rows (n,) by name; gravity_share: of gravity along the track's
+    direction.
+    """
+
+    name: str
+    length: float
+    stiffness: csc_array
+    mass: csc_array
+    rigid: Array
+    pull: Array
+    damping: Damping
+    flexibility: Flexibility | None
+    track: FullTrack
+    points: dict[str, Array]
+    gravity_share: float = 1.0
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom."""
+        return int(self.pull.size)
+
+
+def full_body(study: Study, name: str) -> FullBody:
+    """The whole model of a body of a study. Raises BadInput for one that has none."""
+    body = study.body[name]
+    if isinstance(body, Rigid):
+        return _full_rigid(study, name, body)
+    if isinstance(body, Beam):
+        frame = frame_of_beam(study, name, body)
+        return _full_frame(study, name, frame, _only_bending(assemble(frame)))
+    if isinstance(body, Frame):
+        _check(study, name, body)
+        return _full_frame(study, name, body, assemble(body))
+    raise BadInput(
+        "this body has no whole finite-element model to compare with",
+        where=study.source.where(f"body.{name}.kind"),
+        expected='"frame", "beam" or "rigid"',
+        received=f'"{study.value(f"body.{name}.kind")}"',
+    )
+
+
+def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEMENTS) -> Frame:
+    """A uniform beam as a plane frame with nodes at its supports and about so many elements."""
+    if len(beam.springs) > MOST_SUPPORTS:
+        where = study.source.where(f"body.{name}.supports")
+        raise BadInput(
+            "too many supports for the unreduced model",
+            where=where,
+            expected=f"at most {MOST_SUPPORTS}",
+            received=str(len(beam.springs)),
+        )
+    places = sorted({0.0, beam.length, *(spring.at for spring in beam.springs)})
+    number = {place: f"n{index}" for index, place in enumerate(places)}
+    members = {
+        f"m{index}": {
+            "nodes": [number[before], number[after]],
+            "section": "all",
+            "elements": max(1, round(elements * (after - before) / beam.length)),
+        }
+        for index, (before, after) in enumerate(pairwise(places))
+    }
+    held = {"pinned": ["x", "z"], "clamped": ["x", "z", "ry"], "free": ["x"]}
+    left, right = beam.ends
+    return Frame.model_validate(
+        {
+            "kind": "frame",
+            "plane": "xz",
+            "node": {number[place]: [place, 0.0] for place in places},
+            "section": {"all": _section(beam)},
+            "member": members,
+            "supports": {number[0.0]: held[left], number[beam.length]: held[right]},
+            "spring": {f"s{index}": _spring(spring, number[spring.at]) for index, spring in enumerate(beam.springs)},
+            "track": {"members": list(members)},
+            "modes": beam.modes,
+        }
+    )
+
+
+def _section(beam: Beam) -> dict[str, float]:
+    keys = ("area", "second_moment", "youngs_modulus", "density", "fibre_distance")
+    return {key: getattr(beam, key) for key in keys if getattr(beam, key) is not None}
+
+
+def _spring(spring: Spring, node: str) -> dict[str, Any]:
+    return {
+        "node": node,
+        "stiffness": [0.0, 0.0, spring.stiffness],
+        "rotational": [0.0, spring.rotational, 0.0],
+        "damping": [0.0, 0.0, spring.damping],
+    }
+
+
+def _only_bending(assembly: Assembly) -> Assembly:
+    """Without the motions along a straight beam, which no load on it excites."""
+    keep = np.flatnonzero(assembly.free % 6 != 0)
+    moved = assembly.rigid[keep]
+    return replace(
+        assembly,
+        free=assembly.free[keep],
+        stiffness=assembly.stiffness[keep][:, keep].tocsc(),
+        mass=assembly.mass[keep][:, keep].tocsc(),
+        drag=assembly.drag[keep],
+        rigid=moved[:, np.abs(moved).max(axis=0, initial=0.0) > 0.0],
+    )
+
+
+def _check(study: Study, name: str, frame: Frame) -> None:
+    """The reduced body must be a reduction of this very model."""
+    for key, given, wanted in (
+        ("mass_matrix", frame.mass_matrix, "consistent"),
+        ("rigid_body_modes", frame.rigid_body_modes, "keep"),
+    ):
+        if given != wanted:
+            where = study.source.where(f"body.{name}.{key}")
+            what = "the unreduced model cannot be marched so"
+            raise BadInput(what, where=where, expected=f'"{wanted}"', received=f'"{given}"')
+
+
+def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> FullBody:
+    flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
+    track, ends = track_of(frame, assembly.mesh)
+    gravity = unit(frame.gravity)
+    numbers, loads = point_loads(frame, assembly)
+    return FullBody(
+        name=name,
+        length=float(track.places[-1]),
+        stiffness=assembly.stiffness,
+        mass=assembly.mass,
+        rigid=flexibility.rigid,
+        pull=assembly.drag @ gravity,
+        damping=_damping(study, name, frame, assembly, flexibility),
+        flexibility=flexibility,
+        track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
+        points={word: loads[:, number] for word, number in numbers.items()},
+        gravity_share=float(track.direction @ gravity),
+    )
+
+
+def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> Damping:
+    """The damping of the reduced body: of the modes that it keeps, none of the others, or Rayleigh's; and dampers."""
+    from scipy.sparse import csc_array
+
+    body: Body = study.body[name]
+    values = LaneValues(study, {}, 1)
+    numbers, loads = point_loads(frame, assembly)
+    points = [(loads[:, numbers[str(at)]], rate) for _, at, rate in frame.dampers() if rate > 0.0]
+    rows = np.array([row for row, _ in points]).reshape(len(points), len(assembly.free))
+    rates = np.array([rate for _, rate in points])
+    wide = csc_array(rows)
+    viscous = (wide.T * rates[None, :]) @ wide if points else csc_array(assembly.stiffness.shape)
+    if hasattr(body.damping_ratio, "rayleigh"):
+        by_mass, by_stiffness = body.damping_ratio.rayleigh
+        viscous = viscous + by_mass * assembly.mass + by_stiffness * assembly.stiffness
+        return Damping(csc_array(viscous), np.zeros((len(assembly.free), 0)), np.zeros(0))
+    omega, shapes = _kept(body, frame, assembly, flexibility)
+    rates = values.damping_rates(name, omega)[:, 0]
+    damped = rates > 0.0
+    return Damping(csc_array(viscous), assembly.mass @ shapes[:, damped], rates[damped])
+
+
+def _kept(body: Body, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:
+    """omega (k,) and shapes (n, k) of the modes that the reduced body has."""
+    if isinstance(body, Frame):
+        omega, shapes = frame_modes(frame, assembly, flexibility)
+        kept = kept_modes(frame, omega)
+        return omega[kept], shapes[:, kept]
+    count = AUTO_MODES if body.modes == "auto" else int(body.modes)
+    omega, shapes = flexibility.modes(min(count, len(assembly.free)))
+    return omega[:count], shapes[:, :count]
+
+
+@dataclass(frozen=True)
+class RigidTrack:
+    """Heave (m) and pitch (rad) about the centre of mass at `centre`, m."""
+
+    centre: float
+
+    def rows(self, s: Array, derivative: int = 0) -> Rows:
+        found = no_rows(len(s), 2)
+        found.values[:, 0] = float(derivative == 0)
+        found.values[:, 1] = s - self.centre if derivative == 0 else float(derivative == 1)
+        found.freedoms[:, 1] = 1
+        return found
+
+    def within(self, x: Array, s: Array) -> Array:
+        return np.zeros(np.broadcast_shapes(x.shape, s.shape))
+
+    def inside(self, s: Array) -> tuple[Array, Array]:
+        return s, np.ones(len(s))
+
+    def under_weight(self, x: Array) -> Array:
+        return np.zeros(len(x))
+
+    def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
+        raise BadInput("a rigid body has no section forces", where="quantity", received=quantity)
+
+    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
+        return np.zeros(np.broadcast_shapes(x.shape, s.shape))
+
+    def sections_under_weight(self, quantity: str, x: Array) -> Array:
+        return np.zeros(len(x))
+
+
+def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:
+    from scipy.sparse import csc_array
+
+    rates = LaneValues(study, {}, 1).damping_rates(name, np.zeros(2))[:, 0]
+    mass = np.array([body.mass, body.inertia])
+    nothing: Any = csc_array((2, 2))
+    return FullBody(
+        name=name,
+        length=body.length,
+        stiffness=nothing,
+        mass=csc_array(np.diag(mass)),
+        rigid=np.diag(1.0 / np.sqrt(mass)),
+        pull=np.array([body.mass, 0.0]),
+        damping=Damping(csc_array(np.diag(rates * mass)), np.zeros((2, 0)), np.zeros(0)),
+        flexibility=None,
+        track=RigidTrack(body.centre_of_mass),
+        points={},
+    )

@@ -1,0 +1,269 @@
+"""Rows of ties and sensors of an unreduced scene at stations of its way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine.scene.sensors import Sensor
+from engine.scene.study import Study
+from engine.unreduced.scene import Tie, Unreduced, contacts_of
+from engine.unreduced.track import WIDTH, Rows, no_rows
+from results_schema.errors import BadInput
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RATES = ("velocity", "acceleration")
+
+
+class Along(NamedTuple):
+    """Riders at stations, all (S, R): places m, their first and second derivative by time, and whether they are on
+    the body."""
+
+    s: Array
+    ds: Array
+    dds: Array
+    on: Flags
+
+    def some(self, which: NDArray[np.bool_] | slice) -> Along:
+        """Some of the stations."""
+        return Along(self.s[which], self.ds[which], self.dds[which], self.on[which])
+
+
+def at_positions(model: Unreduced, positions: ArrayLike) -> Along:
+    """All riders at rest where the carriages are: positions (P, C), NaN where one is away; (P,) for one carriage.
+
+    Raises BadInput for another shape.
+    """
+    names = list(model.study.carriage)
+    given = np.asarray(positions, dtype=np.float64)
+    given = given[:, None] if given.ndim == 1 else given
+    if given.ndim != 2 or given.shape[1] != len(names):
+        raise BadInput("positions", where="positions", expected=f"(P, {len(names)}) numbers", received=str(given.shape))
+    owners = [*range(len(names)), *(names.index(name) for name, _, _ in contacts_of(model.study))]
+    offsets = np.array([rider.offset for rider in model.riders])
+    lengths = np.array([rider.length for rider in model.riders])
+    place = given[:, owners] + offsets
+    with np.errstate(invalid="ignore"):
+        on = (place >= -1e-12 * lengths) & (place <= lengths * (1.0 + 1e-12))
+    still = np.zeros_like(place)
+    return Along(np.where(on, np.clip(place, 0.0, lengths), 0.0), still, still, on)
+
+
+def nowhere(model: Unreduced) -> Along:
+    """One station with all carriages on level rigid ground beside the bodies."""
+    none = np.zeros((1, len(model.riders)))
+    return Along(none, none, none, none > 0.0)
+
+
+def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
+    """(S, T, 12) d^j/ds^j of the deflection under every tie, zero where it is off the body."""
+    index, values = [np.zeros((len(along.s), 0, WIDTH), dtype=np.int64)], [np.zeros((len(along.s), 0, WIDTH))]
+    for tie in model.ties:
+        rows = _wide(model.bodies[tie.body].track.rows(along.s[:, tie.rider], derivative))
+        index.append((rows.freedoms + model.firsts[tie.body])[:, None])
+        values.append((rows.values * along.on[:, tie.rider, None])[:, None])
+    return Rows(np.concatenate(index, axis=1), np.concatenate(values, axis=1))
+
+
+def softness(model: Unreduced, along: Along) -> Array:
+    """(S, T, T) m/N: what the elements' own bending between their ends adds under each tie per unit force of another,
+    on the body that is ridden and on that which rides."""
+    count = len(model.ties)
+    found = np.zeros((len(along.s), count, count))
+    for i, j in _together(model):
+        one, other = model.ties[i], model.ties[j]
+        on = along.on[:, one.rider] & along.on[:, other.rider]
+        within = model.bodies[one.body].track.within(along.s[:, one.rider], along.s[:, other.rider])
+        found[:, i, j] = np.where(on, within, 0.0)
+    for i, one in enumerate(model.ties):
+        for j, other in enumerate(model.ties):
+            if one.rides and one.rides == other.rides and one.at is not None and other.at is not None:
+                track = model.bodies[one.rides].track
+                found[:, i, j] += track.within(np.array([one.at]), np.array([other.at]))
+    return found
+
+
+def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
+    """(S, T, T) its first and second derivative by the way of a carriage, between ties of that carriage.
+
+    With them what a load feels on its way is as smooth as the line of the body, whatever the shapes of the elements.
+    """
+    count = len(model.ties)
+    first, second = np.zeros((len(along.s), count, count)), np.zeros((len(along.s), count, count))
+    for i, j in _together(model):
+        one, other = model.ties[i], model.ties[j]
+        if one.carriage != other.carriage:
+            continue
+        track = model.bodies[one.body].track
+        (place, step), (load, _) = track.inside(along.s[:, one.rider]), track.inside(along.s[:, other.rider])
+        before, here, after = (track.within(place + k * step, load + k * step) for k in (-1, 0, 1))
+        on = along.on[:, one.rider] & along.on[:, other.rider]
+        first[:, i, j] = np.where(on, (after - before) / (2.0 * step), 0.0)
+        second[:, i, j] = np.where(on, (after - 2.0 * here + before) / step**2, 0.0)
+    return first, second
+
+
+def _together(model: Unreduced) -> Iterator[tuple[int, int]]:
+    """Pairs of a tie whose force is not given and a tie on the same body."""
+    for i, one in enumerate(model.ties):
+        for j, other in enumerate(model.ties):
+            if one.link != "force" and one.body == other.body:
+                yield i, j
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """J sensors at S stations: index (S, J, 12), on displacements, velocities and accelerations (S, J, 12), on the
+    ties' forces (S, J, T), and what is added (S, J)."""
+
+    index: NDArray[np.int64]
+    on_u: Array
+    on_v: Array
+    on_a: Array
+    on_force: Array
+    added: Array
+
+    def at(self, h: int, u: Array, v: Array, a: Array, forces: Array) -> Array:
+        """(J,) at one station, from its state (n,) and forces (T,)."""
+        index = self.index[h]
+        found = self.on_u[h] * u[index] + self.on_v[h] * v[index] + self.on_a[h] * a[index]
+        return np.asarray(found.sum(axis=1) + self.on_force[h] @ forces + self.added[h])
+
+    def at_rest(self, u: Array, forces: Array) -> Array:
+        """(S, J) from static states (S, n) and forces (S, T)."""
+        taken = u[np.arange(len(u))[:, None, None], self.index]
+        found = np.sum(self.on_u * taken, axis=2) + np.einsum("sjt,st->sj", self.on_force, forces)
+        return np.asarray(found + self.added)
+
+    def less(self, level: Array) -> Readings:
+        """The same, counted from readings (J,)."""
+        return Readings(self.index, self.on_u, self.on_v, self.on_a, self.on_force, self.added - level)
+
+
+def rider_of(model: Unreduced, sensor: Sensor) -> int | None:
+    """The rider that must be on its body for a sensor to read anything."""
+    if sensor.contact is not None:
+        return next(tie.rider for tie in model.ties if _counts(tie, sensor))
+    return None if sensor.rides is None else list(model.study.carriage).index(sensor.rides)
+
+
+def _counts(tie: Tie, sensor: Sensor) -> float:
+    """Part of a tie's force in a contact force: of a carriage altogether, or at one of its contacts."""
+    wanted = sensor.carriage if sensor.contact is None else f"{sensor.carriage}_{sensor.contact}"
+    return float(wanted == (tie.carriage if sensor.contact is None else tie.name))
+
+
+class _Parts(NamedTuple):
+    """A sensor's rows (S, 12) on u, v, a; they share their index."""
+
+    u: Rows
+    v: Array
+    a: Array
+
+
+def readings(model: Unreduced, along: Along) -> Readings:
+    """Rows of all sensors of the study; those on bodies that ride, and of sprung masses, count from the unstressed
+    place."""
+    count, ties = len(along.s), len(model.ties)
+    found = []
+    for name, sensor in model.study.sensor.items():
+        parts = _parts(model, name, sensor, along)
+        forces, added = np.zeros((count, ties)), np.zeros(count)
+        if sensor.quantity == "contact_force":
+            forces[:] = [_counts(tie, sensor) for tie in model.ties]
+        elif sensor.carriage is None and sensor.quantity not in RATES:
+            forces, added = _between_ends(model, name, sensor, along)
+        found.append((parts.u.freedoms, parts.u.values, parts.v, parts.a, forces, added))
+    columns = zip(*found, strict=True) if found else [[]] * 6
+    shapes = ((WIDTH,), (WIDTH,), (WIDTH,), (WIDTH,), (ties,), ())
+    kinds = (np.int64, *(np.float64,) * 5)
+    stacked = [
+        np.stack(list(part), axis=1) if found else np.zeros((count, 0, *shape), dtype=kind)
+        for part, shape, kind in zip(columns, shapes, kinds, strict=True)
+    ]
+    return Readings(*stacked)
+
+
+def _place(model: Unreduced, sensor: Sensor, along: Along) -> tuple[Array, int | None]:
+    """Where a sensor reads (S,), and the rider under which it does."""
+    if sensor.under is None:
+        return np.full(len(along.s), 0.0 if sensor.at is None else sensor.at), None
+    rider = list(model.study.carriage).index(sensor.under)
+    return along.s[:, rider], rider
+
+
+def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
+    count = len(along.s)
+    none = np.zeros((count, WIDTH))
+    if sensor.quantity == "contact_force":
+        return _Parts(no_rows(count), none, none)
+    if sensor.carriage is not None:
+        rows = no_rows(count)
+        rows.freedoms[:] = model.sprung[sensor.carriage]
+        rows.values[:, 0] = 1.0
+        order = ("displacement", *RATES).index(sensor.quantity)
+        on = [rows.values if order == k else none for k in range(3)]
+        return _Parts(Rows(rows.freedoms, on[0]), on[1], on[2])
+    body = model.study.body_of(name)
+    track, first = model.bodies[body].track, model.firsts[body]
+    place, rider = _place(model, sensor, along)
+    if sensor.quantity not in ("displacement", *RATES):
+        moved, inertia = track.sections(sensor.quantity, place)
+        return _Parts(moved.moved(first), none, inertia.values)
+    shape = _wide(track.rows(place).moved(first))
+    if sensor.quantity == "displacement":
+        return _Parts(shape, none, none)
+    on_u, on_v, on_a = none, none, shape.values
+    if sensor.quantity == "velocity":
+        on_v, on_a = shape.values, none
+    if rider is not None:
+        slope, bend = (_wide(track.rows(place, order)).values for order in (1, 2))
+        ds, dds = along.ds[:, rider, None], along.dds[:, rider, None]
+        if sensor.quantity == "velocity":
+            on_u = ds * slope
+        else:
+            on_u, on_v = ds**2 * bend + dds * slope, 2.0 * ds * slope
+    return _Parts(Rows(shape.freedoms, on_u), on_v, on_a)
+
+
+def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> tuple[Array, Array]:
+    """(S, T) what the ties' forces on the sensor's own element add, and (S,) what own weight on it does."""
+    body = model.study.body_of(name)
+    track = model.bodies[body].track
+    place, _ = _place(model, sensor, along)
+    section = sensor.quantity != "displacement"
+    forces = np.zeros((len(along.s), len(model.ties)))
+
+    def adds(s: Array) -> Array:
+        return track.sections_within(sensor.quantity, place, s) if section else track.within(place, s)
+
+    for j, tie in enumerate(model.ties):
+        if tie.body == body:
+            forces[:, j] += np.where(along.on[:, tie.rider], adds(along.s[:, tie.rider]), 0.0)
+        if tie.rides == body and tie.at is not None:
+            forces[:, j] -= adds(np.full(len(place), tie.at))
+    added = np.zeros(len(place))
+    if _weighs(model.study, body):
+        spread = track.sections_under_weight(sensor.quantity, place) if section else track.under_weight(place)
+        added += spread * model.study.gravity
+    return forces, added
+
+
+def _weighs(study: Study, body: str) -> bool:
+    """Whether own weight on the body's elements counts; it cancels where a body that rides counts from its rest."""
+    return study.body[body].own_weight and not any(getattr(c, "body", None) == body for c in study.carriage.values())
+
+
+def _wide(rows: Rows) -> Rows:
+    """The same with 12 entries per row."""
+    more = WIDTH - rows.freedoms.shape[1]
+    if more == 0:
+        return rows
+    pad = ((0, 0), (0, more))
+    return Rows(np.pad(rows.freedoms, pad, mode="edge"), np.pad(rows.values, pad))

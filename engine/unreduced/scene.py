@@ -1,0 +1,301 @@
+"""The unreduced finite-element model of a study's scene: a second source for what the march of modes says.
+
+Every body has all its degrees of freedom, stacked in one row; sprung masses stand after the bodies as degrees of
+freedom of their own. A body that rides and a sprung mass count from their unstressed place over level rigid ground, so
+their weight bends them and their springs by the model itself; the bodies they ride count from their state without
+carriages, or with own weight from the unstressed state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.model.timeline import Rider
+from engine.scene.carriages import BodyCarriage, Carriage, Contact, ForceCarriage, OscillatorCarriage
+from engine.scene.study import Study
+from engine.unreduced.bodies import FullBody, full_body
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+Array = NDArray[np.float64]
+Link = Literal["force", "mass", "spring", "rigid"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tie:
+    """One force between a carriage and the body on which it rides; positive presses.
+
+    name: of the contact. rider: number of its way. body: the name of the ridden one. mass kg, force N, stiffness N/m,
+    damping N s/m: of its kind. other (n,): what it does to the rest of the scene, the rider's side of its gap; at: its
+    place on the track of the body that rides, None where it has none.
+    """
+
+    name: str
+    carriage: str
+    link: Link
+    rider: int
+    body: str
+    other: Array
+    mass: float = 0.0
+    force: float = 0.0
+    stiffness: float = np.inf
+    damping: float = 0.0
+    rides: str = ""
+    at: float | None = None
+
+    @property
+    def compliance(self) -> float:
+        """m/N of its spring."""
+        return 1.0 / self.stiffness
+
+
+@dataclass(frozen=True, eq=False)
+class Unreduced:
+    """All bodies of a scene as one system M x'' + C x' + K x = f + ties.
+
+    bodies by name, firsts: where their degrees of freedom begin; sprung: that of every sprung mass by its carriage's
+    name; riders: the ways of the carriages, then of all contacts; weight (n,): N, constant loads.
+    """
+
+    study: Study
+    bodies: Mapping[str, FullBody]
+    firsts: Mapping[str, int]
+    sprung: Mapping[str, int]
+    riders: tuple[Rider, ...]
+    ties: tuple[Tie, ...]
+    weight: Array
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom of the whole scene."""
+        return int(self.weight.size)
+
+    @property
+    def loose(self) -> tuple[str, ...]:
+        """The bodies that ride."""
+        return tuple(c.body for c in self.study.carriage.values() if isinstance(c, BodyCarriage))
+
+    @cached_property
+    def stiffness(self) -> csc_array:
+        """(n, n) of all bodies, without ties."""
+        return self._stacked([body.stiffness for body in self.bodies.values()], np.zeros(len(self.sprung)))
+
+    @cached_property
+    def mass(self) -> csc_array:
+        """(n, n) of all bodies and sprung masses."""
+        return self._stacked([body.mass for body in self.bodies.values()], self._sprung_masses)
+
+    @cached_property
+    def viscous(self) -> csc_array:
+        """(n, n) of dampers and Rayleigh damping."""
+        return self._stacked([body.damping.viscous for body in self.bodies.values()], np.zeros(len(self.sprung)))
+
+    @cached_property
+    def modal_loads(self) -> Array:
+        """(n, k) M phi of the damped modes, times the root of 2 zeta omega."""
+        found = [np.zeros((self.size, 0))]
+        for name, body in self.bodies.items():
+            wide = np.zeros((self.size, body.damping.rates.size))
+            wide[self.part(name)] = body.damping.loads * np.sqrt(body.damping.rates)
+            found.append(wide)
+        return np.concatenate(found, axis=1)
+
+    @cached_property
+    def rigid(self) -> Array:
+        """(n, r) rigid-body motions of unit mass of what is free to move."""
+        found = [np.zeros((self.size, 0))]
+        for name, body in self.bodies.items():
+            wide = np.zeros((self.size, body.rigid.shape[1]))
+            wide[self.part(name)] = body.rigid
+            found.append(wide)
+        for place, mass in zip(self.sprung.values(), self._sprung_masses, strict=True):
+            found.append(np.eye(self.size)[:, [place]] / np.sqrt(mass))
+        return np.concatenate(found, axis=1)
+
+    @property
+    def _sprung_masses(self) -> Array:
+        return np.array([self.study.value(f"carriage.{name}.mass") for name in self.sprung])
+
+    def part(self, body: str) -> slice:
+        """A body's degrees of freedom."""
+        return slice(self.firsts[body], self.firsts[body] + self.bodies[body].size)
+
+    def elastic(self, loads: Array) -> Array:
+        """(n, c) elastic displacements of all bodies under loads (n, c), rigid-body motions left out."""
+        found = np.zeros_like(loads)
+        for name, body in self.bodies.items():
+            here = loads[self.part(name)]
+            felt = np.flatnonzero(np.any(here, axis=0))
+            if body.flexibility is not None and felt.size:
+                found[self.part(name), felt] = body.flexibility.solve(here[:, felt])
+        return found
+
+    def _stacked(self, parts: Sequence[Any], last: Array) -> csc_array:
+        from scipy.sparse import block_diag, csc_array
+
+        return csc_array(block_diag([*parts, *(csc_array([[value]]) for value in last)], format="csc"))
+
+
+def unreduced_model(
+    study: Study, paces: Mapping[str, float] | None = None, delays: Mapping[str, float] | None = None
+) -> Unreduced:
+    """The whole model of a study without sweep.
+
+    Only modes that the reduced bodies keep are damped by a damping ratio, as there; Rayleigh damping and dampers are
+    exact. paces, delays: as of `engine.model.scene_model.build_model`. Raises BadInput for a body without a whole model, and for
+    a fidelity other than "auto".
+    """
+    if study.solver.fidelity not in ("auto", "full"):
+        where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'
+        raise BadInput("the unreduced model is a full one", where=where, expected='"auto"', received=received)
+    used = {study.body_of(sensor) for sensor in study.sensor}
+    for carriage in study.carriage.values():
+        used |= {carriage.on, carriage.body} if isinstance(carriage, BodyCarriage) else {carriage.on}
+    bodies = {name: full_body(study, name) for name in study.body if name in used}
+    _check_weights(study, bodies)
+    firsts, first = {}, 0
+    for name, body in bodies.items():
+        firsts[name], first = first, first + body.size
+    springy = [name for name, carriage in study.carriage.items() if isinstance(carriage, OscillatorCarriage)]
+    sprung = {name: first + index for index, name in enumerate(springy)}
+    scene = _Scene(study, bodies, firsts, sprung, first + len(sprung))
+    return Unreduced(
+        study=study,
+        bodies=bodies,
+        firsts=firsts,
+        sprung=sprung,
+        riders=tuple(_riders(study, bodies, paces or {}, delays or {})),
+        ties=tuple(scene.ties()),
+        weight=scene.weight(),
+    )
+
+
+def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
+    """Weights act along the track."""
+    for name, carriage in study.carriage.items():
+        share = bodies[carriage.on].gravity_share
+        if carriage.inertial and abs(share - 1.0) > 1e-9 and study.gravity != 0.0:
+            raise BadInput(
+                "the weight of this carriage does not act in the direction of its track",
+                where=study.source.where(f"carriage.{name}.on"),
+                expected="a track whose loads act along gravity",
+                received=f"{share:.3g} of gravity along it",
+            )
+
+
+def _riders(
+    study: Study, bodies: Mapping[str, FullBody], paces: Mapping[str, float], delays: Mapping[str, float]
+) -> Iterator[Rider]:
+    """The ways of the carriages, then of all contacts."""
+    first = next(iter(study.carriage.values()))
+    alone = {}
+    for name, carriage in study.carriage.items():
+        pace = paces.get(name, first.motion.time_scale / carriage.motion.time_scale)
+        delay = delays.get(name, carriage.start_time / first.motion.time_scale)
+        alone[name] = Rider(carriage.motion, bodies[carriage.on].length, pace, delay)
+        yield alone[name]
+    for name, _, contact in contacts_of(study):
+        carriage = study.carriage[name]
+        assert isinstance(carriage, BodyCarriage)
+        middle = 0.5 * bodies[carriage.body].length
+        offset = _ahead(contact, middle if carriage.reference is None else carriage.reference)
+        before = alone[name]
+        yield Rider(before.motion, before.length, before.pace, before.delay, offset)
+
+
+def contacts_of(study: Study) -> Iterator[tuple[str, str, Contact]]:
+    """Carriage, name and contact of every contact of the bodies that ride."""
+    for name, carriage in study.carriage.items():
+        if isinstance(carriage, BodyCarriage):
+            for word, contact in carriage.contacts.items():
+                yield name, word, contact
+
+
+def _ahead(contact: Contact, reference: float) -> float:
+    """m from the carriage's reference to a contact."""
+    return float(contact.offset or 0.0) if contact.at is None else contact.at - reference
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What the ties of a scene are made from."""
+
+    study: Study
+    bodies: Mapping[str, FullBody]
+    firsts: Mapping[str, int]
+    sprung: Mapping[str, int]
+    size: int
+
+    def ties(self) -> Iterator[Tie]:
+        """All ties: of the carriages themselves, then of contacts."""
+        for number, (name, carriage) in enumerate(self.study.carriage.items()):
+            yield from self._own(number, name, carriage)
+        for rider, (name, word, contact) in enumerate(contacts_of(self.study), start=len(self.study.carriage)):
+            yield self._contact(rider, name, word, contact)
+
+    def _own(self, number: int, name: str, carriage: Carriage) -> Iterator[Tie]:
+        none = np.zeros(self.size)
+        if isinstance(carriage, ForceCarriage):
+            yield Tie(name, name, "force", number, carriage.on, none, force=carriage.force)
+        elif isinstance(carriage, OscillatorCarriage):
+            if carriage.wheel_mass > 0.0:
+                yield Tie(name, name, "mass", number, carriage.on, none, mass=carriage.wheel_mass)
+            mass = none.copy()
+            mass[self.sprung[name]] = -1.0
+            k, c = carriage.stiffness, carriage.damping
+            yield Tie(name, name, "spring", number, carriage.on, mass, stiffness=k, damping=c)
+        elif not isinstance(carriage, BodyCarriage):
+            yield Tie(name, name, "mass", number, carriage.on, none, mass=carriage.moving_mass)
+
+    def _contact(self, rider: int, name: str, word: str, contact: Contact) -> Tie:
+        carriage = self.study.carriage[name]
+        assert isinstance(carriage, BodyCarriage)
+        body, first = self.bodies[carriage.body], self.firsts[carriage.body]
+        row = np.zeros(self.size)
+        row[first : first + body.size] = -self._row(name, word, contact, body)
+        return Tie(
+            name=f"{name}_{word}",
+            carriage=name,
+            link="rigid" if contact.stiffness == "rigid" else "spring",
+            rider=rider,
+            body=carriage.on,
+            other=row,
+            stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
+            damping=contact.damping,
+            rides=carriage.body,
+            at=contact.at,
+        )
+
+    def _row(self, name: str, word: str, contact: Contact, body: FullBody) -> Array:
+        """(n of the body,) what moves the contact."""
+        if contact.at is not None:
+            return body.track.rows(np.array([contact.at])).columns(body.size)[:, 0]
+        found = body.points.get(f"point.{contact.point}")
+        if found is None:
+            names = [point.removeprefix("point.") for point in body.points if point.startswith("point.")]
+            raise BadInput(
+                "no such point of the body that rides",
+                where=self.study.source.where(f"carriage.{name}.contacts.{word}.point"),
+                expected=f"one of {', '.join(names)}" if names else "a contact with `at`",
+                received=f'"{contact.point}"',
+            )
+        return found
+
+    def weight(self) -> Array:
+        """(n,) N: of sprung masses, of bodies that ride, and of those whose own weight acts."""
+        found = np.zeros(self.size)
+        riding = [c.body for c in self.study.carriage.values() if isinstance(c, BodyCarriage)]
+        for name, body in self.bodies.items():
+            if name in riding or self.study.body[name].own_weight:
+                found[self.firsts[name] : self.firsts[name] + body.size] = body.pull * self.study.gravity
+        for name, place in self.sprung.items():
+            found[place] = self.study.value(f"carriage.{name}.mass") * self.study.gravity
+        return found

@@ -1,0 +1,127 @@
+"""Places on the track of a whole finite-element model, as rows on its degrees of freedom.
+
+The deflection at s follows the ends of its element by the static shapes; a force at s acts on them by the same
+numbers, and bends the element between its ends besides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.bodies.frame.assembly import Assembly, cross_matrix
+from engine.bodies.frame.sections import forces_from_ends, held_forces, section_weights, spread_forces
+from engine.bodies.frame.shapes import FORCES
+from engine.bodies.frame.track import TrackBeams, TrackPoints
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+WIDTH = 12  # degrees of freedom of an element
+STEP = 1e-3  # of an element's length, between places of a derivative
+
+
+class Rows(NamedTuple):
+    """Rows with a few entries each: values (S, k) at the degrees of freedom `freedoms` (S, k)."""
+
+    freedoms: Counts
+    values: Array
+
+    def moved(self, first: int) -> Rows:
+        """The same where the body's degrees of freedom begin at `first`."""
+        return Rows(self.freedoms + first, self.values)
+
+    def of(self, state: Array) -> Array:
+        """(S,) products with states (n,), or with one state per row (S, n)."""
+        taken = state[self.freedoms] if state.ndim == 1 else np.take_along_axis(state, self.freedoms, axis=1)
+        return np.asarray(np.sum(self.values * taken, axis=1))
+
+    def columns(self, size: int) -> Array:
+        """(size, S) the same as dense columns."""
+        found = np.zeros((size, len(self.freedoms)))
+        np.add.at(found, (self.freedoms, np.arange(len(self.freedoms))[:, None]), self.values)
+        return found
+
+
+def no_rows(count: int, width: int = WIDTH) -> Rows:
+    """Rows of zeros."""
+    return Rows(np.zeros((count, width), dtype=np.int64), np.zeros((count, width)))
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTrack:
+    """The track of a frame.
+
+    numbers (E + 1, 6): of the degrees of freedom of its elements' ends, -1 where they do not move; arms (E + 1, 3): m;
+    spread (E, 3): own weight per length along the elements' axes, kg/m.
+    """
+
+    track: TrackBeams
+    numbers: Counts
+    arms: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, track: TrackBeams, ends: TrackPoints, assembly: Assembly, spread: Array) -> FrameTrack:
+        """The track in an assembly's numbers of degrees of freedom."""
+        numbers = np.full(6 * len(assembly.mesh.points), -1, dtype=np.int64)
+        numbers[assembly.free] = np.arange(len(assembly.free))
+        return cls(track, numbers.reshape(-1, 6)[ends.points], ends.arms, spread)
+
+    def rows(self, s: Array, derivative: int = 0) -> Rows:
+        element, _ = self.track.at(s)
+        return self._on_nodes(element, self.track.to_ends(s, derivative))
+
+    def within(self, x: Array, s: Array) -> Array:
+        place, load = (part.reshape(-1) for part in np.broadcast_arrays(x, s))
+        return self.track.within(place, load).reshape(np.broadcast_shapes(x.shape, s.shape))
+
+    def inside(self, s: Array) -> tuple[Array, Array]:
+        """(S,) places on the same elements, off their ends by the steps (S,) that come with them, m."""
+        element, _ = self.track.at(s)
+        step = STEP * self.track.beams.length[element]
+        return np.clip(s, self.track.places[element] + 2.0 * step, self.track.places[element + 1] - 2.0 * step), step
+
+    def under_weight(self, x: Array) -> Array:
+        return self.track.under_spread_load(x, self.spread)
+
+    def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
+        element, at = self.track.at(x)
+        weights = section_weights(self.track, quantity)[element]
+        elements, places = np.repeat(element, WIDTH), np.repeat(at, WIDTH)
+        unit = np.tile(np.eye(WIDTH), (len(x), 1))
+        strain = forces_from_ends(self.track, elements, places, unit)
+        inertia = spread_forces(self.track, elements, places, self._inertia(elements, unit))
+        found = [
+            np.einsum("scf,sf->sc", forces.reshape(len(x), WIDTH, FORCES), weights) for forces in (strain, inertia)
+        ]
+        return self._on_nodes(element, found[0]), self._on_nodes(element, found[1])
+
+    def _inertia(self, element: Counts, moved: Array) -> Array:
+        """(S, 3) inertia force per length along the element's axes where its ends accelerate by `moved` (S, 12)."""
+        ends = moved.reshape(-1, 2, 6)[:, :, :3].mean(axis=1)
+        local = np.einsum("sij,sj->si", self.track.axes[element], ends)
+        return np.asarray(-self.track.beams.mass[element, None] * local)
+
+    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
+        place, load = (part.reshape(-1) for part in np.broadcast_arrays(x, s))
+        element, _ = self.track.at(place)
+        forces = held_forces(self.track, place, load)
+        found = np.sum(section_weights(self.track, quantity)[element] * forces, axis=1)
+        return np.asarray(found.reshape(np.broadcast_shapes(x.shape, s.shape)))
+
+    def sections_under_weight(self, quantity: str, x: Array) -> Array:
+        element, at = self.track.at(x)
+        forces = spread_forces(self.track, element, at, self.spread[element])
+        return np.asarray(np.sum(section_weights(self.track, quantity)[element] * forces, axis=1))
+
+    def _on_nodes(self, element: Counts, ends: Array) -> Rows:
+        """Rows on degrees of freedom from rows (S, 12) on the ends of the elements' axes: u_end = u + theta x arm."""
+        values = ends.reshape(-1, 2, 6).copy()
+        which = element[:, None] + np.arange(2)
+        values[:, :, 3:] -= np.einsum("sei,seij->sej", values[:, :, :3], cross_matrix(self.arms[which]))
+        numbers = self.numbers[which].reshape(-1, WIDTH)
+        return Rows(np.maximum(numbers, 0), np.where(numbers >= 0, values.reshape(-1, WIDTH), 0.0))

@@ -1,0 +1,217 @@
+"""A netCDF-4 file back into tables, with every check that is possible before its data are loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from results_schema.errors import ArchiveError, BadInput, WanderlastError
+from results_schema.store import files
+from results_schema.store.links import refuse_pointers
+from results_schema.store.tables import CONTENTS, DIGEST, Column, Table, checksum, contents, digest
+
+SCHEMA_VERSION = 2  # archives of version 1 are of before `estimated_error`
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+# zlib cannot shrink anything by more than 1032; a file that claims more was never written in full.
+_LARGEST_COMPRESSION = 1100
+_TEXT_BYTES = 16
+
+
+@contextmanager
+def checked(path: Path) -> Iterator[Any]:
+    """An open netCDF4.Dataset of an archive that is ours, of a known schema and of a credible size.
+
+    Raises BadInput (no such file, or it points at other files) and ArchiveError (damaged, foreign, newer).
+    """
+    with opened(path) as dataset:
+        _check_schema(path, dataset)
+        check_sizes(path, dataset)
+        _check_contents(path, dataset)
+        yield dataset
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """An open netCDF4.Dataset of any netCDF-4 file that points at no others. Raises BadInput and ArchiveError."""
+    import netCDF4
+
+    _check_signature(path)
+    with files.NETCDF_LOCK:
+        refuse_pointers(path)
+        with _as_archive_error(path), netCDF4.Dataset(path, "r") as dataset:
+            yield dataset
+
+
+def read_tables(path: Path, dataset: Any) -> dict[str, Table]:
+    """Everything in the file, by group. Raises ArchiveError where data or attributes are damaged."""
+    with _as_archive_error(path):
+        tables = {group: _read_table(place) for group, place in groups_of(dataset)}
+        _check_digest(path, dataset, tables)
+    return tables
+
+
+def verify(path: Path, dataset: Any) -> None:
+    """Read everything once, one variable at a time. Raises ArchiveError where something is damaged."""
+    with _as_archive_error(path):
+        tables = {group: _read_table(place, _checksum_only) for group, place in groups_of(dataset)}
+        _check_digest(path, dataset, tables)
+
+
+def groups_of(dataset: Any) -> Iterator[tuple[str, Any]]:
+    """The groups that hold something, as (path, netCDF4 group), the root first."""
+    yield "/", dataset
+    pending = list(dataset.groups.values())
+    while pending:
+        place = pending.pop(0)
+        if place.variables or place.ncattrs():
+            yield place.path, place
+        pending.extend(place.groups.values())
+
+
+@contextmanager
+def _as_archive_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except WanderlastError:
+        raise
+    except (OSError, RuntimeError, ValueError, LookupError, AttributeError, TypeError, MemoryError) as error:
+        raise ArchiveError(
+            f"damaged or truncated ({error})", where=str(path), remedy="run the study again with --overwrite"
+        ) from error
+
+
+def _check_signature(path: Path) -> None:
+    if not path.exists():
+        raise BadInput("no such file", where=str(path))
+    if not path.is_file():
+        raise BadInput("not a file", where=str(path))
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(_SIGNATURE))
+    except OSError as error:
+        raise BadInput(f"cannot be read ({error.strerror})", where=str(path)) from error
+    if start != _SIGNATURE:
+        raise ArchiveError("not a netCDF-4 file", where=str(path), expected="an archive of wanderlast")
+
+
+def _check_schema(path: Path, dataset: Any) -> None:
+    version = getattr(dataset, "schema_version", None)
+    if not isinstance(version, int | np.integer) or not isinstance(getattr(dataset, "study_kind", None), str):
+        raise ArchiveError(
+            "a netCDF file of another program",
+            where=str(path),
+            expected="attributes schema_version and study_kind",
+            received=", ".join(dataset.ncattrs()) or "no attributes",
+        )
+    if version > SCHEMA_VERSION:
+        raise ArchiveError(
+            "written by a newer version",
+            where=str(path),
+            expected=f"schema_version up to {SCHEMA_VERSION}",
+            received=str(version),
+            remedy="update wanderlast",
+        )
+    if version < SCHEMA_VERSION:
+        raise ArchiveError(
+            "written before archives held estimated_error of every reported number",
+            where=str(path),
+            expected=f"schema_version {SCHEMA_VERSION}",
+            received=str(version),
+            remedy="run the study again with --overwrite",
+        )
+
+
+def check_sizes(path: Path, dataset: Any) -> None:
+    """Refuse a file that claims more data than it can hold, or none, or of foreign types. Raises ArchiveError."""
+    claimed = 0
+    for group, place in groups_of(dataset):
+        if place.vltypes or place.cmptypes or place.enumtypes:
+            raise ArchiveError("holds types that archives do not have", where=str(path), received=f"group {group}")
+        for name, variable in place.variables.items():
+            count = 1
+            for size in variable.shape:
+                count *= int(size)
+            if count == 0:
+                raise ArchiveError("a variable has no rows", where=str(path), received=name)
+            claimed += count * (_TEXT_BYTES if variable.dtype is str else variable.dtype.itemsize)
+    present = path.stat().st_size
+    if claimed > _LARGEST_COMPRESSION * present:
+        raise ArchiveError(
+            "claims more data than it can hold",
+            where=str(path),
+            expected=f"at most {_LARGEST_COMPRESSION} times its {present} bytes",
+            received=f"{claimed} bytes",
+        )
+
+
+def _check_contents(path: Path, dataset: Any) -> None:
+    outlines = {group: _read_table(place, _outline) for group, place in groups_of(dataset)}
+    stated = set(str(getattr(dataset, CONTENTS, "")).split("\n"))
+    found = set(contents(outlines).split("\n"))
+    if stated != found or "status" not in dataset.variables:
+        missing = sorted(stated - found) or sorted(found - stated) or ["status"]
+        word = "missing" if stated - found or stated == found else "not listed in its contents"
+        raise ArchiveError(
+            f"variables are {word}",
+            where=str(path),
+            expected=f"{len(stated)} variables, as its attribute {CONTENTS!r} says",
+            received=f"without {'; '.join(missing)}" if word == "missing" else "; ".join(missing),
+        )
+
+
+def _check_digest(path: Path, dataset: Any, tables: dict[str, Table]) -> None:
+    if digest(tables) != getattr(dataset, DIGEST, ""):
+        raise ArchiveError(
+            "damaged: values or attributes are not those that were written",
+            where=str(path),
+            remedy="run the study again with --overwrite",
+        )
+
+
+_Loaded = tuple[np.ndarray, str]
+
+
+def _all_of(variable: Any) -> _Loaded:
+    data = np.asarray(variable[...])
+    return (data.astype(object) if variable.dtype is str else data), ""
+
+
+def _checksum_only(variable: Any) -> _Loaded:
+    data, _ = _all_of(variable)
+    return _outline(variable)[0], checksum(data)
+
+
+def _outline(variable: Any) -> _Loaded:
+    """An array of the right type and shape without memory of its own, and no checksum."""
+    is_text = variable.dtype is str
+    one = np.array("" if is_text else 0, object if is_text else variable.dtype)
+    return np.broadcast_to(one, variable.shape), ""
+
+
+def _read_table(place: Any, load: Callable[[Any], _Loaded] = _all_of) -> Table:
+    attributes = {key: place.getncattr(key) for key in place.ncattrs()}
+    beside = set(str(attributes.pop("coordinates", "")).split())
+    columns: dict[str, tuple[Any, dict[str, Any]]] = {}
+    for name, variable in place.variables.items():
+        variable.set_auto_maskandscale(False)
+        own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != "_FillValue"}
+        beside |= set(str(own.pop("coordinates", "")).split())
+        columns[name] = (variable, own)
+    return Table(
+        {name: len(dimension) for name, dimension in place.dimensions.items()},
+        {
+            name: _column(name, variable, own, name in beside, load(variable))
+            for name, (variable, own) in columns.items()
+        },
+        attributes,
+    )
+
+
+def _column(name: str, variable: Any, attributes: dict[str, Any], is_named: bool, loaded: _Loaded) -> Column:
+    data, found = loaded
+    return Column(variable.dimensions, data, attributes, is_named or variable.dimensions == (name,), found)

@@ -1,0 +1,83 @@
+"""Tables into one netCDF-4 file: the same tables give the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from results_schema.store import files
+from results_schema.store.tables import Column, Table
+
+_CHUNK_BYTES = 1 << 20
+
+
+def write_tables(path: Path, tables: Mapping[str, Table], added: Mapping[str, Any]) -> None:
+    """Write tables by group ("/", "/model/bed") into a new file; `added` joins the root's attributes."""
+    import netCDF4
+
+    with files.NETCDF_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
+        for group, table in tables.items():
+            place = dataset if group == "/" else dataset.createGroup(group)
+            _write_table(place, table)
+        dataset.setncatts(dict(added))
+
+
+def _write_table(place: Any, table: Table) -> None:
+    for name, size in table.sizes.items():
+        place.createDimension(name, size)
+    place.setncatts({key: _attribute(value) for key, value in table.attributes.items()})
+    further = [name for name, column in table.columns.items() if column.is_coordinate and column.dims != (name,)]
+    named: set[str] = set()
+    for name, column in table.columns.items():
+        beside = [] if column.is_coordinate else _coordinates_of(column, further, table)
+        named.update(beside)
+        _write_column(place, name, column, beside)
+    rest = [name for name in further if name not in named]
+    if rest:
+        place.setncattr("coordinates", " ".join(rest))
+
+
+def _coordinates_of(column: Column, further: list[str], table: Table) -> list[str]:
+    """The coordinates that CF wants named with a variable: those over some of its dimensions."""
+    return [name for name in further if set(table.columns[name].dims) <= set(column.dims)]
+
+
+def _write_column(place: Any, name: str, column: Column, coordinates: list[str]) -> None:
+    options: dict[str, Any] = {"fill_value": False}
+    if column.data.dtype.kind == "f" and not column.is_coordinate:
+        options["fill_value"] = column.data.dtype.type(np.nan)
+    if column.is_chunked:
+        chunks = chunk_shape(column.data.shape, column.data.itemsize)
+        options |= {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": chunks}
+    variable = place.createVariable(name, str if column.is_text else column.data.dtype, column.dims, **options)
+    variable.set_auto_maskandscale(False)
+    if column.is_chunked:
+        # Chunks are written whole, one after the other: a cache per variable would only take memory.
+        variable.set_var_chunk_cache(_CHUNK_BYTES)
+    variable.setncatts({key: _attribute(value) for key, value in column.attributes.items() if key != "_FillValue"})
+    if coordinates:
+        variable.setncattr("coordinates", " ".join(coordinates))
+    variable[...] = column.data if column.dims else column.data.item()
+
+
+def _attribute(value: Any) -> Any:
+    return value[0] if isinstance(value, np.ndarray) and value.size == 1 else value
+
+
+def chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
+    """Chunks of about a megabyte that keep the last axes whole, so that one variant's rows lie together.
+
+    >>> chunk_shape((1000, 400, 200), 8)
+    (1, 400, 200)
+    >>> chunk_shape((1_000_000,), 8)
+    (131072,)
+    """
+    left = max(1, _CHUNK_BYTES // itemsize)
+    chunks = []
+    for size in reversed(shape):
+        chunks.append(min(size, left))
+        left = max(1, left // size)
+    return tuple(reversed(chunks))

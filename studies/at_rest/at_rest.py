@@ -1,0 +1,194 @@
+"""Studies of a scene with its carriages at rest: the first one at one position after another, every other one where it
+starts. Nothing is marched; a kind says by `AtRest` what it computes of a scene, and this cuts the work into pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.scene.carriages import MAX_CONTACTS
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from studies.at_rest.positions import CORRECTED, Asked, Positions, positions_of, with_modes
+from studies.protocol.measuring import Piece, Work
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import Way
+    from engine.model.variant_values import LaneValues
+    from engine.scene.study import Study
+    from results_schema.status import Fidelity
+
+Array = NDArray[np.float64]
+Named = Mapping[str, NDArray[Any]]
+
+AT_ONCE = 40_000  # variants times positions of one piece
+STATION_SECONDS = 1.5e-4  # of one variant at one position, about
+UNREDUCED_SECONDS = 0.5  # of one position, about
+START_SECONDS, SHAPES_SECONDS = 0.5, 3.0
+
+
+class AtRest(Protocol):
+    """What a kind computes of a scene at rest; arrays by the names of results, with the dimensions of `Grid`."""
+
+    name: str
+
+    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> Named:
+        """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V,) where a contact opens."""
+
+    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> Named:
+        """Results (B, S, ...) along all bodies, of the scene without sweep."""
+
+    def unreduced(self, study: Study, model: SceneModel, positions: Array) -> Named:
+        """Results (S, ...) of the unreduced model, by the names of `variants`."""
+
+    def check_model(self, model: SceneModel) -> None:
+        """Refuse a scene that has no answer. Raises BadInput."""
+
+    def fidelity(self, model: SceneModel) -> Fidelity:
+        """Which model computes it."""
+
+    def inner(self, study: Study, model: SceneModel) -> Mapping[str, tuple[str, NDArray[Any]]]:
+        """Dimensions of results beyond variant and position: result -> dimension and its coordinate."""
+
+
+def pieces_of(kind: AtRest, study: Study, asked: Asked) -> list[Piece]:
+    """The work of a study at rest: shapes of its base scene, all variants, and what is compared."""
+    from engine.batch.plan import check_memory
+    from engine.model.distinct_models import base_scene
+    from engine.scene.sweep import expand
+    from engine.unreduced.scene import unreduced_model
+
+    model = base_scene(study)
+    kind.check_model(model)
+    places, cases = positions_of(study, asked), expand(study)
+    if places.unreduced.size:
+        check_held(model)
+        unreduced_model(study.without_sweep())  # refuses bodies that have none
+    count = places.all.size
+    check_memory(study, cases.size, 8 * cases.size * _numbers(study, asked, count))
+    seconds = SHAPES_SECONDS + count * STATION_SECONDS
+    found = [Piece("shapes", "shapes of all bodies in the base scene", partial(_shapes, kind, study, places), seconds)]
+    step = max(1, AT_ONCE // count)
+    for number, first in enumerate(range(0, cases.size, step)):
+        size = min(step, cases.size - first)
+        words = f"{size:,} variants at {count} positions" if cases.size > 1 else f"{count} positions"
+        compute = partial(_variants, kind, study, places, slice(first, first + size))
+        seconds, large = START_SECONDS + size * count * STATION_SECONDS, size * _numbers(study, asked, count) * 8
+        found.append(Piece(f"variants-{number:04d}", words, compute, seconds, large))
+    for modes in asked.mode_counts:
+        words = f"{modes} modes of every body at {places.checked.size} positions"
+        found.append(Piece(f"modes-{modes}", words, partial(_with_modes, kind, study, places, modes), START_SECONDS))
+    if places.unreduced.size:
+        words = f"the unreduced model at {places.unreduced.size} positions"
+        seconds = START_SECONDS + UNREDUCED_SECONDS * places.unreduced.size
+        found.append(Piece("unreduced", words, partial(_unreduced, kind, study, places), seconds))
+    return found
+
+
+def check_held(model: SceneModel) -> None:
+    """Refuse a body that nothing holds: it has no static state. Raises BadInput."""
+    riding = {carriage.rides for carriage in model.carriages}
+    for number, part in enumerate(model.bodies):
+        if part.modal.rigid_modes and number not in riding:
+            raise BadInput(
+                "nothing holds this body, so it has no static state",
+                where=model.study.source.where(f"body.{part.name}.supports"),
+                expected="supports that hold it",
+            )
+
+
+def _numbers(study: Study, asked: Asked, positions: int) -> int:
+    """Numbers that are kept of one variant, at most."""
+    modes = int(getattr(asked, "modes", 0))
+    return 8 + positions * (modes or 2 * len(study.sensor) + MAX_CONTACTS * len(study.carriage))
+
+
+def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
+    """Shapes along all bodies, of the scene without sweep."""
+    from engine.model.distinct_models import base_scene
+    from engine.model.station_path import frozen
+
+    model = base_scene(study)
+    return _plain(kind.shapes(model, frozen(model, places.all)))
+
+
+def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
+    """Some variants, in the order of the scenes that they share."""
+    from engine.model.distinct_models import scenes, structure
+    from engine.model.variant_values import LaneValues
+    from engine.scene.sweep import expand
+
+    cases = expand(study)
+    everything = np.arange(cases.size, dtype=np.int64)
+    chosen = everything[np.argsort(structure(cases, everything), kind="stable")][part]
+    numbers, found = [], []
+    for model, variants in scenes(study, cases, chosen):
+        work.check()
+        values = LaneValues(model.study, cases.columns_of(variants), variants.size)
+        numbers.append(variants)
+        found.append(_evaluated(kind, model, values, places))
+    joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+    return _plain({"number": np.concatenate(numbers), **joined})
+
+
+def _evaluated(kind: AtRest, model: SceneModel, values: LaneValues, places: Positions) -> dict[str, NDArray[Any]]:
+    """Results of some variants of a scene, with NaN where a contact is off the body."""
+    from engine.model.station_path import frozen
+
+    along = frozen(model, places.all)
+    found = dict(kind.variants(model, values, along))
+    own = [along[rider].here for rider in {0, *(rider for rider, _ in model.carriages[0].loads)}]
+    gone = ~np.all([here for here in own if here is not None], axis=0)
+    opened = found.pop("opened", np.zeros((values.size, places.all.size), dtype=np.bool_)) & ~gone
+    for array in found.values():
+        array[:, gone] = np.nan
+    found["status"] = np.where(opened.any(axis=1), Status.SEPARATED, Status.OK)
+    found["fidelity"] = np.full(values.size, int(kind.fidelity(model)))
+    found["modes"] = np.full(values.size, model.body_modes)
+    return found
+
+
+def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:
+    """Results with another number of modes of every body, with and without static correction."""
+    from engine.model.distinct_models import base_scene
+    from engine.model.station_path import frozen
+    from engine.model.variant_values import LaneValues
+
+    found = []
+    for correction in CORRECTED:
+        model = base_scene(with_modes(study, modes, correction))
+        along = frozen(model, places.all[places.checked])
+        found.append(
+            {name: one[0] for name, one in kind.variants(model, LaneValues(model.study, {}, 1), along).items()}
+        )
+    names = [name for name in found[0] if name != "opened"]
+    return _plain({name: np.stack([one[name] for one in found]) for name in names})
+
+
+def _unreduced(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
+    """Results of the unreduced model, and those of the modes at the same positions."""
+    from engine.model.distinct_models import base_scene
+    from engine.model.station_path import frozen
+    from engine.model.variant_values import LaneValues
+
+    model, positions = base_scene(study), places.all[places.unreduced]
+    reduced = kind.variants(model, LaneValues(model.study, {}, 1), frozen(model, positions))
+    full = kind.unreduced(study.without_sweep(), model, positions)
+    return _plain({**full, **{f"{name}_reduced": reduced[name][0] for name in full}})
+
+
+def _plain(arrays: Named) -> xr.Dataset:
+    """Arrays with dimensions of no meaning, as a piece."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {name: ([f"{name}_{axis}" for axis in range(array.ndim)], array) for name, array in arrays.items()}
+    )

@@ -1,0 +1,177 @@
+"""The pieces of a study at rest put together: dimensions, coordinates and declarations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.variables import Variable
+from studies.at_rest.positions import Asked, Positions, positions_of
+from studies.protocol.measuring import described, usual
+from studies.results.results import sensor_units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.study import Study
+    from studies.at_rest.at_rest import AtRest
+
+BODY_PLACES = 101  # along every body, of its shapes
+
+COORDINATES = (
+    Variable("on_body", ("on_body",), "str", long_name="body", required=False, lead="none"),
+    Variable(
+        "body_place",
+        ("body_place",),
+        long_name="place along the body over the length of its track",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "checked_position",
+        ("checked_position",),
+        units="m",
+        long_name="position at which numbers of modes are compared",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "unreduced_position",
+        ("unreduced_position",),
+        units="m",
+        long_name="position at which the unreduced model is computed",
+        required=False,
+        lead="none",
+    ),
+    Variable(
+        "correction",
+        ("correction",),
+        "int8",
+        long_name="whether the static correction is on",
+        meaning="1 with, 0 without",
+        required=False,
+        lead="none",
+    ),
+)
+
+
+def gathered(kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked: Asked) -> xr.Dataset:
+    """The study's dataset from its pieces."""
+    return _Gathering(kind, pieces, study, asked).dataset()
+
+
+def asked_coordinates(places: Positions, asked: Asked) -> dict[str, NDArray[Any]]:
+    """The coordinates that follow from what is asked."""
+    return {
+        "position": places.all,
+        "checked_position": places.all[places.checked],
+        "unreduced_position": places.all[places.unreduced],
+        "mode_count": np.array(asked.mode_counts, dtype=np.int64),
+        "correction": np.array([1, 0]),
+    }
+
+
+class _Gathering:
+    """The pieces of one study with what their dimensions mean."""
+
+    def __init__(self, kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked: Asked) -> None:
+        from engine.model.distinct_models import base_scene
+        from engine.scene.sweep import expand
+
+        self.kind, self.pieces, self.asked = kind, pieces, asked
+        self.model, self.cases, self.places = base_scene(study), expand(study), positions_of(study, asked)
+        self.inner = kind.inner(study, self.model)
+        self.declared = _declared(kind.name, study)
+
+    def dataset(self) -> xr.Dataset:
+        """Everything, labelled."""
+        import xarray as xr
+
+        from engine.batch.dataset import coordinates
+
+        variables = {**self._grid(), **self._shapes(), **self._mode_counts(), **self._unreduced()}
+        found = xr.Dataset(variables, coords=coordinates(self.cases))
+        return found.assign_coords({name: found_one for name, found_one in self._coordinates() if name in found.dims})
+
+    def _coordinates(self) -> list[tuple[str, Any]]:
+        from results_schema.variables import axes
+
+        known = {**axes(), **self.declared}
+        values: dict[str, NDArray[Any]] = {
+            **asked_coordinates(self.places, self.asked),
+            "on_body": np.array([part.name for part in self.model.bodies]),
+            "body_place": np.linspace(0.0, 1.0, BODY_PLACES),
+            **dict(self.inner.values()),
+        }
+        return [(name, described(known[name], (name,), array)) for name, array in values.items()]
+
+    def _dims(self, name: str) -> tuple[str, ...]:
+        """Dimensions of a result beyond variant and position."""
+        return (self.inner[name][0],) if name in self.inner else ()
+
+    def _grid(self) -> dict[str, Any]:
+        """Results on the sweep's grid."""
+        parts = [piece for name, piece in self.pieces.items() if name.startswith("variants-")]
+        numbers = np.concatenate([part["number"].values for part in parts])
+        order, shape = np.argsort(numbers), self.cases.shape
+        whole = {
+            str(name): np.concatenate([part[name].values for part in parts])[order]
+            for name in parts[0].data_vars
+            if name != "number"
+        }
+        own = {name: whole.pop(name).reshape(shape) for name in ("status", "fidelity", "modes")}
+        found = dict(usual(self.cases.dims, **own, steps=np.zeros(shape)))
+        for name, array in whole.items():
+            dims = (*self.cases.dims, "position", *self._dims(name))
+            found[name] = described(self.declared[name], dims, array.reshape(*shape, *array.shape[1:]))
+        return found
+
+    def _shapes(self) -> dict[str, Any]:
+        """Shapes along the bodies, and what belongs to them."""
+        found = {}
+        for name, array in self.pieces["shapes"].data_vars.items():
+            along = ("on_body", "position", *self._dims(str(name)), "body_place")
+            dims = along if array.ndim == len(along) else ("position", *self._dims(str(name)))
+            found[str(name)] = described(self.declared[str(name)], dims, array.values)
+        return found
+
+    def _mode_counts(self) -> dict[str, Any]:
+        """Results over the number of modes."""
+        if not self.asked.mode_counts:
+            return {}
+        parts = [self.pieces[f"modes-{count}"] for count in self.asked.mode_counts]
+        found = {}
+        for name in map(str, parts[0].data_vars):
+            variable = self.declared.get(f"{name}_by_mode_count")
+            if variable is not None:
+                array = np.stack([part[name].values for part in parts], axis=1)
+                dims = ("correction", "mode_count", "checked_position", *self._dims(name))
+                found[variable.name] = described(variable, dims, array)
+        return found
+
+    def _unreduced(self) -> dict[str, Any]:
+        """Results of the unreduced model, and the relative differences of the modes' results from them."""
+        if "unreduced" not in self.pieces:
+            return {}
+        piece, found = self.pieces["unreduced"], {}
+        for name in map(str, piece.data_vars):
+            if name.endswith("_reduced"):
+                continue
+            dims = ("unreduced_position", *self._dims(name))
+            full, reduced = piece[name].values, piece[f"{name}_reduced"].values
+            found[f"{name}_unreduced"] = described(self.declared[f"{name}_unreduced"], dims, full)
+            # every frequency by itself; readings change their sign on the way
+            size = np.abs(full) if name == "frequency" else np.full_like(full, np.abs(full).max(initial=0.0))
+            part = np.divide(reduced - full, size, out=np.zeros_like(full), where=size > 0.0)
+            found[f"{name}_difference"] = described(self.declared[f"{name}_difference"], dims, part)
+        return found
+
+
+def _declared(kind: str, study: Study) -> dict[str, Variable]:
+    """The kind's declarations for the names of a study."""
+    from results_schema.variables import expand
+
+    return expand(kind, sensor_units(study), tuple(study.carriage))

@@ -1,0 +1,124 @@
+"""Where the first carriage stands in studies at rest, what they are asked, and scenes with other numbers of modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, Strict, Tag
+
+from engine.scene.carriages import BodyCarriage
+from engine.study_file.spec import LIST, NUMBER, Spec, by_form
+from engine.study_file.units import Length, fault
+from results_schema.errors import BadInput
+from studies.results.findings_common import first_carriage
+from studies.results.results import spread
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.scene.study import Study
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+CORRECTED: Sequence[Mapping[str, Any]] = ({"solver.static_correction": True}, {"solver.static_correction": False})
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if list(values) != sorted(set(values)):
+        raise fault("a list in ascending order is wanted here", expected="each once")
+    return values
+
+
+_Number = Annotated[int, Field(ge=2, le=2001)]
+_Listed = Annotated[tuple[Length, ...], Strict(False), Field(min_length=1, max_length=2001), AfterValidator(_ascending)]
+_Modes = Annotated[int, Field(ge=1, le=64)]
+
+
+class Asked(Spec):
+    """The table [question] of a study at rest.
+
+    positions: of the first carriage, how many along its way, or places in m. mode_counts: numbers of modes of every
+    body that are compared at the middle and the last position. unreduced: at how many positions the unreduced
+    finite-element model is computed too.
+    """
+
+    positions: Annotated[Annotated[_Number, Tag(NUMBER)] | Annotated[_Listed, Tag(LIST)], by_form] = 41
+    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), AfterValidator(_ascending)] = ()
+    unreduced: int = Field(default=0, ge=0, le=101)
+
+
+class Positions(NamedTuple):
+    """Where the first carriage stands, m (P,), and places among these: of the comparison of numbers of modes, and of
+    the unreduced model."""
+
+    all: Array
+    checked: Counts
+    unreduced: Counts
+
+
+def positions_of(study: Study, asked: Asked) -> Positions:
+    """The positions of a study. Raises BadInput where there are none, or one is off the body."""
+    low, high = way_of(study)
+    if isinstance(asked.positions, int):
+        found = np.linspace(low, high, asked.positions)
+    else:
+        found = np.array(asked.positions)
+        slack = 1e-9 * (high - low)
+        if found[0] < low - slack or found[-1] > high + slack:
+            raise BadInput(
+                "a position where the carriage is off its body",
+                where=study.source.where("question.positions"),
+                expected=f"places within {low:.6g} to {high:.6g} m",
+                received=f"{found[0]:.6g} to {found[-1]:.6g} m",
+            )
+    last, middle = found.size - 1, found.size // 2
+    ends = {0: [], 1: [middle], 2: sorted({middle, last})}
+    compared = ends[asked.unreduced] if asked.unreduced in ends else spread(found.size, asked.unreduced)
+    return Positions(found, np.array(sorted({middle, last})), np.array(compared, dtype=np.int64))
+
+
+def way_of(study: Study) -> tuple[float, float]:
+    """Ends of the first carriage's way, as far as it stands on its body with all its contacts, m. For a list of
+    positions that is all that its body allows. Raises BadInput where there is no such part."""
+    name, carriage = first_carriage(study)
+    length = float(study.value(f"body.{carriage.on}.length"))
+    ahead = [0.0]
+    if isinstance(carriage, BodyCarriage):
+        middle = 0.5 * float(study.value(f"body.{carriage.body}.length"))
+        reference = middle if carriage.reference is None else carriage.reference
+        ahead = [(c.offset or 0.0) if c.at is None else c.at - reference for c in carriage.contacts.values()]
+    low, high = -min(ahead), length - max(ahead)
+    if not isinstance(study.question.get("positions"), list | tuple):
+        first, last = carriage.motion.range()
+        low, high = max(low, first), min(high, last)
+    if not low < high:
+        raise BadInput(
+            "the carriage never stands on its body with all its contacts",
+            where=study.source.where(f"carriage.{name}.motion"),
+            expected=f"a way with a part within {-min(ahead):.6g} to {length - max(ahead):.6g} m",
+        )
+    return low, high
+
+
+def check_mode_counts(study: Study, asked: Asked) -> None:
+    """Refuse numbers of modes that a body does not take. Raises BadInput."""
+    for count in asked.mode_counts:
+        try:
+            with_modes(study, count, CORRECTED[0])
+        except BadInput as error:
+            where = study.source.where("question.mode_counts")
+            raise BadInput(f"with {count} modes: {error.what}", where=where, expected=error.expected) from None
+
+
+def with_modes(study: Study, count: int, others: Mapping[str, Any]) -> Study:
+    """The scene without sweep with so many modes of every body, and other values at dotted keys."""
+    return study.without_sweep().with_values({**{f"body.{name}.modes": count for name in study.body}, **others})
+
+
+def all_positions(model: SceneModel, positions: Array) -> Array:
+    """(S, C) places of all carriages in m, the first one at `positions`, the others where they start."""
+    starts = [float(carriage.rider.motion.path(0.0).S) for carriage in model.carriages]
+    return np.stack([positions, *(np.full_like(positions, start) for start in starts[1:])], axis=1)

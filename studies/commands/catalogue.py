@@ -1,0 +1,86 @@
+"""The study files that come with the program: built-in studies, and commented files to start from."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from results_schema.errors import BadInput
+
+LIBRARY = Path(__file__).parents[1] / "library"
+STARTS = Path(__file__).parents[1] / "starts"
+EVERY_STUDY = STARTS / "every-study.part"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A built-in study: its name, its kind, and its title."""
+
+    name: str
+    kind: str
+    title: str
+
+
+def built_in() -> Mapping[str, Path]:
+    """Files of the built-in studies by name."""
+    return _files(LIBRARY)
+
+
+def starts() -> Mapping[str, Path]:
+    """Files to start from by kind of study."""
+    return _files(STARTS)
+
+
+def entries() -> Iterator[Entry]:
+    """The built-in studies by name."""
+    for name, path in built_in().items():
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        yield Entry(name, data["kind"], data["title"])
+
+
+def find_study(study: str) -> Path:
+    """The file of a study: that of the built-in study of this name, else the path itself. Raises BadInput.
+
+    >>> find_study("asymmetry").name
+    'asymmetry.toml'
+    """
+    known = built_in()
+    if study in known:
+        return known[study]
+    path = Path(study)
+    if path.suffix or path.is_file() or len(path.parts) > 1:
+        return path
+    raise BadInput(
+        "no such file, and no built-in study of that name",
+        where=study,
+        expected=f"a path, or one of {', '.join(known)}",
+        remedy=_nearest(study, known),
+    )
+
+
+def start_text(kind: str) -> str:
+    """A study file to start from: what is special about the kind, then every key that all kinds share; or a built-in
+    study, by its name where no kind has it.
+
+    Raises BadInput for an unknown name.
+    """
+    known = starts()
+    if kind not in known and kind in built_in():
+        return built_in()[kind].read_text(encoding="utf-8")
+    if kind not in known:
+        raise BadInput(
+            "no such kind of study", where=kind, expected=f"one of {', '.join(known)}", remedy=_nearest(kind, known)
+        )
+    return known[kind].read_text(encoding="utf-8") + EVERY_STUDY.read_text(encoding="utf-8")
+
+
+def _files(folder: Path) -> Mapping[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def _nearest(name: str, known: Mapping[str, Path]) -> str:
+    near = get_close_matches(name, known, n=1)
+    return f'did you mean "{near[0]}"?' if near else ""

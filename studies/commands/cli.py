@@ -1,0 +1,164 @@
+"""The command `wanderlast`: what it understands. The work is done elsewhere, and imported only when it is asked for."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from studies.commands import error_exit as trouble
+from studies.protocol import stopping
+
+_FOLDER = click.Path(path_type=Path, file_okay=False)
+_FILE = click.Path(path_type=Path)
+_THREADS = click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads; default: all cores.")
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="wanderlast", message="wanderlast %(version)s")
+def commands() -> None:
+    """Batch studies of loads that move on structures that bend.
+
+    STUDY is the path of a study file (TOML) or the name of a built-in study (see "wanderlast list").
+
+    \b
+    Exit codes: 0 fine; 2 bad input; 3 finished, but some variants carry a status other than ok,
+    or an audit missed the tolerance; 4 damaged or foreign archive; 70 workers gave up;
+    74 input/output failed (disk full, read-only); 75 another run holds the archive;
+    130 and 143 interrupted, finished work is kept; 1 a bug of our own.
+    """
+
+
+@commands.command()
+@click.argument("kind")
+@click.argument("file", type=_FILE, required=False)
+def init(kind: str, file: Path | None) -> None:
+    """Write a commented study file of KIND to start from, or a copy of the built-in study KIND.
+
+    FILE is KIND.toml unless given.
+    """
+    from studies.commands import actions
+
+    actions.init(kind, file)
+
+
+@commands.command()
+@click.argument("study")
+def check(study: str) -> None:
+    """Validate STUDY and explain what a run would do."""
+    from studies.commands import actions
+
+    actions.check(study)
+
+
+@commands.command()
+@click.argument("study")
+@click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
+@click.option("--overwrite", is_flag=True, help="Replace another archive, and unfinished parts of another study.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+@_THREADS
+@_JSON
+def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
+    """Run STUDY and write its archive.
+
+    With a progress bar, and a summary at the end. Started again after any interruption it goes on from what is
+    finished.
+    """
+    from studies.commands import actions, console
+    from studies.findings import choices
+    from studies.protocol.options import RunOptions
+    from studies.reporting import summary
+    from studies.results.results import Results
+
+    outcome = actions.run(study, archive, RunOptions(**how))
+    code = actions.exit_code(outcome)
+    if as_json:
+        chosen = choices.as_json(Results.of(outcome.results))
+        console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
+    else:
+        console.show_outcome(outcome)
+    console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))
+    return code
+
+
+@commands.command()
+@click.argument("archive", type=_FILE)
+@click.option("-o", "folder", type=_FOLDER, metavar="FOLDER", help="Where to write; default: <archive>-report, here.")
+def report(archive: Path, folder: Path | None) -> None:
+    """Write a page with the figures of ARCHIVE.
+
+    One self-contained HTML page, and the figures as SVG and PNG beside it.
+    """
+    from studies.commands import actions
+
+    actions.report(archive, folder)
+
+
+@commands.command()
+@click.argument("archive", type=_FILE)
+def info(archive: Path) -> None:
+    """Tell what is inside ARCHIVE and whether it is whole.
+
+    Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
+    """
+    from studies.commands import actions
+
+    actions.info(archive)
+
+
+@commands.command(name="list")
+def list_() -> None:
+    """List the built-in studies and the kinds of study."""
+    from studies.commands import actions
+
+    actions.list_studies()
+
+
+@commands.command()
+@click.option("--modes", type=click.IntRange(1, 64), default=10, show_default=True, help="Modes of the beam.")
+@click.option("--steps", type=click.IntRange(1, 10**6), default=1000, show_default=True, help="Steps of a passage.")
+@click.option("--variants", type=click.IntRange(1, 10**6), default=16384, show_default=True, help="Variants at once.")
+@click.option("--scheme", default="average-acceleration", show_default=True, help="Time integration scheme.")
+@click.option("--ties", type=click.IntRange(1, 12), default=1, show_default=True, help="Masses on the beam at once.")
+@_THREADS
+@_JSON
+def bench(threads: int | None, as_json: bool, **scene: Any) -> None:
+    """Measure the pace of the march on this machine."""
+    from studies.commands import actions, console
+    from studies.commands.bench import Scene
+
+    found = actions.bench(Scene(**scene), threads)
+    if as_json:
+        console.say_json(found.as_json())
+    else:
+        console.show_throughput(found)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; every error ends as one message on standard error."""
+    command = list(sys.argv[1:] if arguments is None else arguments)
+
+    def invoke() -> int:
+        code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+
+    if arguments is None:
+        stopping.own_process()
+        _keep_linear_algebra_to_one_thread()
+    code = trouble.exit_code_of(invoke)
+    if arguments is None:
+        stopping.end_undisturbed()
+        gc.freeze()  # looking through what is left would take a third of a second
+    return code
+
+
+def _keep_linear_algebra_to_one_thread() -> None:
+    """Tell OpenBLAS so before numpy loads it. The threads are the march's own; those of OpenBLAS wait for each other
+    longer than a product of small matrices takes."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,0 +1,204 @@
+"""What a run would do, from its plan and about a second of measuring: the scene, the work and its time, as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.batch.audit import audit_size
+from engine.batch.plan import Plan
+from engine.batch.plausibility import remarks
+from engine.model.distinct_models import base_scene
+from engine.model.scene_model import SceneModel
+from engine.model.variant_values import LaneValues, moving_mass
+from engine.scene.sweep import Cases, expand
+from studies.commands import chosen
+from studies.commands.forecast import Forecast, forecast
+from studies.protocol.measuring import disk_bytes
+from studies.results.formatting import counted, number, unit_text
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
+    from studies.protocol.measuring import MeasuringKind
+
+Array = NDArray[np.float64]
+
+FREQUENCIES_SHOWN = 6
+
+
+class Table(NamedTuple):
+    """A table for people: title, headings, rows of text."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What `check` tells: tables, a line with the cost, and what is worth knowing beside it."""
+
+    tables: tuple[Table, ...]
+    cost: str
+    remarks: tuple[str, ...]
+
+
+def preview(plan: Plan, threads: int) -> Preview:
+    """The explanation of a plan for so many threads, from about a second of measuring."""
+    seen = forecast(plan, threads)
+    tables = (
+        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan)),
+        Table(seen.title, chosen.HEADINGS, seen.rows),
+    )
+    room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
+    cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}"
+    remark = (seen.remark,) if seen.remark else ()
+    return Preview(tuple(table for table in tables if table.rows), cost, (*remarks(plan), *remark))
+
+
+def _audit(seen: Forecast) -> str:
+    """How many variants are audited."""
+    wanted = seen.plan.study.solver.audit
+    if wanted == "auto" and not seen.plan.converges and seen.plan.choice is None:
+        return ""
+    variants = audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size)
+    if variants:
+        return f" Then {counted(variants, 'variant')} are audited." if variants > 1 else " Then 1 variant is audited."
+    return (
+        " No audit." if wanted == 0 else " No audit: it would take too long; audit = N audits N variants all the same."
+    )
+
+
+def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
+    """The explanation of a study that measures: its pieces, one after another, and the time they take."""
+    pieces = kind.pieces(study)
+    rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
+    cases = expand(study)
+    if kind.sweeps:
+        rows.insert(1, ("variants", f"{cases.size:,}"))
+    work = [(piece.name, piece.words, duration(piece.seconds)) for piece in pieces]
+    tables = (
+        Table(study.title or study.source.name, ("", ""), rows),
+        *(_of_scene(study, cases) if kind.sweeps else ()),
+        Table("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work),
+    )
+    cost = (
+        f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
+        f"{size(disk_bytes(pieces))} on the disk."
+    )
+    return Preview(tuple(table for table in tables if table.rows), cost, ())
+
+
+def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:
+    """The scene of a study that is computed in pieces, as a march's preview shows it."""
+    base = base_scene(study)
+    yield _bodies(base)
+    yield from _checks(base)
+    yield _sweep(cases)
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> duration(0.02), duration(42.0), duration(4000.0)
+    ('0.1 s', '42 s', '1.1 h')
+    """
+    if seconds < 100.0:
+        return f"{number(max(seconds, 0.1), 2)} s"
+    return f"{number(seconds / 60, 2)} min" if seconds < 3600 else f"{number(seconds / 3600, 2)} h"
+
+
+def size(count: int) -> str:
+    """A number of bytes as people say it.
+
+    >>> size(2_500), size(300 * 2**20)
+    ('2.44 KiB', '300 MiB')
+    """
+    value, unit = float(count), "bytes"
+    for larger in ("KiB", "MiB", "GiB", "TiB", "PiB"):
+        if value < 1000.0:
+            break
+        value, unit = value / 1024.0, larger
+    return f"{number(value)} {unit}"
+
+
+def _study(plan: Plan) -> Table:
+    study = plan.study
+    shape = " x ".join(f"{length} {dim}" for dim, length in zip(plan.cases.dims, plan.cases.shape, strict=True))
+    variants = f"{plan.size:,} = {shape}" if len(plan.cases.dims) > 1 else f"{plan.size:,}"
+    rows = [("kind", study.kind), ("variants", variants), ("start", _START[study.start])]
+    return Table(study.title or study.source.name, ("", ""), rows)
+
+
+_START = {"rest": "undeformed, at rest", "equilibrium": "static equilibrium of the first position"}
+
+
+def _bodies(base: SceneModel) -> Table:
+    values, rows = LaneValues(base.study, {}, 1), []
+    for part in base.bodies:
+        omega = part.modal.omega
+        rates = values.damping_rates(part.name, omega)[:, 0]
+        elastic = omega > 0.0
+        ratios = rates[elastic] / (2.0 * omega[elastic])
+        shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
+        more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
+        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, span(ratios)))
+    return Table("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
+
+
+def _checks(base: SceneModel) -> Iterator[Table]:
+    """One table per body that was checked when it was imported."""
+    for part in base.bodies:
+        yield Table(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
+
+
+def _sweep(cases: Cases) -> Table:
+    rows = [
+        (
+            axis.name,
+            str(len(axis.values)),
+            f"{span(axis.values)} {unit_text(axis.units)}".strip(),
+            ", ".join(axis.paths),
+        )
+        for axis in cases.axes
+    ]
+    return Table("Sweep", ("axis", "values", "range", "sets"), rows)
+
+
+def _ratios(plan: Plan) -> Table:
+    """Ratios of the first carriage that decide how dynamic the scene is, over all variants."""
+    name = plan.base.carriages[0].name
+    found: dict[str, list[Array]] = {}
+    for grid in plan.grids:
+        for ratio, values in _ratios_of(grid, name):
+            found.setdefault(ratio, []).append(values)
+    rows = [(ratio, span(np.concatenate(values))) for ratio, values in found.items()]
+    return Table(f"Ratios of {name}", ("ratio", "range"), rows)
+
+
+def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:
+    scene, values = grid.scene, grid.values
+    rider, time_scale = scene.carriages[0].rider, values.time_scale(name)
+    critical = scene.first_omega * scene.leading_body.modal.length / np.pi
+    yield "top speed over the critical speed omega_1 L/pi", rider.top_speed / time_scale / critical
+    if rider.motion.period is not None:
+        yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
+    if scene.study.carriage[name].inertial:
+        yield "mass over the body's mass", moving_mass(scene, values, 0) / scene.leading_body.modal.mass
+
+
+def span(values: NDArray[Any]) -> str:
+    """Smallest and largest of some numbers.
+
+    >>> span(np.array([0.5, 2.0, 1.0])), span(np.array([3.0]))
+    ('0.5 to 2', '3')
+    """
+    if values.size == 0:
+        return "none"
+    low, high = number(float(values.min())), number(float(values.max()))
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,66 @@
+"""Largest absolute over largest absolute static value, as more than one kind of study reports it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.variables import Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.study import Study
+
+DYNAMIC_AMPLIFICATION = Variable(
+    "dynamic_amplification",
+    ("sensor",),
+    long_name="dynamic amplification",
+    meaning="largest absolute value over the largest absolute static value of the same model; NaN where the static "
+    "value is zero (velocities, accelerations)",
+    nan_allowed=True,
+)
+
+
+def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """The dataset with `dynamic_amplification`, from `<sensor>_max`, `_min` and `_static`, and its errors."""
+    import xarray as xr
+
+    ratios = []
+    for sensor in study.sensor:
+        largest, smallest = (abs(dataset[f"{sensor}_{side}"]) for side in ("max", "min"))
+        static = dataset[f"{sensor}_static"]
+        ratios.append(largest.where(largest > smallest, smallest) / static.where(static > 0.0))
+    joined = xr.concat(ratios, "sensor").transpose(*dataset["status"].dims, "sensor")
+    found = dataset.assign(
+        dynamic_amplification=(joined.dims, joined.values, DYNAMIC_AMPLIFICATION.attributes()),
+    )
+    return with_derived_errors(found, derived_from(study))
+
+
+def derived_from(study: Study) -> Mapping[str, tuple[str, ...]]:
+    """The results whose errors the amplifications have: that of the larger extreme, as both are over the static
+    value."""
+    return {f"dynamic_amplification {sensor}": (f"{sensor}_max", f"{sensor}_min") for sensor in study.sensor}
+
+
+def with_derived_errors(dataset: xr.Dataset, derived: Mapping[str, tuple[str, ...]]) -> xr.Dataset:
+    """The dataset with errors of results that a study derives from others: the largest of theirs, with the tolerance of
+    the first."""
+    import xarray as xr
+
+    if "estimated_error" not in dataset:
+        return dataset
+    errors = dataset[["estimated_error", "tolerance"]]
+    parts = [errors]
+    for name, sources in derived.items():
+        largest = errors["estimated_error"].sel(result=list(sources)).max("result", skipna=False)
+        tolerance = errors["tolerance"].sel(result=sources[0], drop=True)
+        own = xr.Dataset({"estimated_error": largest, "tolerance": tolerance})
+        parts.append(own.expand_dims(result=np.array([name])))
+    joined = xr.concat(parts, "result", combine_attrs="override")
+    joined["estimated_error"] = joined["estimated_error"].transpose(*errors["estimated_error"].dims)
+    joined["result"].attrs = dict(dataset["result"].attrs)
+    return dataset.drop_dims("result").assign(joined)

@@ -1,0 +1,226 @@
+"""Closed forms that figures and findings compare with, for every variant of a sweep (mechanics.md, 7 and 9)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.results.formatting import MINUS
+from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.model.scene_model import SceneModel
+
+Array = NDArray[np.float64]
+CYCLE_POINTS = 720
+ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
+ONE_PEAK = 1 / 8
+NEARLY = 0.01  # of the length: what counts as the middle
+LONG_SWING = 0.45  # of the length: an amplitude that reaches the ends
+_PLACES = ("centre", "amplitude")
+
+
+def first_omega(results: Results) -> xr.DataArray | float:
+    """Lowest elastic natural frequency (rad/s) of the first carriage's body, over the axes that change that body."""
+    import xarray as xr
+
+    recorded = results.recorded(results.carriage.on)
+    if recorded is not None:
+        stored = recorded["first_frequency"]
+        found = 2.0 * math.pi * stored.values
+        return xr.DataArray(found, dims=stored.dims) if stored.dims else float(found)
+    axes = [axis for axis in results.axes if any(_changes_modes(results, path) for path in axis.paths)]
+    dims = list(dict.fromkeys(axis.dim for axis in axes))
+    if not dims:
+        return _model(results, {}).first_omega
+    sizes = [len(results.dataset[dim]) for dim in dims]
+    omega = np.empty(sizes)
+    for place in np.ndindex(*sizes):
+        index = dict(zip(dims, place, strict=True))
+        omega[place] = _model(results, {path: a.values[index[a.dim]] for a in axes for path in a.paths}).first_omega
+    return xr.DataArray(omega, dims=dims)
+
+
+def damping_ratio(results: Results) -> Any:
+    """Damping ratio of that mode: one for all modes, the first of a list, or Rayleigh's a/(2 omega) + b omega/2."""
+    from engine.bodies.beam.beam import Rayleigh
+
+    key = f"body.{results.carriage.on}.damping_ratio"
+    spec = results.study.value(key)
+    if isinstance(spec, Rayleigh) and not _is_swept(results, key):
+        omega = first_omega(results)
+        mass, stiffness = (results.parameter(f"{key}.rayleigh.{i}") for i in (0, 1))
+        return 0.5 * (mass / omega + stiffness * omega)
+    if isinstance(spec, tuple) and not _is_swept(results, key):
+        return results.parameter(f"{key}.{_rigid_modes(results)}")
+    return results.parameter(key)
+
+
+def lag(results: Results, sensor: str) -> Any:
+    """The lag in m that damping alone causes at low speed, -2 zeta v/omega_1 at a fixed place.
+
+    Under the carriage it is half of that: there w = phi(s) q, of which q alone is late, and with w_s = phi^2 q_0 the
+    odd part -(2 zeta v/omega_1) phi phi' q_0 is half as much of dw_s/ds.
+    """
+    speed = results.parameter(f"carriage.{results.carriage_name}.motion.speed")
+    return -lag_factor(results, sensor) * damping_ratio(results) * speed / first_omega(results)
+
+
+def lag_factor(results: Results, sensor: str) -> int:
+    """2 for a sensor at a fixed place, 1 under or on a carriage."""
+    return 2 if results.study.sensor[sensor].rides is None else 1
+
+
+def lag_formula(results: Results, sensor: str) -> str:
+    """The formula in print, with its sign."""
+    return f"{MINUS}{'2 ' if lag_factor(results, sensor) == 2 else ''}ζ v/ω₁"
+
+
+def frequency_ratio(results: Results) -> Any:
+    """Cycles per second of the first carriage's motion over the body's first natural frequency."""
+    return 2.0 * math.pi * cycle_frequency(results) / first_omega(results)
+
+
+def cycle_frequency(results: Results) -> Any:
+    """Cycles per second of the first carriage's motion."""
+    motion, key = results.carriage.motion, f"carriage.{results.carriage_name}.motion"
+    if hasattr(motion, "frequency"):
+        return results.parameter(f"{key}.frequency")
+    return results.parameter(f"{key}.speed") / motion.max_speed
+
+
+def remainder_of_start(results: Results) -> Array:
+    """Part of the vibration of the start that is left in the last cycle of an out-and-back, for every variant.
+
+    exp(-zeta_1 omega_1 T (cycles - 1)) with the cycle's time T; NaN where only dampers damp the body, so that zeta_1
+    is not known. Where both do it is an upper bound. The body is
+    taken without the carriage, whose mass makes the vibration die out more slowly.
+    """
+    key = f"carriage.{results.carriage_name}.motion"
+    start, end, speed, turn, cycles = (
+        results.everywhere(results.parameter(f"{key}.{name}")) for name in ("start", "end", "speed", "turn", "cycles")
+    )
+    time = 2.0 * ((math.pi - 2.0) * turn + 1.0) * np.abs(end - start) / speed
+    damping, omega = (results.everywhere(value) for value in (damping_ratio(results), first_omega(results)))
+    unknown = (damping == 0.0) & (_support_damping(results) > 0.0)
+    return np.where(unknown, np.nan, np.exp(-damping * omega * time * (cycles - 1.0)))
+
+
+def loaded_frequency(results: Results, mass_ratio: Array) -> Array:
+    """First natural frequency (n,) with the carriage's mass on its way, over that without, for mass ratios (n,).
+
+    omega_eff = omega_1 (1 + m <phi_1^2>)^(-1/2), the mean taken over the cycle; for a shuttle about the middle of a
+    pinned beam <phi_1^2> is (1 + J0(2 pi a/L)) over the beam's mass.
+    """
+    tau = np.arange(CYCLE_POINTS) / CYCLE_POINTS
+    first = _first_shape(results, results.carriage.motion.path(tau).S)
+    mass = body_mass(results, results.carriage.on)
+    return np.asarray((1.0 + mass_ratio * mass * float(np.mean(first**2))) ** -0.5)
+
+
+def body_mass(results: Results, name: str) -> float:
+    """Mass of a body without sweep, kg."""
+    from engine.bodies.build import build_body
+
+    recorded = results.recorded(name)
+    return float(build_body(results.study.body[name]).modal.mass if recorded is None else recorded["mass"])
+
+
+def _rigid_modes(results: Results) -> int:
+    """Number of rigid-body modes of the first carriage's body."""
+    recorded = results.recorded(results.carriage.on)
+    if recorded is not None:
+        return int(np.count_nonzero(recorded["frequency"].values == 0.0))
+    return _model(results, {}).leading_body.modal.rigid_modes
+
+
+def _first_shape(results: Results, places: Array) -> Array:
+    """(S,) shape of the first elastic mode of the first carriage's body at places (S,), kg^(-1/2)."""
+    from scipy.interpolate import CubicSpline
+
+    recorded, number = results.recorded(results.carriage.on), _rigid_modes(results)
+    if recorded is not None:
+        return np.asarray(CubicSpline(recorded["position"].values, recorded["mode_shape"].values[number])(places))
+    return np.asarray(_model(results, {}).leading_body.modal.shape(places, 0)[:, number])
+
+
+def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
+    """Frequency ratios (n,) at which the `order`-th harmonic of the cycle meets the loaded frequency."""
+    return loaded_frequency(results, mass_ratio) / order
+
+
+def shuttle_amplification(results: Results, sensor: str) -> Array | None:
+    """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
+    beam from one end to the other and the sensor is at midspan."""
+    from engine.bodies import Beam
+    from engine.scene.motions import Sinusoidal
+
+    body, motion = results.study.body[results.carriage.on], results.carriage.motion
+    mass = _coordinate(results, "mass_ratio")
+    swept = {path for axis in results.axes for path in axis.paths}
+    fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
+    if mass is None or swept & fixed or not isinstance(motion, Sinusoidal):
+        return None
+    if results.carriage.masses != ("mass",):  # a spring keeps part of the mass from following
+        return None
+    if not isinstance(body, Beam) or body.supports != "pinned-pinned":
+        return None
+    at = results.study.sensor[sensor].at
+    if at is None or motion.amplitude < LONG_SWING * body.length:
+        return None
+    if max(abs(place / body.length - 0.5) for place in (at, motion.centre)) > NEARLY:
+        return None
+    return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
+
+
+def end_spring_difference(results: Results, sensor: str) -> Array | None:
+    """(E I/L^3)|1/k_a - 1/k_b| for every variant; None unless a beam stands on two springs at its ends and the sensor
+    is at midspan. One peak per slow cycle instead of two where it is above 1/8."""
+    from engine.bodies import Beam
+
+    name = results.carriage.on
+    body, at = results.study.body[name], results.study.sensor[sensor].at
+    key = f"body.{name}"
+    varied = any(path == f"{key}.length" or path.endswith(".at") for axis in results.axes for path in axis.paths)
+    if not isinstance(body, Beam) or isinstance(body.supports, str) or len(body.supports) != 2 or varied or at is None:
+        return None
+    ends = sorted(spring.at for spring in body.supports)
+    if ends != [0.0, body.length] or abs(at / body.length - 0.5) > NEARLY:
+        return None
+    if any(spring.rotational for spring in body.supports):
+        return None
+    first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
+    bending: Any = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
+    return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
+
+
+def _coordinate(results: Results, name: str) -> Array | None:
+    found = results.dataset.coords.get(name)
+    return None if found is None else results.everywhere(found)
+
+
+def _support_damping(results: Results) -> Array:
+    """Sum of the dampers (N s/m) under the first carriage's body, for every variant."""
+    name = results.carriage.on
+    keys = [f"body.{name}.{key}" for key, _, _ in results.study.body[name].dampers()]
+    return sum((results.everywhere(results.parameter(key)) for key in keys), np.zeros(results.shape))
+
+
+def _is_swept(results: Results, key: str) -> bool:
+    return any(key in axis.paths for axis in results.axes)
+
+
+def _changes_modes(results: Results, path: str) -> bool:
+    here = f"body.{results.carriage.on}."
+    return path.startswith(here) and not path.startswith((f"{here}damping_ratio", f"{here}modes"))
+
+
+def _model(results: Results, values: dict[str, float]) -> SceneModel:
+    from engine.model.scene_model import build_model
+
+    return build_model(results.study.without_sweep().with_values({k: float(v) for k, v in values.items()}), {}, {})

@@ -1,0 +1,113 @@
+"""Errors told of every reported number: over all variants beside the tolerance, and beside what the audit observed."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+
+from studies.findings.choices import is_marched, known
+from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
+from studies.results.formatting import counted, number, percent
+from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
+MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those that are told only
+
+
+def pictures(results: Results) -> list[Figure]:
+    """The told errors by result; none where there are none, or there is no sweep."""
+    if not is_marched(results) or "estimated_error" not in results.dataset or results.size < 2:
+        return []
+    error = results.dataset["estimated_error"].transpose(*results.dims, "result").values[results.kept.values]
+    asked = zip(results.dataset["result"].values, error.T, results.dataset["tolerance"].values, strict=True)
+    rows = [(str(name), known(own), float(tolerance)) for name, own, tolerance in asked if known(own).size]
+    if not rows:
+        return []
+    rows.sort(key=lambda row: (np.isnan(row[2]), -row[1].max() / np.nan_to_num(row[2], nan=1.0)))
+    shown, count = rows[:MOST_RESULTS], error.shape[1]
+    caption = (
+        "Lines go from the smallest error of the variants to the largest, dots are their median. In grey: results that "
+        f"are held to no tolerance. {len(shown)} of {counted(count, 'result')}."
+    )
+    lacking = f" Without an estimate of some: {counted(int(np.isnan(error).any(axis=1).sum()), 'variant')}."
+    caption += lacking if np.isnan(error).any() else ""
+    return [draw("estimates", _title(*rows[0]), caption, 0.8 + 0.21 * len(shown), partial(_draw_results, shown))]
+
+
+def _title(name: str, error: Array, tolerance: float) -> str:
+    """How near its tolerance the nearest result comes."""
+    if np.isnan(tolerance):
+        return "No result is held to a tolerance"
+    if error.max() <= tolerance:
+        return (
+            f"All errors told are within their tolerances; {name} comes nearest, at {percent(error.max() / tolerance)}"
+        )
+    share = percent(float(np.mean(error > tolerance)))
+    return (
+        f"{name} may miss its tolerance in {share} of the variants, {number(error.max() / tolerance, 2)} times at most"
+    )
+
+
+def _draw_results(rows: list[tuple[str, Array, float]], drawing: Drawing) -> None:
+    axes = drawing.subplots()
+    for place, (_, error, tolerance) in enumerate(rows):
+        sizes, colour = np.maximum(error, LEAST), MUTED if np.isnan(tolerance) else BLUE
+        axes.plot([sizes.min(), sizes.max()], [place, place], color=colour, linewidth=2.0)
+        axes.plot(np.median(sizes), place, "o", color=colour)
+        (mark,) = axes.plot(tolerance, place, "|", color=VERMILION, markersize=9.0, label="" if place else "tolerance")
+        mark.set_markeredgewidth(1.6)
+    axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="error told")
+    axes.grid(False, axis="y")
+    logarithmic(axes.xaxis)
+    legend_beside(axes)
+
+
+def compared(group: xr.Dataset | None) -> list[Figure]:
+    """Told against observed errors of the audit; none without two numbers that have both."""
+    if group is None:
+        return []
+    told, observed = (
+        group[name].transpose("sample", "result").values for name in ("estimated_error", "observed_error")
+    )
+    both = np.isfinite(told) & np.isfinite(observed)
+    if int(both.sum()) < 2:
+        return []
+    pairs = np.maximum(np.stack([told[both], observed[both]]), LEAST)
+    times, variants = pairs[1] / pairs[0], counted(int(both.any(axis=1).sum()), "variant")
+    enough = percent(float(np.mean(times <= 1.0)))
+    title = f"Of {counted(times.size, 'audited number')} {enough} are no further off than told"
+    caption = f"{variants}, a dot for every reported number; below the line its error was told large enough."
+    if times.max() > 1.0:
+        worst = np.broadcast_to(group["result"].values, both.shape)[both][np.argmax(times)]
+        caption += f" Worst above it: {worst}, {number(float(times.max()), 2)} times what was told."
+    caption += "" if both.all() else f" Not drawn: {counted(int((~both).sum()), 'number')} without one of both."
+    held = np.broadcast_to(np.isfinite(group["tolerance"].values), both.shape)[both]
+    fill = partial(_draw_compared, pairs, held, np.unique(known(group["tolerance"].values)))
+    return [draw("estimated-observed", title, caption, 3.9, fill)]
+
+
+def _draw_compared(pairs: Array, held: NDArray[np.bool_], tolerances: Array, drawing: Drawing) -> None:
+    axes = drawing.subplots()
+    ends = pairs.min() / 1.8, max(pairs.max(), *tolerances, LEAST) * 1.8
+    axes.plot(ends, ends, color=INK, linewidth=0.9, label="as told")
+    for label, own, colour in (("held to a tolerance", held, BLUE), ("told only", ~held, MUTED)):
+        if own.any():
+            axes.plot(*pairs[:, own], "o", color=colour, markersize=3.0, label=label, rasterized=own.sum() > 500)
+    for place, tolerance in enumerate(tolerances):
+        axes.axhline(tolerance, color=VERMILION, linewidth=0.9, linestyle="--", label="" if place else "tolerance")
+    for axis in (axes.xaxis, axes.yaxis):
+        logarithmic(axis)
+    axes.set(xlim=ends, ylim=ends, xlabel="error told", ylabel="error observed")
+    axes.set_box_aspect(1.0)
+    axes.set_anchor("W")
+    legend_beside(axes)

@@ -1,0 +1,211 @@
+"""The common look of all figures, and how they become SVG and PNG.
+
+Figures are drawn without pyplot (no global state, no display). No text is read as mathematics, so that a title such as
+"$x$ {{7*7}}" stands as it was written.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure as Drawing
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from studies.results.formatting import number
+
+INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
+BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
+DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+SEQUENTIAL = "viridis"
+FEW_DECADES = 300.0
+ALIKE = 1e-6  # of the largest value: a smaller range is rounding
+FLAT = 0.05  # of the largest value, shown to either side of what is constant
+
+BESIDE: Mapping[str, Any] = {
+    "loc": "upper left",
+    "bbox_to_anchor": (1.01, 1.02),
+    "alignment": "left",
+    "borderpad": 0.0,
+}
+WIDTH = 7.6  # inches: the width of the page's column
+STYLE: Any = {
+    "text.parse_math": False,
+    "text.color": INK,
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "axes.titlecolor": INK,
+    "axes.labelsize": 8.5,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "grid.color": HAIR,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 3.0,
+    "xtick.minor.size": 0.0,
+    "ytick.minor.size": 0.0,
+    "lines.linewidth": 1.5,
+    "lines.markersize": 4.0,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "legend.title_fontsize": 8.0,
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "path.simplify_threshold": 0.3,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A drawing with its plain file name, its title and its caption."""
+
+    name: str
+    title: str
+    caption: str
+    drawing: Drawing
+
+
+def draw(name: str, title: str, caption: str, height: float, fill: Callable[[Drawing], None]) -> Figure:
+    """A figure of the page's width and `height` inches, filled by `fill` in the common look."""
+    with matplotlib.rc_context(STYLE):
+        drawing = Drawing(figsize=(WIDTH, height), layout="constrained")
+        FigureCanvasAgg(drawing)
+        fill(drawing)
+    return Figure(plain_name(name), title, caption, drawing)
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once and keep that: every further layout would differ in the last digit."""
+    if figure.drawing.get_layout_engine() is not None:
+        figure.drawing.draw_without_rendering()
+        figure.drawing.set_layout_engine("none")
+
+
+def plain_name(text: str) -> str:
+    """A file name of small letters, digits and dashes, whatever the text holds.
+
+    >>> plain_name("../a <script> Title/"), plain_name("???")
+    ('a-script-title', 'figure')
+    """
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:60].strip("-") or "figure"
+
+
+def svg(figure: Figure) -> str:
+    """The figure as an SVG element that may stand in a page beside others; the same figure gives the same text."""
+    stream = io.StringIO()
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": figure.name}):
+        _settle(figure)
+        figure.drawing.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    text = stream.getvalue()
+    # matplotlib repeats every text as a comment.
+    element = re.sub(r"<!--.*?-->\n?", "", text[text.index("<svg") :], flags=re.DOTALL)
+    # Identifiers must differ between the figures of one page.
+    element = re.sub(r'\bid="', f'id="{figure.name}-', element)
+    return re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{figure.name}-", element)
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as PNG, 200 dots per inch."""
+    stream = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        _settle(figure)
+        figure.drawing.savefig(stream, format="png", dpi=200, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def shades(count: int) -> list[Any]:
+    """Colours of `count` ordered values, dark to light but never pale; colour-blind safe."""
+    colours = matplotlib.colormaps[SEQUENTIAL]
+    return [colours(0.9 * i / max(1, count - 1)) for i in range(count)] if count > 1 else [BLUE]
+
+
+def logarithmic(axis: Any) -> None:
+    """A logarithmic axis with plain numbers at its ticks: at 1, 2, 5 of each decade while there are few of them."""
+    axis._set_axes_scale("log")
+    low, high = axis.get_view_interval()
+    few = 0.0 < low < high < FEW_DECADES * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: printed(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def printed(value: float) -> str:
+    """A number as figures print it, with a true minus sign."""
+    return number(value).replace("-", "\N{MINUS SIGN}")
+
+
+def is_logarithmic(values: NDArray[np.float64]) -> bool:
+    """Whether positive values span more than a decade in steps that grow with them."""
+    values = np.unique(values[np.isfinite(values)])
+    if len(values) < 3 or values[0] <= 0.0 or values[-1] / values[0] < 10.0:
+        return False
+    plain, logs = np.diff(values), np.diff(np.log(values))
+    return bool(logs.std() / logs.mean() < plain.std() / plain.mean())
+
+
+def zero_line(axes: Axes) -> None:
+    """A thin line at zero."""
+    axes.axhline(0.0, color=MUTED, linewidth=0.7, zorder=1.5)
+
+
+def widen(axes: Axes, values: Sequence[NDArray[np.float64]]) -> None:
+    """A vertical axis on which values that differ by rounding alone look constant, with short numbers at its ticks."""
+    known = np.concatenate([row[np.isfinite(row)] for row in values])
+    largest = float(np.abs(known).max(initial=0.0))
+    if known.size and largest > 0.0 and float(np.ptp(known)) < ALIKE * largest:
+        middle = float(known.mean())
+        axes.set_ylim(middle - FLAT * largest, middle + FLAT * largest)
+
+
+def note(axes: Axes, text: str) -> None:
+    """A remark in place of data."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=MUTED)
+    axes.set(xticks=[], yticks=[])
+
+
+def colour_bar(axes: Axes, mesh: Any, label: str, **options: Any) -> Any:
+    """The bar of a map, with plain numbers."""
+    plain = FuncFormatter(lambda value, _: printed(value))
+    bar = axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, format=plain, **options)
+    bar.outline.set_visible(False)
+    bar.ax.minorticks_off()
+    return bar
+
+
+def banded(edges: Sequence[float]) -> dict[str, Any]:
+    """Colours for a map in bands between `edges`, as options of the map; values beyond the ends get end colours."""
+    colours = matplotlib.colormaps[SEQUENTIAL].resampled(len(edges) + 1)
+    return {"cmap": colours, "norm": BoundaryNorm(list(edges), colours.N, extend="both")}
+
+
+def legend_beside(axes: Axes, title: str = "") -> None:
+    """The legend at the right of the plot, away from the data."""
+    axes.legend(title=title or None, **BESIDE)
+
+
+def legend_of_all(drawing: Drawing, axes: Axes) -> None:
+    """One legend at the right of the whole figure, with the curves of `axes`."""
+    handles, labels = axes.get_legend_handles_labels()
+    drawing.legend(handles, labels, loc="outside right upper", alignment="left")

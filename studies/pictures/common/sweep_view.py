@@ -1,0 +1,209 @@
+"""Which part of a sweep a figure shows: up to two axes of it, the others held, and the words that say so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, QuadMesh
+from numpy.typing import NDArray
+
+from results_schema.status import Status
+from studies.pictures.common.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades, widen
+from studies.results.formatting import listed
+from studies.results.results import VARIANT, Axis, Results, spread, statuses
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+MOST_CURVES = 6
+VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
+SPEEDS = (".motion.speed", ".motion.frequency")
+MASSES = (".mass", ".force")
+DAMPING = (".damping_ratio",)
+
+
+class Curve(NamedTuple):
+    """y (n,) over x (n,) for one value of the second axis; place: where in the sweep each point lies."""
+
+    label: str
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A sweep seen along `x` and, for several curves or a map, `y`; every other dimension is held at an index."""
+
+    results: Results
+    x: Axis | None
+    y: Axis | None
+    held: dict[str, int]
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the axes lie along the one dimension of a sampled or zipped sweep, so that there are points only."""
+        return self.x is not None and self.x.dim == VARIANT
+
+    def cut(self, values: Any) -> xr.DataArray:
+        """Values over (some of) the sweep with the held dimensions taken out."""
+        import xarray as xr
+
+        array = xr.DataArray(values)
+        return array.isel({dim: i for dim, i in self.held.items() if dim in array.dims})
+
+    def plane(self, values: Any) -> Array:
+        """The same as an array (x, y) of the shown dimensions, (x,) where they are one; axes ascend on a grid."""
+        import xarray as xr
+
+        axes = {axis.dim: axis for axis in (self.x, self.y) if axis is not None}
+        like = self.cut(self.results.dataset["status"])
+        full = xr.broadcast(self.cut(values), like)[0].transpose(*axes)
+        ordered = full.isel({dim: _order(axis) for dim, axis in axes.items()})
+        return np.asarray(ordered.values, dtype=np.float64)
+
+    def along(self, axis: Axis, values: Any = None) -> Array:
+        """Values (n,) along one axis in the order of `plane`: its own, or others that depend on it alone."""
+        array = None if values is None else self.cut(values)
+        own = axis.values if array is None or array.dims != (axis.dim,) else np.asarray(array.values, dtype=np.float64)
+        return own[_order(axis)]
+
+    def curves(self, values: Any, along: Any = None) -> list[Curve]:
+        """Values as curves over x (or over the values of `along`), at most 6 of the second axis."""
+        assert self.x is not None
+        grid = self.plane(values)
+        ways = self.along(self.x) if along is None else self.plane(along)
+        ways = np.broadcast_to(ways.reshape(ways.shape + (1,) * (grid.ndim - ways.ndim)), grid.shape)
+        if grid.ndim == 1:
+            return [Curve("", ways, grid)]
+        assert self.y is not None
+        order = _order(self.y)
+        return [Curve(self.y.value(int(order[i])), ways[:, i], grid[:, i]) for i in spread(len(order), MOST_CURVES)]
+
+    @property
+    def words(self) -> str:
+        """What is held where, "" if nothing is."""
+        axes = [axis for axis in self.results.axes if len(axis.values) > 1]
+        held = [axis.at(self.held[axis.dim]) for axis in axes if axis.dim in self.held]
+        others = [axis for axis in axes if axis.dim not in self.held and axis not in (self.x, self.y)]
+        varied = f"{listed([axis.name for axis in others])} differ from point to point." if others else ""
+        return " ".join(text for text in (f"Held at {', '.join(held)}." if held else "", varied) if text)
+
+    @property
+    def missing(self) -> str:
+        """How many of the shown variants have no values, and why; "" if all have."""
+        status = self.cut(self.results.dataset["status"]).values.ravel()
+        counts = {Status(int(v)): int(n) for v, n in zip(*np.unique(status, return_counts=True), strict=True)}
+        lost = {value: count for value, count in counts.items() if not value.values_kept}
+        return f"Of {status.size} variants shown: {statuses(lost)}." if lost else ""
+
+    def caption(self, *sentences: str) -> str:
+        """Sentences, then what is held and what is missing."""
+        return " ".join(text for text in (*sentences, self.words, self.missing) if text)
+
+
+def view(results: Results, x: Sequence[str] = SPEEDS, y: Sequence[str] = (*DAMPING, *MASSES)) -> View:
+    """A view along the first axis whose key ends like one of `x`, and one like `y`; else along what there is.
+
+    Axes that are not shown are held in the middle of their values.
+    """
+    varied = [axis for axis in results.axes if len(axis.values) > 1]
+    first = results.axis(*x) or (varied[0] if varied else None)
+    rest = [axis for axis in varied if axis is not first and first and (axis.dim == VARIANT) == (first.dim == VARIANT)]
+    second = _first(rest, y) or (rest[0] if rest else None)
+    shown = {axis.dim for axis in (first, second) if axis is not None}
+    held = {dim: size // 2 for dim, size in zip(results.dims, results.shape, strict=True) if dim not in shown}
+    return View(results, first, second, held)
+
+
+def alone(seen: View) -> View:
+    """The same view without its second axis, which is then held in the middle too."""
+    if seen.y is None or seen.x is None or seen.y.dim == seen.x.dim:
+        return View(seen.results, seen.x, None, seen.held)
+    return View(seen.results, seen.x, None, {**seen.held, seen.y.dim: len(seen.y.values) // 2})
+
+
+def _order(axis: Axis) -> NDArray[np.int64]:
+    """Places along an axis in ascending order; a sample stays as it is."""
+    return np.arange(len(axis.values)) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
+
+
+def _first(axes: Sequence[Axis], endings: Sequence[str]) -> Axis | None:
+    return next((axis for ending in endings for axis in axes if axis.sets(ending)), None)
+
+
+def along_axis(axes: Axes, seen: View, title: str = "", values: Array | None = None) -> None:
+    """Label and scale of the horizontal axis."""
+    assert seen.x is not None
+    axes.set_xlabel(title or seen.x.title)
+    if is_logarithmic(seen.x.values if values is None else values):
+        logarithmic(axes.xaxis)
+
+
+def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
+    """Curves in ordered colours with a legend beside; points, coloured by the second axis, where it is sampled."""
+    if seen.is_sampled:
+        _draw_points(axes, seen, curves[0])
+        return
+    for curve, colour in zip(curves, shades(len(curves)), strict=True):
+        marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
+        axes.plot(curve.x, curve.y, color=colour, marker=marker, label=curve.label)
+    if seen.y is not None and len(curves) > 1:
+        legend_beside(axes, seen.y.noun)
+    widen(axes, [curve.y for curve in curves])
+
+
+def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
+    size = 14.0 if len(curve.x) < 500 else 4.0
+    style: dict[str, Any] = {"s": size, "linewidths": 0.0, "rasterized": len(curve.x) > VECTOR_CELLS}
+    if seen.y is None:
+        axes.scatter(curve.x, curve.y, color=BLUE, **style)
+        return
+    points = axes.scatter(curve.x, curve.y, c=seen.y.values, cmap=SEQUENTIAL, **style)
+    axes.figure.colorbar(points, ax=axes, label=seen.y.title, pad=0.02).outline.set_visible(False)
+
+
+def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None, None), **style: Any) -> Any:
+    """Values over the plane of two axes as coloured cells, or as coloured points where the sweep is sampled.
+
+    ways: other values than the axes' own to draw over, e.g. the speed ratio.
+    """
+    assert seen.x is not None and seen.y is not None
+    x, y = (seen.along(axis, way) for axis, way in zip((seen.x, seen.y), ways, strict=True))
+    grid = seen.plane(values)
+    axes.grid(visible=False)
+    mesh: QuadMesh | PathCollection
+    if seen.is_sampled:
+        shown = np.isfinite(grid)
+        mesh = axes.scatter(x[shown], y[shown], c=grid[shown], s=14.0, linewidths=0.0, **style)
+    else:
+        rasterized = grid.size > VECTOR_CELLS
+        edges = _edges(x), _edges(y)
+        mesh = axes.pcolormesh(*edges, grid.T, shading="flat", rasterized=rasterized, edgecolors="face", **style)
+        mesh.set_linewidth(0.7)  # covers the seams that browsers show between cells
+    for axis, way, ends in ((axes.xaxis, x, axes.set_xlim), (axes.yaxis, y, axes.set_ylim)):
+        if np.nanmin(way) >= 0.0 > axis.get_view_interval()[0]:
+            ends(0.0, None)  # the lowest cell reaches below its value
+        if is_logarithmic(way):
+            logarithmic(axis)
+    return mesh
+
+
+def _edges(values: Array) -> Array:
+    """Edges of cells around ascending or descending values: half-way between, by ratio where the axis is drawn so."""
+    if values.size == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    spaced = np.log(values) if is_logarithmic(values) else values
+    middle = 0.5 * (spaced[1:] + spaced[:-1])
+    edges = np.concatenate([[1.5 * spaced[0] - 0.5 * spaced[1]], middle, [1.5 * spaced[-1] - 0.5 * spaced[-2]]])
+    return np.exp(edges) if is_logarithmic(values) else edges
+
+
+def depends_on(seen: View, values: Any, axis: Axis | None) -> bool:
+    """Whether values, cut to the view, vary along exactly this axis."""
+    return axis is not None and seen.cut(values).dims == (axis.dim,)

@@ -1,0 +1,38 @@
+"""What a finished study says, from its dataset alone: in sentences and in figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from studies.findings.choices import told_choices
+from studies.protocol.study import kind_named
+from studies.results.findings_common import told_envelopes
+from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from studies.pictures.common.figures import Figure
+
+
+def findings(dataset: xr.Dataset) -> list[str]:
+    """The answer in sentences, the most important first."""
+    return findings_of(Results.of(dataset))
+
+
+def figures(dataset: xr.Dataset) -> list[Figure]:
+    """The figures of the report, the most important first."""
+    return figures_of(Results.of(dataset))
+
+
+def findings_of(results: Results) -> list[str]:
+    """What the kind of study finds, then what the envelopes say, then what every variant took."""
+    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results), *told_choices(results)]
+
+
+def figures_of(results: Results) -> list[Figure]:
+    """The figures of the kind of study, then the envelopes, then what every variant took, cost and left out."""
+    from studies.pictures.common import choice, envelopes, estimates
+
+    own = kind_named(results.study.kind).figures(results)
+    return [*own, *envelopes.pictures(results), *choice.pictures(results), *estimates.pictures(results)]

@@ -1,0 +1,339 @@
+"""The report of an archive: one page that stands by itself, and its figures as files.
+
+The page holds everything: figures as inline SVG, its style, no script, nothing from outside. What comes from a study's
+file is text, escaped in the page and drawn as it stands in figures.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from engine.study_file.document import Beside
+from results_schema.errors import BadInput
+from results_schema.status import Status, label
+from results_schema.store import files
+from results_schema.store.archive import Archive, open_archive
+from results_schema.variables import Variable, expand
+from studies.pictures.common import audit as audited
+from studies.pictures.common import estimates, unreduced
+from studies.pictures.common.figures import Figure, png, svg
+from studies.protocol.study import kind_named
+from studies.reporting.answers import figures_of, findings_of
+from studies.reporting.summary import noun, ranges
+from studies.results.formatting import counted, number, quantity, unit_text
+from studies.results.results import Results
+from studies.runs import audit
+from studies.runs.archived import results_of
+from studies.runs.audit import told_audit
+from studies.runs.unreduced import GROUP, told_unreduced
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+PAGE = "report.html"
+TEMPLATES = Path(__file__).parent / "templates"
+LONG_TEXT = 120
+
+
+class Row(NamedTuple):
+    """A name, what it is, and a remark."""
+
+    name: str
+    value: str
+    remark: str = ""
+
+
+class Drawn(NamedTuple):
+    """A figure as it stands in the page; files: its plain name, to which .svg and .png belong."""
+
+    number: int
+    title: str
+    caption: str
+    files: str
+    svg: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One sentence of the answer; subject: the sensor, carriage or envelope that it is about, or ""."""
+
+    subject: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """Everything that the template shows; plain text but for the drawings."""
+
+    title: str
+    question: str
+    noun: str
+    facts: Sequence[Row]
+    findings: Sequence[Finding]
+    figures: Sequence[Drawn]
+    statuses: Sequence[Row]
+    scene: Mapping[str, Sequence[Row]]
+    sweep: Sequence[Row]
+    results: Sequence[tuple[str, ...]]
+    declarations: Sequence[tuple[str, ...]]
+    provenance: Sequence[Row]
+    study_text: str
+
+
+def write_report(archive: Path | str, folder: Path | str) -> Path:
+    """Write the page and its figures (SVG and PNG) into a folder; the page's path.
+
+    Raises BadInput (no such archive, no such place) and ArchiveError before anything is written, and OutputFailed.
+    """
+    folder = Path(folder)
+    _check_folder(folder)
+    source = open_archive(archive)
+    results = results_of(source)
+    figures = [
+        *figures_of(results),
+        *audited.pictures(results, source.groups.get(audit.GROUP)),
+        *estimates.compared(source.groups.get(audit.GROUP)),
+        *unreduced.pictures(results, source.groups.get(GROUP)),
+    ]
+    page = page_of(source, results, figures)
+    text = _template().render(page=page)
+    files.make_folder(folder)
+    files.check_output_place(folder / PAGE)
+    for figure, drawn in zip(figures, page.figures, strict=True):
+        files.write_text(folder / f"{drawn.files}.svg", _standalone(drawn.svg))
+        files.write_whole(folder / f"{drawn.files}.png", partial(_fill, png(figure)))
+    files.write_text(folder / PAGE, text)
+    return folder / PAGE
+
+
+def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Page:
+    """The page of an archive."""
+    kind = kind_named(results.study.kind)
+    return Page(
+        title=results.study.title or str(source.root.attrs.get("title", "")) or kind.name,
+        question=kind.question,
+        noun=noun(source.root),
+        facts=_facts(results, noun(source.root)),
+        findings=[
+            _finding(results, text)
+            for text in (*findings_of(results), *_audited(source, results), *told_unreduced(source.groups.get(GROUP)))
+        ],
+        figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
+        statuses=_statuses(results, noun(source.root)),
+        scene=_scene(results),
+        sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
+        results=_results(results),
+        declarations=_declarations(results),
+        provenance=_provenance(source),
+        study_text=results.study.source.text,
+    )
+
+
+def _audited(source: Archive, results: Results) -> list[str]:
+    """What the audit says, as sentences."""
+    return [f"{text[0].upper()}{text[1:]}." for text in told_audit(source.groups.get(audit.GROUP), results)]
+
+
+def _template() -> Template:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"soft": _soft, "minus": _minus}
+    return environment.get_template(PAGE)
+
+
+def _soft(text: str) -> Markup:
+    """Text that may break after an underscore."""
+    return Markup("_<wbr>").join(escape(part) for part in text.split("_"))
+
+
+def _minus(text: str) -> str:
+    """Numbers with a true minus sign."""
+    return re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise BadInput("the report's folder is a file", where=str(folder), expected="a folder", received="a file")
+    if not folder.parent.is_dir():
+        raise BadInput("the folder above the report does not exist", where=str(folder.parent), remedy="create it first")
+    files.check_output_place((folder if folder.exists() else folder.parent) / PAGE)
+
+
+def _fill(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
+
+
+def _standalone(element: str) -> str:
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{element}'
+
+
+def _drawn(place: int, figure: Figure) -> Drawn:
+    return Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
+
+
+def _facts(results: Results, noun: str) -> list[Row]:
+    """The run in a line."""
+    dataset = results.dataset
+    steps = dataset["steps_used"].values
+    low, high = int(steps.min()), int(steps.max())
+    modes = sorted({int(count) for count in dataset["modes_used"].values.ravel()})
+    fine = results.status_counts.get(Status.OK, 0)
+    counts = [Row(f"{noun}s", f"{results.size:,}"), Row("status ok", f"{fine:,}")]
+    return [
+        Row("kind of study", results.study.kind),
+        *(counts if _statuses(results, noun) else ()),
+        Row("modes", " to ".join(str(count) for count in dict.fromkeys((modes[0], modes[-1])))),
+        *([Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}")] if high else []),
+    ]
+
+
+def _finding(results: Results, text: str) -> Finding:
+    subject, colon, rest = text.partition(": ")
+    if colon and subject in (*results.sensors, *results.study.carriage, *results.envelopes):
+        return Finding(subject, rest)
+    return Finding("", text)
+
+
+def _statuses(results: Results, noun: str) -> list[Row]:
+    """How many have which status; nothing where a study that measures is one whole, and well."""
+    if noun == "point" and results.size == 1 and set(results.status_counts) == {Status.OK}:
+        return []
+    return [_status_row(status, count) for status, count in results.status_counts.items()]
+
+
+def _status_row(status: Status, count: int) -> Row:
+    return Row(label(status), f"{count:,}", status.message)
+
+
+def _scene(results: Results) -> dict[str, list[Row]]:
+    """The tables of the study file as they were written, by heading; the sweep has its own table."""
+    swept = {path: axis.name for axis in results.axes for path in axis.paths}
+    found: dict[str, list[Row]] = {}
+    for name, value in results.study.data.items():
+        if name in ("sweep", "schema_version", "title", "kind"):
+            continue
+        if name in ("body", "carriage", "sensor", "envelope"):
+            for own, table in value.items():
+                found[f"{name} {own}"] = _rows(results, f"{name}.{own}", table, swept)
+        elif isinstance(value, dict):
+            found[name] = _rows(results, name, value, swept)
+        else:
+            found.setdefault("whole scene", []).append(_row(results, name, value, swept))
+    return found
+
+
+def _rows(results: Results, here: str, table: Mapping[str, Any], swept: Mapping[str, str]) -> list[Row]:
+    """Leaves of a table; what lies deeper is named with a dot."""
+    found = []
+    for key, value in table.items():
+        path = f"{here}.{key}"
+        if isinstance(value, Beside):
+            continue
+        if isinstance(value, dict):
+            inner = _rows(results, path, value, swept)
+            found += [row._replace(name=f"{key}.{row.name}") for row in inner]
+        else:
+            found.append(_row(results, path, value, swept))
+    return found
+
+
+def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> Row:
+    text = value if isinstance(value, str) else _plain(value)
+    try:
+        unit = results.study.unit(path)
+    except (KeyError, ValueError, TypeError):
+        unit = None
+    if unit is not None and unit.symbol and not isinstance(value, str):
+        text = f"{text} {unit_text(unit.symbol)}"
+    remark = f"swept: {swept[path]}" if path in swept else ""
+    return Row(path.rsplit(".", 1)[-1], _shortened(text), remark)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        return ("; " if any(isinstance(item, dict) for item in value) else ", ").join(map(_plain, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
+    return number(value, 9) if isinstance(value, float) else str(value)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONG_TEXT else f"{text[: LONG_TEXT - 1]}…"
+
+
+def _sweep_row(results: Results, place: int) -> Row:
+    axis = results.axes[place]
+    low, high = (quantity(float(end), axis.units) for end in (axis.values.min(), axis.values.max()))
+    span = f"{low} to {high}" if len(axis.values) > 1 else low
+    return Row(axis.noun, f"{span}, {counted(len(axis.values), 'value')}", ", ".join(axis.paths))
+
+
+def _results(results: Results) -> list[tuple[str, ...]]:
+    """Name, sensor, smallest and largest with their places, of every result that is a number per variant."""
+    rows: list[tuple[str, ...]] = []
+    for found in ranges(results):
+        ends = [quantity(end.value, found.units, 4) for end in (found.smallest, found.largest)]
+        rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where))
+    return rows
+
+
+def _declarations(results: Results) -> list[tuple[str, ...]]:
+    """Name, dimensions, unit and meaning of every variable in the archive."""
+    declared = expand(results.study.kind, results.sensors, tuple(results.study.carriage), results.envelopes)
+    names = [str(name) for name in results.dataset.data_vars]
+    return [_declaration(results, declared[name]) for name in names if name in declared]
+
+
+def _declaration(results: Results, variable: Variable) -> tuple[str, ...]:
+    own = tuple(map(str, results.dataset[variable.name].dims))
+    swept = own[: len(results.dims)] == results.dims
+    dims = ", ".join(("variant", *own[len(results.dims) :]) if swept else own)
+    units = "" if variable.flags is not None else unit_text(str(results.dataset[variable.name].attrs.get("units", "1")))
+    words = variable.long_name + (f": {variable.meaning}" if variable.meaning else "")
+    return (variable.name, dims, units, words)
+
+
+def _provenance(source: Archive) -> list[Row]:
+    """Root attributes that say where the numbers come from; the study's text has its own place."""
+    wanted = {
+        "history": "made by",
+        "study_sha256": "study file, SHA-256",
+        "study_files": "files of the model, SHA-256",
+        "results_key": "study, files and program",
+        "packages": "packages",
+        "python": "Python",
+        "machine": "machine",
+        "run_seconds": "run time",
+        "Conventions": "conventions",
+        "schema_version": "schema",
+    }
+    found = [Row("archive", source.path.name)]
+    for key, words in wanted.items():
+        if key in source.root.attrs:
+            found.append(Row(words, _attribute(key, source.root.attrs[key])))
+    return found
+
+
+def _attribute(key: str, value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    parts = [value] if np.ndim(value) == 0 else list(value)
+    text = ", ".join(part if isinstance(part, str) else number(float(part), 6) for part in parts)
+    return f"{text} s" if key == "run_seconds" else text

@@ -1,0 +1,179 @@
+"""A finished run in one table: the range of every result, and which variants it belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from results_schema.status import Status, label
+from results_schema.variables import expand
+from studies.results.formatting import quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.study import Study
+    from studies.protocol.study import AnyKind
+    from studies.results.results import Results
+    from studies.runs.runner import Outcome
+
+_BESIDE = ("_position",)  # where something was, shown by nothing but itself
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """One end of a result's range: its value, and the swept numbers (or names) of that variant by name, with units."""
+
+    value: float
+    variant: Mapping[str, tuple[float | str, str]]
+
+    @property
+    def where(self) -> str:
+        """The variant in words."""
+        return ", ".join(f"{name} {_shown(value, unit)}" for name, (value, unit) in self.variant.items())
+
+
+@dataclass(frozen=True)
+class Range:
+    """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor."""
+
+    name: str
+    sensor: str
+    units: str
+    smallest: Extreme
+    largest: Extreme
+
+    @property
+    def size(self) -> float:
+        """The larger magnitude, beside which rounding shows."""
+        return max(abs(self.smallest.value), abs(self.largest.value))
+
+
+def is_measured(results: xr.Dataset) -> bool:
+    """Whether these are results of a study that measures: its grid is no sweep."""
+    kind = _kind(results)
+    return is_pieced(results) and not getattr(kind, "sweeps", False)
+
+
+def is_pieced(results: xr.Dataset) -> bool:
+    """Whether these were computed in pieces, and not by a march."""
+    from studies.protocol.study import is_measuring
+
+    return is_measuring(str(results.attrs["study_kind"]))
+
+
+def _kind(results: xr.Dataset) -> AnyKind:
+    from studies.protocol.study import kind_named
+
+    return kind_named(str(results.attrs["study_kind"]))
+
+
+def noun(results: xr.Dataset) -> str:
+    """What a status belongs to."""
+    return "point" if is_measured(results) else "variant"
+
+
+def counts(results: xr.Dataset) -> dict[str, int]:
+    """Number of variants by status, those that occur."""
+    values, found = np.unique(results["status"].values, return_counts=True)
+    return {label(Status(int(value))): int(count) for value, count in zip(values, found, strict=True)}
+
+
+def all_ok(results: xr.Dataset) -> bool:
+    """Whether every variant's status is ok."""
+    return bool((results["status"].values == Status.OK).all())
+
+
+def ranges(study_results: Results) -> Iterator[Range]:
+    """The range of every result that is one number per variant, or one per variant and sensor or place; of studies
+    in pieces of every result, but where they take a sweep without what belongs to no variant."""
+    results = study_results.dataset
+    grid = results["status"].dims
+    if is_pieced(results):
+        beside = () if is_measured(results) else _beside_the_grid(study_results.study)
+        for name, array in results.data_vars.items():
+            if array.dtype.kind == "f" and name not in beside:
+                yield from _range(results, str(name), "", array)
+        return
+    for name, array in results.data_vars.items():
+        if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
+            continue
+        of_places = len(array.dims) == len(grid) + 1 and str(array.dims[-1]).endswith("_place")
+        if array.dims == grid or of_places:
+            yield from _range(results, str(name), "", array)
+        elif array.dims == (*grid, "sensor"):
+            for place, sensor in enumerate(results["sensor"].values):
+                yield from _range(results, str(name), str(sensor), array.isel(sensor=place))
+
+
+def _beside_the_grid(study: Study) -> set[str]:
+    """Results whose dimensions do not begin with the sweep's."""
+    from studies.results.results import sensor_units
+
+    declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
+    return {name for name, variable in declared.items() if variable.lead != "grid"}
+
+
+def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
+    """What `run --json` prints."""
+    from studies.results.results import Results
+    from studies.runs.audit import as_json as audit_as_json
+
+    results, told = outcome.results, Results.of(outcome.results)
+    return {
+        "archive": str(outcome.archive),
+        "kind": results.attrs["study_kind"],
+        "title": results.attrs["title"],
+        "variants": int(results["status"].size),
+        "status": counts(results),
+        "was_finished": outcome.was_finished,
+        "resumed": outcome.resumed,
+        "seconds": outcome.seconds,
+        "exit_code": exit_code,
+        "remarks": list(outcome.remarks),
+        "audit": None if outcome.audit is None else audit_as_json(outcome.audit, told),
+        "results": [
+            {
+                "name": found.name,
+                "sensor": found.sensor or None,
+                "units": found.units,
+                "smallest": _end_as_json(found.smallest),
+                "largest": _end_as_json(found.largest),
+            }
+            for found in ranges(told)
+        ],
+    }
+
+
+def _end_as_json(end: Extreme) -> dict[str, Any]:
+    return {"value": end.value, "at": {name: value for name, (value, _) in end.variant.items()}}
+
+
+def _range(results: xr.Dataset, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
+    values = array.values
+    if not np.isfinite(values).any():
+        return
+    units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
+    smallest, largest = (_extreme(results, array, pick(values)) for pick in (np.nanargmin, np.nanargmax))
+    yield Range(name, sensor, units, smallest, largest)
+
+
+def _extreme(results: xr.Dataset, array: xr.DataArray, flat: np.intp) -> Extreme:
+    place = dict(zip(array.dims, np.unravel_index(flat, array.shape), strict=True))
+    variant: dict[str, tuple[float | str, str]] = {}
+    for name, coordinate in results.coords.items():
+        swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "ifU"
+        if swept and name not in _DERIVED:
+            value = coordinate.values[place[coordinate.dims[0]]].item()
+            variant[str(name)] = (value, str(coordinate.attrs.get("units", "1")))
+    return Extreme(float(array.values.reshape(-1)[flat]), variant)
+
+
+def _shown(value: float | str, unit: str) -> str:
+    return value if isinstance(value, str) else quantity(value, unit)
+
+
+_DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

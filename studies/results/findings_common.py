@@ -1,0 +1,84 @@
+"""Parts of sentences that several kinds of study use, and checks that they share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from studies.results.formatting import counted, percent, quantity
+from studies.results.results import Index, Results, extreme, statuses
+
+if TYPE_CHECKING:
+    from engine.scene.carriages import Carriage
+    from engine.scene.study import Study
+
+Array = NDArray[np.float64]
+
+
+def first_carriage(study: Study) -> tuple[str, Carriage]:
+    """Name and carriage that come first. Raises BadInput where nothing moves."""
+    if not study.carriage:
+        where, expected = study.source.where("carriage"), "at least one table [carriage.name]"
+        raise BadInput("nothing moves", where=where, expected=expected)
+    return next(iter(study.carriage.items()))
+
+
+def check_sensors(study: Study) -> None:
+    """Refuse a study that measures nothing. Raises BadInput."""
+    if not study.sensor:
+        where, expected = study.source.where("sensor"), "at least one table [sensor.name]"
+        raise BadInput("nothing is measured", where=where, expected=expected)
+
+
+def in_words(results: Results, index: Index) -> str:
+    """Where in the sweep, as the end of a sentence; "" without a sweep."""
+    at = results.at(index)
+    return f" at {at}" if at else ""
+
+
+def exceeds(results: Results, values: Array, threshold: float) -> str:
+    """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept."""
+    beyond = np.isfinite(values) & (values > threshold)
+    if not beyond.any():
+        return f"stays below {percent(threshold)}"
+    axis = results.axis(".motion.speed", ".motion.frequency")
+    if axis is None:
+        return f"exceeds {percent(threshold)} in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+    along = results.everywhere(results.dataset[axis.name])
+    lowest = float(along[beyond].min())
+    if lowest == axis.values.min():
+        return f"exceeds {percent(threshold)} already at {quantity(lowest, axis.units)}"
+    return f"first exceeds {percent(threshold)} at {quantity(lowest, axis.units)}"
+
+
+def told_envelopes(results: Results) -> list[str]:
+    """The value of largest size anywhere along a body, of every envelope."""
+    said = []
+    for name, envelope in results.study.envelope.items():
+        ends = [results.envelope(name, end) for end in ("max", "min")]
+        values = np.where(np.abs(ends[0]) >= np.abs(ends[1]), *ends)
+        place = extreme(np.where(results.with_values[..., None], np.abs(values), np.nan))
+        if place is None:
+            said.append(f"{name}: no variant has values.")
+            continue
+        value = quantity(float(values[place]), results.envelopes[name])
+        at = quantity(float(results.dataset[f"{name}_place"].values[place[-1]]), "m")
+        held = "while the contact holds, " if not results.held.all() and results.held.any() else ""
+        words = envelope.quantity.replace("_", " ")
+        said.append(
+            f"{name}: {held}the largest {words} along {envelope.body} is {value}, at {at} of its track"
+            f"{f' ({which})' if (which := results.at(place[:-1])) else ''}."
+        )
+    return said
+
+
+def told_statuses(results: Results) -> list[str]:
+    """How many variants carry a status other than ok, as a sentence; none where all are fine."""
+    others = sum(count for status, count in results.status_counts.items() if status != Status.OK)
+    if not others:
+        return []
+    return [f"Of {counted(results.size, 'variant')}, {others:,} carry a status: {statuses(results.status_counts)}."]

@@ -1,0 +1,312 @@
+"""A finished dataset together with the study it came from: axes, parameters, statuses and histories by name."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.status import Status, label
+from results_schema.variables import sensor_unit
+from studies.results.formatting import axis_title, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.carriages import Carriage
+    from engine.scene.study import Study
+
+Array = NDArray[np.float64]
+VARIANT = "variant"
+PACES = (".motion.frequency", ".motion.speed")
+Index = tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along it."""
+
+    name: str
+    dim: str
+    paths: tuple[str, ...]
+    values: Array
+    units: str
+
+    @property
+    def noun(self) -> str:
+        """Its name as a word."""
+        return self.name.replace("_", " ")
+
+    @property
+    def title(self) -> str:
+        """Name and unit as on a figure's axis."""
+        return axis_title(self.noun, self.units)
+
+    def value(self, index: int) -> str:
+        """One value with its unit."""
+        return quantity(float(self.values[index]), self.units)
+
+    def at(self, index: int) -> str:
+        """One value with name and unit."""
+        return f"{self.noun} {self.value(index)}"
+
+    def sets(self, *endings: str) -> bool:
+        """Whether one of the keys that it sets ends so."""
+        return any(f".{path}".endswith(ending) for path in self.paths for ending in endings)
+
+
+class Trace(NamedTuple):
+    """History of one sensor in one variant: values (T,) over `along` (T,), whose name is `over`; elapsed s or None."""
+
+    over: str
+    along: Array
+    values: Array
+    elapsed: Array | None
+
+    @property
+    def times(self) -> Array:
+        """Seconds where they are known, else the stations."""
+        return self.along if self.elapsed is None else self.elapsed
+
+    @property
+    def end(self) -> float:
+        """The last of the times."""
+        return float(np.nanmax(self.times))
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A study's dataset, from memory or from its archive, and the study; models: the archive's bodies by name."""
+
+    dataset: xr.Dataset
+    study: Study
+    models: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> Results:
+        """The results of a dataset that carries its study's text. Raises BadInput where the text is no study."""
+        import engine
+
+        return cls(dataset, engine.load(f"{dataset.attrs['study']}\n"))
+
+    @cached_property
+    def dims(self) -> tuple[str, ...]:
+        """Dimensions of the sweep."""
+        return tuple(map(str, self.dataset["status"].dims))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Their lengths."""
+        return self.dataset["status"].shape
+
+    @property
+    def size(self) -> int:
+        """Number of variants."""
+        return int(self.dataset["status"].size)
+
+    @cached_property
+    def axes(self) -> tuple[Axis, ...]:
+        """The swept numbers in the order of the file."""
+        found = []
+        for name, axis in self.study.sweep.axes.items():
+            coordinate = self.dataset[name]
+            values = np.asarray(coordinate.values, dtype=np.float64)
+            units = str(coordinate.attrs.get("units", "1"))
+            found.append(Axis(name, str(coordinate.dims[0]), axis.of, values, "" if units == "1" else units))
+        return tuple(found)
+
+    def axis(self, *endings: str) -> Axis | None:
+        """The first axis of more than one value that sets a key with one of these endings, tried in their order."""
+        varied = [axis for axis in self.axes if len(axis.values) > 1]
+        return next((axis for ending in endings for axis in varied if axis.sets(ending)), None)
+
+    @cached_property
+    def sensors(self) -> dict[str, str]:
+        """Name and unit of every sensor."""
+        return sensor_units(self.study)
+
+    @property
+    def carriage(self) -> Carriage:
+        """The first carriage."""
+        return next(iter(self.study.carriage.values()))
+
+    @property
+    def carriage_name(self) -> str:
+        """Name of the first carriage."""
+        return next(iter(self.study.carriage))
+
+    def recorded(self, body: str) -> xr.Dataset | None:
+        """What the archive holds of a body out of files, whose model cannot be built without them; else None."""
+        return None if self.study.body[body].recorded is None else self.models[body]
+
+    @cached_property
+    def envelopes(self) -> dict[str, str]:
+        """Name and unit of every envelope."""
+        return envelope_units(self.study)
+
+    @cached_property
+    def kept(self) -> xr.DataArray:
+        """Where the status keeps values."""
+        return self.dataset["status"] < int(Status.NOT_CONVERGED)
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Where values are kept and the contact holds, in the sweep's shape: beyond, the equations say no more."""
+        return np.asarray(self.kept.values & (self.dataset["status"].values != int(Status.SEPARATED)))
+
+    @cached_property
+    def with_values(self) -> NDArray[np.bool_]:
+        """Which variants speak for all, in the sweep's shape: those whose contact holds, or all with values if none."""
+        return self.held if self.held.any() else np.asarray(self.kept.values)
+
+    def envelope(self, name: str, end: str) -> Array:
+        """An envelope's "max" or "min", in the sweep's shape and over its places."""
+        values = self.dataset[f"{name}_envelope_{end}"].transpose(*self.dims, f"{name}_place")
+        return np.asarray(values.values, dtype=np.float64)
+
+    @cached_property
+    def status_counts(self) -> dict[Status, int]:
+        """Number of variants per status, those that occur."""
+        counts = Counter(self.dataset["status"].values.ravel().tolist())
+        return {Status(value): counts[value] for value in sorted(counts)}
+
+    def parameter(self, path: str) -> xr.DataArray | float:
+        """A number of the scene by its dotted key: over the sweep where an axis sets it, else as in the file."""
+        axis = next((axis for axis in self.axes if path in axis.paths), None)
+        return self.dataset[axis.name].astype(np.float64) if axis else float(self.study.value(path))
+
+    def everywhere(self, values: Any) -> Array:
+        """Values that depend on some of the sweep's axes, or on none, for every variant, in the sweep's shape."""
+        import xarray as xr
+
+        full = xr.broadcast(xr.DataArray(values), self.dataset["status"])[0].transpose(*self.dims)
+        return np.asarray(full.values, dtype=np.float64)
+
+    def deciding_axis(self, variable: str, sensor: str) -> Axis | None:
+        """The axis, other than the pace of the motion, along which a result changes most; the mass in doubt."""
+        values, pace = self.of_sensor(variable, sensor), self.axis(*PACES)
+        axes = [axis for axis in self.axes if axis is not pace and len(axis.values) > 1]
+        if not axes or VARIANT in self.dims:
+            return self.axis(".mass")
+        axes.sort(key=lambda axis: not axis.sets(".mass"))
+        return max(axes, key=lambda axis: float((values.max(axis.dim) - values.min(axis.dim)).fillna(0.0).mean()))
+
+    def holds_up_to(self, axis: Axis, holds: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+        """The largest value of an axis up to which something holds in every known variant; None if nowhere.
+
+        holds, known: in the sweep's shape.
+        """
+        values = self.everywhere(self.dataset[axis.name])
+        broken = values[known & ~holds]
+        fine = values[known & holds & (values < broken.min() if broken.size else True)]
+        return float(fine.max()) if fine.size else None
+
+    def index_of(self, flat: int) -> Index:
+        """Place of a variant in the sweep from its flat number."""
+        return tuple(int(i) for i in np.unravel_index(flat, self.shape)) if self.dims else ()
+
+    def at(self, index: Index) -> str:
+        """The swept parameters of one variant in words; "" without a sweep.
+
+        They read like "speed 5 m/s, mass 100 kg".
+        """
+        place = dict(zip(self.dims, index, strict=True))
+        return ", ".join(axis.at(place[axis.dim]) for axis in self.axes if len(axis.values) > 1)
+
+    def values_at(self, index: Index) -> dict[str, float]:
+        """Swept numbers of one variant by dotted key."""
+        place = dict(zip(self.dims, index, strict=True))
+        return {path: axis.values[place[axis.dim]].item() for axis in self.axes for path in axis.paths}
+
+    def carriage_at(self, index: Index) -> Carriage:
+        """The first carriage of one variant."""
+        own = {path: value for path, value in self.values_at(index).items() if path.startswith("carriage.")}
+        whole = {path: int(v) if isinstance(self.study.value(path), int) else v for path, v in own.items()}
+        return self.study.without_sweep().with_values(whole).carriage[self.carriage_name]
+
+    def of_sensor(self, variable: str, sensor: str) -> xr.DataArray:
+        """A result over sensors for one of them."""
+        return self.dataset[variable].sel(sensor=sensor)
+
+    def traced(self) -> list[Index]:
+        """The variants whose values and histories are kept, in the order of their flat numbers."""
+        names = [name for name in self.sensors if name in self.dataset]
+        if not names:
+            return []
+        stored = self.dataset[names[0]]
+        flat = stored["history"].values if "history" in stored.dims else range(self.size)
+        kept = self.kept.values.ravel()
+        return [self.index_of(int(number)) for number in flat if kept[int(number)]]
+
+    def trace(self, sensor: str, index: Index) -> Trace:
+        """The stored history of one variant."""
+        stored = self.dataset[sensor]
+        over = str(stored.dims[-1])
+        elapsed = self.dataset.coords.get("elapsed")
+        along = np.asarray(self.dataset[over].values, dtype=np.float64)
+        times = None if elapsed is None else np.asarray(self._row(elapsed, index))
+        return Trace(over, along, np.asarray(self._row(stored, index)), times)
+
+    def _row(self, stored: xr.DataArray, index: Index) -> Array:
+        """One variant's row of an array over histories, or over the sweep, or over neither."""
+        if "history" in stored.dims:
+            flat = int(np.ravel_multi_index(index, self.shape)) if self.dims else 0
+            return np.asarray(stored.sel(history=flat).values, dtype=np.float64)
+        places = {dim: i for dim, i in zip(self.dims, index, strict=True) if dim in stored.dims}
+        return np.asarray(stored.isel(places).values, dtype=np.float64)
+
+
+def sensor_units(study: Study) -> dict[str, str]:
+    """Name and unit of every sensor."""
+    return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+
+
+def envelope_units(study: Study) -> dict[str, str]:
+    """Name and unit of every envelope."""
+    return {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
+
+
+def statuses(counts: Mapping[Status, int]) -> str:
+    """Statuses other than ok in words, "" where there are none.
+
+    >>> statuses({Status.OK: 5, Status.SEPARATED: 2, Status.DIVERGED: 1})
+    '2 separated (values kept), 1 diverged (left out)'
+    """
+    others = [(status, count) for status, count in counts.items() if status != Status.OK]
+    return ", ".join(
+        f"{count} {label(status)} ({'values kept' if status.values_kept else 'left out'})" for status, count in others
+    )
+
+
+def extreme(values: xr.DataArray | Array, by: Any = np.nanargmax) -> Index | None:
+    """Place of the largest value (or of that which `by` picks); None where there are only NaN.
+
+    >>> extreme(np.array([[1.0, np.nan], [3.0, 2.0]]))
+    (1, 0)
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if np.isnan(array).all():
+        return None
+    return tuple(int(i) for i in np.unravel_index(int(by(array)), array.shape)) if array.ndim else ()
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most `most` of `count` places, evenly spread, with both ends.
+
+    >>> spread(10, 4), spread(2, 4)
+    ([0, 3, 6, 9], [0, 1])
+    """
+    if count <= most:
+        return list(range(count))
+    return sorted({math.floor(0.5 + i * (count - 1) / (most - 1)) for i in range(most)}) if most > 1 else [count // 2]
+
+
+def chosen(items: Sequence[Any], most: int) -> Iterator[Any]:
+    """At most `most` of the items, evenly spread."""
+    return (items[i] for i in spread(len(items), most))

@@ -1,0 +1,171 @@
+"""What an archive says of its study, read without any other file, and compared with what it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.errors import ArchiveError, BadInput
+from results_schema.store.archive import Archive
+from results_schema.validate import group_findings, root_findings
+from studies.at_rest.labelling import asked_coordinates
+from studies.at_rest.positions import Asked, positions_of
+from studies.protocol.measuring import MeasuringKind, question_of
+from studies.protocol.study import AnyKind, kind_named
+from studies.results.results import Results, envelope_units, sensor_units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.bodies.modal.description import Recorded
+    from engine.scene.study import Study
+    from engine.study_file.spec import Spec
+
+MODELS = "/model/"
+SAME = 1e-9  # relative difference of an axis's values from those of the study: other machines round otherwise
+SHOWN = 5  # findings in a message
+
+
+def results_of(archive: Archive) -> Results:
+    """The results of an archive with their study.
+
+    Raises ArchiveError where what the archive says of its study is no study, or is not what it holds.
+    """
+    models = {path.removeprefix(MODELS): group for path, group in archive.groups.items() if path.startswith(MODELS)}
+    try:
+        study = _study(archive.root, models)
+        found = list(_findings(archive, study))
+    except BadInput as error:
+        raise _refused(archive.path, str(error)) from error
+    if found:
+        more = f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+        raise _refused(archive.path, "; ".join(found[:SHOWN]) + more)
+    return Results(archive.root, study, models)
+
+
+def _refused(path: Path, text: str) -> ArchiveError:
+    return ArchiveError(
+        f"what this archive says of its study is not what it holds: {text}",
+        where=str(path),
+        remedy="run the study again with --overwrite",
+    )
+
+
+def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> dict[str, xr.Dataset]:
+    """The groups of bodies; that of a body out of files, under the first carriage, with its lowest elastic frequency
+    over the axes that change it, which nobody could tell later without the files."""
+    from results_schema.variables import declarations
+    from studies.findings.theory import first_omega
+
+    name = results.carriage.on
+    path, body = f"{MODELS}{name}", results.study.body[name]
+    if not body.names_files:
+        return dict(groups)
+    (declared,) = (variable for variable in declarations(MODELS) if variable.name == "first_frequency")
+    omega = first_omega(results)
+    dims, values = getattr(omega, "dims", ()), np.asarray(omega, dtype=np.float64)
+    added = {declared.name: (dims, values / (2.0 * np.pi), declared.attributes())}
+    return {**groups, path: groups[path].assign(added)}
+
+
+def _study(root: xr.Dataset, models: Mapping[str, xr.Dataset]) -> Study:
+    """The study of an archive, from its text alone. Raises BadInput."""
+    from engine.scene.study import load_recorded
+
+    recorded = {name: found for name, group in models.items() if (found := _recorded(group)) is not None}
+    return load_recorded(str(root.attrs["study"]), recorded)
+
+
+def _recorded(group: xr.Dataset) -> Recorded | None:
+    from engine.bodies.modal.description import Recorded
+
+    length = float(group["length"]) if "length" in group and group["length"].size == 1 else np.nan
+    return Recorded(length) if np.isfinite(length) and length > 0.0 else None
+
+
+def _findings(archive: Archive, study: Study) -> Iterator[str]:
+    """Every difference between what is said and what is there, the most telling first."""
+    root = archive.root
+    if root.attrs.get("study_kind") != study.kind:
+        yield f"study_kind: expected {study.kind!r}, received {root.attrs.get('study_kind')!r}"
+        return
+    kind = kind_named(study.kind)
+    used = {name for carriage in study.carriage.values() for name in (carriage.on, getattr(carriage, "body", ""))}
+    bodies = {name: body.recorded for name, body in study.body.items() if name in used and body.recorded is not None}
+    missing = [name for name, recorded in bodies.items() if np.isnan(recorded.length)]
+    if missing:
+        yield from (f"{MODELS}{name}: expected what this body out of files is, received nothing" for name in missing)
+        return
+    if isinstance(kind, MeasuringKind):
+        yield from _position_findings(root, study, question_of(study, kind.settings))
+    yield from _axis_findings(root, study)
+    yield from _label_findings(root, study)
+    names = (sensor_units(study), tuple(study.carriage), envelope_units(study))
+    yield from root_findings(root, study.kind, *names)
+    for path, group in archive.groups.items():
+        yield from (f"{path}: {text}" for text in group_findings(group, path, int(root["status"].size)))
+    yield from _model_findings(root, study, kind, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
+
+
+def _model_findings(root: xr.Dataset, study: Study, kind: AnyKind, groups: Mapping[str, xr.Dataset]) -> Iterator[str]:
+    """The bodies: they are the study's, and those out of files have all that theory asks of them."""
+    for path in groups:
+        if path.removeprefix(MODELS) not in study.body:
+            yield f"{path}: expected a body of the study"
+    if isinstance(kind, MeasuringKind):
+        return
+    name = next(iter(study.carriage.values())).on
+    if study.body[name].recorded is None:
+        return
+    group = groups[f"{MODELS}{name}"]
+    for needed in ("first_frequency", "mode_shape"):
+        if needed not in group:
+            yield f"{MODELS}{name}: expected {needed} of a body out of files, received nothing"
+    sizes = dict(group["first_frequency"].sizes) if "first_frequency" in group else {}
+    if any(root.sizes.get(dim) != size for dim, size in sizes.items()):
+        yield f"{MODELS}{name}: expected first_frequency over axes of the sweep, received {sizes}"
+
+
+def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
+    """The axes of the sweep against the coordinates."""
+    from engine.scene.sweep import VARIANT, expand
+
+    if not study.sweep.axes:
+        return
+    joint = {name: study.sweep.zip or axis.sobol is not None for name, axis in study.sweep.axes.items()}
+    sizes = {VARIANT if joint[name] else name: axis.size for name, axis in study.sweep.axes.items()}
+    # Before the axes are spread out: a text can ask for thousands of millions of variants.
+    if list(root["status"].sizes.items()) != list(sizes.items()):
+        yield f"status: expected the axes {sizes} of the study, received {dict(root['status'].sizes)}"
+        return
+    for axis in expand(study).axes:
+        found = root.coords.get(axis.name)
+        if found is None or found.dims != (axis.dim,) or found.dtype.kind not in "if":
+            yield f"{axis.name}: expected the numbers of this axis along {axis.dim}"
+        elif not np.allclose(found.values, axis.values, rtol=SAME, atol=0.0):
+            yield f"{axis.name}: expected the values of the study's axis, received others"
+        elif found.attrs.get("units") != (axis.units or "1"):
+            yield f"{axis.name}: expected the unit {axis.units or '1'!r}, received {found.attrs.get('units')!r}"
+
+
+def _position_findings(root: xr.Dataset, study: Study, asked: Spec) -> Iterator[str]:
+    """The coordinates of a study at rest against what it asks for."""
+    if not isinstance(asked, Asked):
+        return
+    for name, wanted in asked_coordinates(positions_of(study, asked), asked).items():
+        found = root.coords.get(name)
+        if found is not None and (found.shape != wanted.shape or not np.allclose(found.values, wanted, SAME, SAME)):
+            yield f"{name}: expected what the study asks for, received others"
+    bodies = root["on_body"].values.tolist() if "on_body" in root.coords else list(study.body)
+    if not set(bodies) <= set(study.body):
+        yield f"on_body: expected the bodies {list(study.body)}, received {bodies}"
+
+
+def _label_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
+    """Names of sensors and their units."""
+    for name, wanted in (("sensor", list(study.sensor)), ("sensor_unit", list(sensor_units(study).values()))):
+        if name in root.coords and root[name].values.tolist() != wanted:
+            yield f"{name}: expected {wanted}, received {root[name].values.tolist()}"

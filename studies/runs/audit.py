@@ -1,0 +1,221 @@
+"""The audit of a run: what some variants report against the same variants computed again with more of everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from results_schema.variables import axes, declarations
+from studies.findings.amplification import derived_from
+from studies.findings.choices import is_marched
+from studies.protocol.measuring import Work, described
+from studies.results.formatting import counted, scientific
+from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.batch.audit import Audit
+    from engine.batch.plan import Plan
+    from engine.scene.study import Study
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+GROUP = "/audit"
+NONE_AUDITED = (
+    "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
+)
+
+
+def refuse_audit(study: Study) -> None:
+    """Refuse an audit of a study that marches no variants. Raises BadInput."""
+    if study.solver.audit not in ("auto", 0):
+        where = study.source.where("solver.audit")
+        raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
+
+
+def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
+    """The group of an archive by its path; {} where nothing is audited, or no audited variant has values.
+
+    dataset: the study's own. Raises Interrupted.
+    """
+    from engine.batch.audit import sampled
+    from engine.batch.execution import choose
+
+    choose(plan, work.threads, work.stop.event)
+    variants = sampled(plan)
+    kept = _flat(plan, dataset["status"])[variants] < int(Status.NOT_CONVERGED)
+    found = _on_threads(plan, variants[kept], work)
+    work.check()
+    if not found.variants.size:
+        return {}
+    return {GROUP: _dataset(plan, dataset, found, int(np.count_nonzero(~kept)) + found.left_out)}
+
+
+def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
+    """The audit, shared out among threads."""
+    from engine.batch.audit import audit
+    from engine.batch.execution import run_jobs
+    from engine.march.march import Halted
+
+    try:
+        return audit(plan, variants, work.halted, partial(run_jobs, threads=work.threads))
+    except Halted:
+        work.check()
+        raise
+
+
+def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:
+    """(V,) a result of every variant by its flat number."""
+    return np.asarray(array.transpose(*plan.cases.dims).values).reshape(plan.size)
+
+
+def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr.Dataset:
+    import xarray as xr
+
+    names, derived = _names(plan), derived_from(plan.study)
+    whole = [str(name) for name in dataset["result"].values]
+    rows = [[names.index(own) for own in ([name] if name in names else derived[name])] for name in whole]
+    observed = np.where(np.isfinite(found.observed), found.observed, np.nan)
+    arrays: dict[str, NDArray[Any]] = {
+        "observed_error": np.stack([observed[own].max(axis=0) for own in rows], axis=1),
+        "estimated_error": np.stack([found.told[own].max(axis=0) for own in rows], axis=1),
+        "tolerance": np.asarray(dataset["tolerance"].values),
+        "tolerance_asked": plan.cases_tolerance[found.variants],
+        "variant_status": _flat(plan, dataset["status"])[found.variants],
+        "left_out": np.array(left_out),
+    }
+    declared = {variable.name: variable for variable in declarations(GROUP)}
+    own = {
+        axis.name: ("sample", axis.values[plan.cases.positions(found.variants)[axis.dim]], dataset[axis.name].attrs)
+        for axis in plan.cases.axes
+    }
+    coordinates = {
+        "sample": ("sample", found.variants, axes()["sample"].attributes()),
+        "result": ("result", whole, axes()["result"].attributes()),
+    }
+    return xr.Dataset(
+        {name: described(declared[name], declared[name].dims, array) for name, array in arrays.items()},
+        coords=coordinates | own,
+    )
+
+
+def _names(plan: Plan) -> list[str]:
+    """The results of a plan's march."""
+    from engine.accuracy.results import results_of
+
+    return [result.name for result in results_of(plan.asked)]
+
+
+def relative_errors(group: xr.Dataset, name: str = "observed_error") -> Array:
+    """(n, R) errors over the tolerances of their results; NaN where these are only told."""
+    tighter = np.asarray(group["tolerance_asked"].values)[:, None]  # `solver.tolerance` over the study's
+    return np.asarray(group[name].values / (np.asarray(group["tolerance"].values) * tighter), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What an audit found among the variants that the archive calls ok.
+
+    worst: the largest observed error over its tolerance, NaN where none is known; place, result: its number in the
+    group, and the result. missed: variants beyond a tolerance. unknown: those without a number. marked: variants to
+    which the archive itself gives another status than ok, and so no promise; marked_worst: the largest among them.
+    """
+
+    count: int
+    left_out: int
+    worst: float
+    place: int
+    result: int
+    missed: int
+    unknown: int
+    marked: int
+    marked_worst: float
+
+    @property
+    def held(self) -> bool:
+        """Whether every audited variant that the archive calls ok is known to be within its tolerance."""
+        return not (self.missed or self.unknown)
+
+    @classmethod
+    def of(cls, group: xr.Dataset) -> Verdict:
+        """The verdict of the archive's group."""
+        errors = relative_errors(group)
+        held = np.isfinite(group["tolerance"].values)
+        over = np.max(np.where(held, errors, -1.0), axis=1, initial=-1.0)  # one that is not known makes it NaN
+        ours = np.asarray(group["variant_status"].values) == int(Status.OK)
+        known = ~np.isnan(over)
+        place = int(np.argmax(np.where(known & ours, over, -1.0)))
+        return cls(
+            count=int(np.count_nonzero(ours)),
+            left_out=int(group["left_out"]),
+            worst=float(over[place]) if ours[place] else np.nan,
+            place=place,
+            result=int(np.nanargmax(np.where(np.isnan(errors[place]), -1.0, errors[place]))),
+            missed=int(np.count_nonzero(over[known & ours] > 1.0)),
+            unknown=int(np.count_nonzero(~known & ours)),
+            marked=int(np.count_nonzero(~ours)),
+            marked_worst=float(over[known & ~ours].max()) if (known & ~ours).any() else np.nan,
+        )
+
+
+def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
+    """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
+    if group is None:
+        left_open = is_marched(results) and results.study.solver.audit == "auto"
+        return [NONE_AUDITED] if left_open and bool(results.kept.any()) else []
+    verdict = Verdict.of(group)
+    told = [_told(group, verdict, results)] if verdict.count else []
+    if verdict.missed:
+        told.append(f"the tolerance was not held: {verdict.missed} of {counted(verdict.count, 'variant')} missed it")
+    if verdict.unknown:
+        told.append(f"{counted(verdict.unknown, 'variant')} could not be compared, which counts as not held")
+    if verdict.marked:
+        found = f"; there it found at most {verdict.marked_worst:.2g} of it" if verdict.marked_worst >= 0.0 else ""
+        also = "further " if verdict.count else ""
+        told.append(f"audit of {counted(verdict.marked, f'{also}variant')} that the archive marks itself{found}")
+    if verdict.left_out:
+        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit had no values")
+    return told
+
+
+def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
+    """The sentence on variants that the archive calls ok."""
+    said = f"audit of {counted(verdict.count, 'variant')} found "
+    if not np.isfinite(verdict.worst) or verdict.worst < 0.0:
+        return f"{said}no number to compare"
+    asked, observed, name = _worst(group, verdict)
+    at = results.at(results.index_of(int(group["sample"].values[verdict.place])))
+    return f"asked {scientific(asked)}, {said}at most {scientific(observed)}, worst{f' at {at}' if at else ''} ({name})"
+
+
+def _worst(group: xr.Dataset, verdict: Verdict) -> tuple[float, float, str]:
+    """The tolerance and the observed error of the worst result, and its name."""
+    tighter = float(group["tolerance_asked"].values[verdict.place])
+    asked = float(group["tolerance"].values[verdict.result]) * tighter
+    return asked, verdict.worst * asked, str(group["result"].values[verdict.result])
+
+
+def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
+    """What `run --json` says of it."""
+    verdict = Verdict.of(group)
+    place = dict(zip(results.dims, results.index_of(int(group["sample"].values[verdict.place])), strict=True))
+    asked, observed, name = _worst(group, verdict)
+    return {
+        "variants": verdict.count,
+        "marked": verdict.marked,
+        "left_out": verdict.left_out,
+        "not_compared": verdict.unknown,
+        "tolerance": asked,
+        "largest_observed_error": observed,
+        "worst_result": name,
+        "at": {axis.name: float(axis.values[place[axis.dim]]) for axis in results.axes},
+        "held": verdict.held,
+    }

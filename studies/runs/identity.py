@@ -1,0 +1,61 @@
+"""What the results of a run belong to: the study, the contents of the files that it names, and the program."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
+
+PROGRAM = Path(__file__).parents[2]
+PACKAGES = ("engine", "results_schema", "studies")
+DRAWING = PROGRAM / "studies" / "pictures"  # of what is finished: no number depends on it
+LIBRARIES = ("numpy", "scipy")  # numba and its compiler belong to the kernels' hash
+
+
+def files_of(study: Study) -> dict[str, str]:
+    """SHA-256 by path of every file that the bodies of a study are made of, included ones too."""
+    return {path: digest for body in study.body.values() for path, digest in body.hashes}
+
+
+def check_unchanged(study: Study) -> None:
+    """Refuse a model whose files are no longer those that the study was read with. Raises BadInput."""
+    for path, digest in files_of(study).items():
+        file = Path(path)
+        if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+            raise BadInput(
+                "a file of the model has changed while the study ran",
+                where=path,
+                expected="the file as it was when the study was read",
+                remedy="run again",
+            )
+
+
+def run_key(study: Study, names: Sequence[str] = ()) -> str:
+    """What finished parts belong to: the study's text, the files of its bodies, the names of its pieces, and all that
+    makes numbers: kernels, sources and libraries."""
+    from engine.kernels.jit import kernel_hash
+
+    texts = [study.source.sha256, *files_of(study).values(), *names, kernel_hash(), sources_hash(sources())]
+    texts += [f"{library} {version(library)}" for library in LIBRARIES]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()
+
+
+def sources() -> list[Path]:
+    """Every source of ours that has a say in the numbers of parts."""
+    found = [path for package in PACKAGES for path in (PROGRAM / package).rglob("*.py")]
+    return sorted(path for path in found if not path.is_relative_to(DRAWING))
+
+
+def sources_hash(paths: Sequence[Path]) -> str:
+    """SHA-256 over names and texts of sources."""
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(str(path.relative_to(PROGRAM)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()

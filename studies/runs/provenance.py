@@ -1,0 +1,62 @@
+"""What an archive says of its making: the study, the program and its packages, the machine, the time."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from engine.scene.study import Study
+from results_schema.store.archive import FILES, files_text
+from results_schema.store.reading import SCHEMA_VERSION
+from studies.protocol.study import study_attributes
+from studies.runs.identity import files_of
+
+CONVENTIONS = "CF-1.11"
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "xarray", "netCDF4", "dask", "pydantic", "pint")
+
+# The only attributes in which a resumed archive may differ from an uninterrupted one.
+OF_TIME_AND_MACHINE = ("history", "machine", "run_seconds")
+
+
+def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
+    """Root attributes of an archive. key: what the results belong to; seconds: duration of this run."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return {
+        "Conventions": CONVENTIONS,
+        **study_attributes(study),
+        **({FILES: files_text(hashes)} if (hashes := files_of(study)) else {}),
+        "schema_version": SCHEMA_VERSION,
+        "results_key": key,
+        "packages": [f"{name} {_version(name)}" for name in ("wanderlast", *PACKAGES)],
+        "python": platform.python_version(),
+        "machine": machine(),
+        "run_seconds": round(seconds, 3),
+        "history": f"{now} wanderlast {_version('wanderlast')}: run of {study.kind}",
+    }
+
+
+def machine() -> str:
+    """The machine in one line: processor, number of cores, system."""
+    cores = len(os.sched_getaffinity(0))
+    return f"{_processor()}, {cores} core{'s' if cores > 1 else ''}, {platform.system()} {platform.release()}"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.machine())
