@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.ladder import REFERENCE_PART, Measured
+from engine.accuracy.ladder import Measured
+from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.choice import nearest
 from engine.march.outcome import Asked
@@ -68,12 +69,10 @@ def telling_of(asked: Asked, measured: Measured, others: Numbers, span: tuple[fl
 
 
 def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> Array:
-    """(P, R) errors of references; those that are off by more than was asked of them count as if they were not, as
-    dearer marches of their neighbours could not be told to hold either."""
-    asked: Array = np.array(
-        [REFERENCE_PART * result.tolerance * (least if result.follows else 1.0) for result in results]
-    )
-    return np.where(asked < measured.reference.T, 0.0, measured.reference.T)
+    """(P, R) errors of references; those that are off by more than they may ever be count as if they were not, as
+    dearer marches of their neighbours could hardly be told to hold."""
+    most: Array = np.array([DOUBTED * r.tolerance * (least if r.follows else 1.0) for r in results])
+    return np.where(most < measured.reference.T, 0.0, measured.reference.T)
 
 
 def all_but(spare: int, errors: Array, axis: int) -> Array:

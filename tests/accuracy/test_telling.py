@@ -81,7 +81,7 @@ def test_margins_are_what_pilots_that_are_left_out_need() -> None:
     np.testing.assert_allclose(found.held[0, 0, 20], 0.2, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("reference", "decides"), [(0.2, 0.3), (3.0, 0.1)])
+@pytest.mark.parametrize(("reference", "decides"), [(0.2, 0.3), (0.39, 0.49), (3.0, 0.1)])
 def test_references_that_do_not_settle_are_told_but_do_not_decide(reference: float, decides: float) -> None:
     given = measured(np.full(COUNT, 0.1 * TOLERANCE), reference * TOLERANCE)
     found = telling_of(asked(), given, others(), (1.0, 1.0), 0)
