@@ -150,8 +150,8 @@ def unreduced_model(
     """The whole model of a study without sweep.
 
     Only modes that the reduced bodies keep are damped by a damping ratio, as there; Rayleigh damping and dampers are
-    exact. paces, delays: as of `engine.model.scene_model.build_model`. Raises BadInput for a body without a whole model, and for
-    a fidelity other than "auto".
+    exact. paces, delays: as of `engine.model.scene_model.build_model`. Raises BadInput for a body without a whole
+    model, and for a fidelity other than "auto".
     """
     if study.solver.fidelity not in ("auto", "full"):
         where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'

@@ -72,8 +72,8 @@ class Piece:
 class MeasuringKind(Protocol):
     """A kind of study that is computed in pieces. settings: the class of its table [question].
 
-    name, summary, question: as of every kind (see `studies.protocol.study.Kind`). sweeps: whether it takes a [sweep], whose grid
-    is then that of its results; else it measures, and a method that fails is an answer.
+    name, summary, question: as of every kind (see `studies.protocol.study.Kind`). sweeps: whether it takes a [sweep],
+    whose grid is then that of its results; else it measures, and a method that fails is an answer.
     """
 
     name: str
