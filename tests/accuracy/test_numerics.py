@@ -18,7 +18,7 @@ from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files
 from tests.engine.build import beam, cruise, fixed
 from tests.engine.riders import FLEXIBLE, THREE, riding
-from tests.engine.test_unreduced import frame
+from tests.unreduced.test_unreduced import frame
 
 
 def test_it_is_a_value() -> None:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from studies.findings.peaks import PEAKS, Peaks, peaks
+from tests.findings.test_indices import waves
 from tests.naive import indices as naive
-from tests.studies.test_indices import waves
 
 Array = NDArray[np.float64]
 

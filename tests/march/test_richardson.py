@@ -22,10 +22,10 @@ from engine.model.variant_values import padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
 from results_schema.status import Status
+from tests.batch.test_determinism import digest, mixed
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.keeping import Kept
 from tests.engine.reading import Reading
-from tests.engine.test_determinism import digest, mixed
 from tests.engine.twin import solve_twin
 
 Array = NDArray[np.float64]

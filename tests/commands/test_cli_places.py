@@ -12,8 +12,8 @@ import pytest
 
 from results_schema.store import files
 from studies.commands.cli import main
+from tests.commands.test_cli import Captured, here, refused
 from tests.studies.small import SMALL, write
-from tests.studies.test_cli import Captured, here, refused
 
 __all__ = ["here"]  # a fixture
 

@@ -23,9 +23,9 @@ from studies.pictures.common.figures import BLUE, MUTED, Figure
 from studies.reporting.report import write_report
 from studies.results.results import Results
 from studies.runs.runner import Outcome
+from tests.pictures.test_figures import sweeps
+from tests.pictures.test_report import check_standing_alone
 from tests.studies import at_rest, scenes
-from tests.studies.test_figures import sweeps
-from tests.studies.test_report import check_standing_alone
 
 SPEEDS = 'pace = { of = "carriage.table.motion.speed", values = [6, 2, 4] }'
 MASSES = 'mass = { of = "carriage.table.mass", values = [10, 20] }'

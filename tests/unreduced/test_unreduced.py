@@ -145,7 +145,7 @@ def test_contacts_count(part: str, monkeypatch: pytest.MonkeyPatch) -> None:
         "damping of modes": {"body.bed.damping_ratio": 0.0},
     }
     other = unreduced_model(given.with_values(changed[part]))
-    monkeypatch.setattr("tests.engine.test_unreduced.unreduced_model", lambda study: other)
+    monkeypatch.setattr("tests.unreduced.test_unreduced.unreduced_model", lambda study: other)
     assert max(apart(given).values()) > 1e-3
 
 

@@ -20,8 +20,8 @@ from results_schema.errors import BadInput
 from tests.bodies.frames import straight
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.engine.reading import Reading
-from tests.engine.test_twin import assert_close
 from tests.engine.twin import march_twin
+from tests.march.test_twin import assert_close
 
 ALL = {"histories": "all"}
 SPRINGS = [{"at": 0.0, "stiffness": 60.0, "damping": 2.0}, {"at": 1.0, "stiffness": 90.0}]

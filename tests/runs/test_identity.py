@@ -36,10 +36,10 @@ from studies.runs.identity import PROGRAM, run_key, sources, sources_hash
 from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files, in_process
+from tests.commands.test_cli_interrupted import after_parts, assert_same_results
+from tests.protocol.test_measuring import after_pieces
 from tests.studies import at_rest, imported
 from tests.studies.small import SCENES, SMALL, write
-from tests.studies.test_cli_interrupted import after_parts, assert_same_results
-from tests.studies.test_measuring import after_pieces
 
 Captured = pytest.CaptureFixture[str]
 

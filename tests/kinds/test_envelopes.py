@@ -22,11 +22,11 @@ from studies.reporting.report import write_report
 from studies.results.results import Results
 from studies.runs import part_writer as gathering
 from studies.runs.runner import run_to_archive
+from tests.commands.test_cli_interrupted import after_parts, assert_same_results
+from tests.pictures.test_report import archive, check_standing_alone
 from tests.scene.mutations import mutations, survives
 from tests.studies import scenes
 from tests.studies.small import SCENES, write
-from tests.studies.test_cli_interrupted import after_parts, assert_same_results
-from tests.studies.test_report import archive, check_standing_alone
 
 EXTRA = """\
 [envelope.shape]

@@ -62,7 +62,7 @@ import json, sys
 import numpy as np
 sys.path.insert(0, sys.argv[1])
 import engine.march.march
-from tests.engine.test_kernels import numbers_of, small
+from tests.kernels.test_kernels import numbers_of, small
 print(json.dumps({name: numbers_of(small(name)) for name in sys.argv[3:]}))
 if sys.argv[2] == "break":  # histories go to a row that is not there
     sampled = engine.march.march.rows_sampled

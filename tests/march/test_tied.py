@@ -11,7 +11,7 @@ import pytest
 from engine.scene.study import Study
 from tests.engine import twin as twins
 from tests.engine.build import aboard, beam, cruise, fixed, mass, oscillator, shuttle, swing, under
-from tests.engine.test_twin import DAMPED, ENTERING, SPRINGS, WAYPOINTS, case, compare, scheme
+from tests.march.test_twin import DAMPED, ENTERING, SPRINGS, WAYPOINTS, case, compare, scheme
 from tests.naive import scene as scenes
 
 CROSSING = cruise(0.0, 1.0, 0.8)

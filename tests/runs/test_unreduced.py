@@ -18,7 +18,7 @@ from studies.reporting.report import write_report
 from studies.runs import unreduced
 from studies.runs.runner import run_to_archive
 from tests.engine.build import beam, cruise, fixed, mass, shuttle
-from tests.engine.test_unreduced import RIGID, frame, riding
+from tests.unreduced.test_unreduced import RIGID, frame, riding
 
 SENSORS = {"middle": fixed(0.5), "aboard": fixed(0.2, body="table"), "moment": fixed(0.3713, "bending_moment")}
 
