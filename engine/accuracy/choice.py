@@ -20,7 +20,7 @@ from engine.accuracy.results import Result, results_of
 from engine.accuracy.telling import TELLING, Telling, others_of, telling_of
 from engine.kernels.choice import cheapest, nearest
 from engine.march.outcome import Asked
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.sweep import Cases
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def choose(
             columns = cases.columns_of(own)
             if TOLERANCE in columns:  # pilots serve the tightest that has them for neighbours
                 columns = {**columns, TOLERANCE: np.full(own.size, span[0] * asked.study.solver.tolerance)}
-            values = LaneValues(grid.scene.study, columns, own.size)
+            values = VariantValues(grid.scene.study, columns, own.size)
             climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, within, span))
     across([climb.go for climb in climbs])
     return _chosen(asked, cases, climbs, np.concatenate([own for own in parts if own.size]), share)

@@ -17,7 +17,7 @@ from engine.march.tables import SceneTables, StaticUnit
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel, with_numerics
 from engine.model.timeline import Grid, build_grid, refined
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.kinks import stops
 from engine.scene.sensors import MOST_PLACES
 
@@ -43,7 +43,7 @@ class SceneGrid:
 
     asked: Asked
     scene: SceneModel
-    values: LaneValues
+    values: VariantValues
     unit: int
     places: int = MOST_PLACES
     _models: dict[Numerics, SceneModel] = field(default_factory=dict)
@@ -129,7 +129,7 @@ class SceneGrid:
         by *= model.scheme.stride
         return self.grid.stations(by, self.free_by(model, by), MOST_COMPARED)
 
-    def safe_cuts(self, numerics: Numerics, values: LaneValues, by: int) -> Counts:
+    def safe_cuts(self, numerics: Numerics, values: VariantValues, by: int) -> Counts:
         """(V,) ``by``, or the least power of two of steps that no variant's rules forbid."""
         if self.fixed or numerics.fidelity == "static":
             return np.full(values.size, by, dtype=np.int64)
@@ -138,7 +138,7 @@ class SceneGrid:
         return by * np.exp2(np.ceil(np.log2(np.maximum(times, 1.0)) - 1e-9)).astype(np.int64)
 
 
-def fixed_steps(values: LaneValues) -> bool:
+def fixed_steps(values: VariantValues) -> bool:
     """Whether the study says how many steps."""
     return values.study.solver.steps != "auto" or "solver.steps" in values.columns
 

@@ -14,13 +14,13 @@ from engine.accuracy.choice import Choice
 from engine.accuracy.grids import MOST_COMPARED, SceneGrid
 from engine.accuracy.reference import USUAL_LEVEL, Halted, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
-from engine.kernels.layout import MARKS
+from engine.kernels.layout import STATISTICS
 from engine.march.outcome import Flat, Outcome, outcome, used
 from engine.march.tables import SceneTables
 from engine.model.numerics import Numerics
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import MOST_STATIONS
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -56,7 +56,7 @@ class Group:
 
     @abstractmethod
     def found(
-        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
     ) -> Found:
         """The results of some of its variants; kept: with the histories at the grid's stations or not. Raises
         Halted."""
@@ -83,7 +83,7 @@ class Group:
 
     @property
     def chunk_bytes(self) -> float:
-        """Bytes of a variant's histories and marks while it is marched."""
+        """Bytes of a variant's histories and statistics while it is marched."""
         asked, study = self.grid.asked, self.scene.study
         steps = self.usual_steps
         rows = (
@@ -93,7 +93,7 @@ class Group:
         )
         places = max((envelope.places for envelope in study.envelope.values()), default=0)
         signals = len(study.sensor) + len(self.scene.carriages)
-        found = 8.0 * rows * max(1, len(study.sensor)) + 8.0 * MARKS * max(signals, places)
+        found = 8.0 * rows * max(1, len(study.sensor)) + 8.0 * STATISTICS * max(signals, places)
         pair = 24.0 * min(steps, MOST_STATIONS) * max(signals, places)  # which has all histories of a segment
         return found + (pair if self.scene.scheme.stride > 1 else 0.0)
 
@@ -138,7 +138,7 @@ class MarchGroup(Group):
         return float(self.model.body_modes * self.tables.steps)
 
     def found(
-        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
     ) -> Found:
         results = results_of(self.grid.asked)
         stations = self.grid.stations(self.model, self.by)
@@ -183,7 +183,7 @@ class ConvergingGroup(Group):
         return self.grid.tables(self.grid.model(as_fixed(self.grid).numerics[0]), 1)
 
     def found(
-        self, values: LaneValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
     ) -> Found:
         asked, results = self.grid.asked, results_of(self.grid.asked)
         levels = as_fixed(self.grid)

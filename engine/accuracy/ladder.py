@@ -22,7 +22,7 @@ from engine.march.outcome import Asked, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ class Climb:
     the study's; ``values`` have the least. share: does marches that need not wait for each other."""
 
     grid: SceneGrid
-    values: LaneValues
+    values: VariantValues
     ladder: Ladder
     halted: Halted
     share: Share

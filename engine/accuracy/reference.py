@@ -28,7 +28,7 @@ from engine.kernels.schemes import Scheme
 from engine.march.outcome import Flat, Outcome, outcome, used
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -125,7 +125,7 @@ def is_free(grid: SceneGrid) -> bool:
 
 def converge(
     grid: SceneGrid,
-    values: LaneValues,
+    values: VariantValues,
     levels: Levels,
     part: float,
     beyond: int = 0,
@@ -169,7 +169,7 @@ def converge(
     return found
 
 
-def _is_dear(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> NDArray[np.bool_]:
+def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> NDArray[np.bool_]:
     """(V,) whether a level takes more work, over the whole time, than a closer reference is worth."""
     if level == len(levels.numerics):
         return np.zeros(values.size, dtype=np.bool_)
@@ -195,7 +195,7 @@ def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: 
 
 
 def _march(
-    grid: SceneGrid, levels: Levels, values: LaneValues, level: int, *, halted: Halted, share: Share
+    grid: SceneGrid, levels: Levels, values: VariantValues, level: int, *, halted: Halted, share: Share
 ) -> tuple[Outcome, Flat]:
     """One level of variants, each with its own number of steps."""
     model, by = grid.model(levels.numerics[level]), _by(grid, values, levels, level)
@@ -224,7 +224,7 @@ def _room(of: Outcome, size: int) -> Outcome:
     return of.of(np.zeros(size, dtype=np.int64))
 
 
-def _by(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> Counts:
+def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Counts:
     """(V,) steps of a level in one of the grid's: powers of two, so that variants share tables."""
     if levels.steps == "as the study says":
         return np.ones(values.size, dtype=np.int64)
@@ -238,7 +238,7 @@ def _by(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> Coun
     return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(wanted, own) / grid.unit).clip(0.0) - 1e-9)), dtype=np.int64)
 
 
-def _may_march(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> NDArray[np.bool_]:
+def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> NDArray[np.bool_]:
     """(V,) whether a level is worth its work, and within the rules that no march may break."""
     if levels.steps == "as the study says":
         numerics = levels.numerics[level]
@@ -262,7 +262,7 @@ def _units(grid: SceneGrid) -> float:
     return max(rider.end for rider in grid.scene.riders)
 
 
-def level_work(grid: SceneGrid, values: LaneValues, levels: Levels, level: int) -> Array:
+def level_work(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Array:
     """(V,) modes x steps of a level over one passage or cycle."""
     model = grid.model(levels.numerics[level])
     return np.asarray(model.body_modes * grid.unit * model.scheme.stride * _by(grid, values, levels, level), np.float64)

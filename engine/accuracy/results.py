@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engine.march.envelopes import envelope_names
 from engine.march.outcome import Asked, Outcome
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneValues, weights
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.reduction import HISTORY_PART, Compared
 from engine.scene.study import Study
@@ -44,7 +44,7 @@ class Pair(NamedTuple):
 
     asked: Asked
     model: SceneModel
-    values: LaneValues
+    values: VariantValues
     one: Outcome
     other: Outcome
     apart: Array
@@ -161,7 +161,7 @@ def results_of(asked: Asked) -> tuple[Result, ...]:
     return tuple(result for family in FAMILIES for result in family.results(asked))
 
 
-def differences(asked: Asked, model: SceneModel, values: LaneValues, one: Outcome, other: Outcome) -> Array:
+def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Outcome, other: Outcome) -> Array:
     """(R, V) how far two outcomes of the same variants are apart, by result: over the scale of each that ``other`` has.
     Infinite where only ``one`` has diverged, NaN where the other has."""
     with np.errstate(invalid="ignore", over="ignore"):  # of those that have diverged

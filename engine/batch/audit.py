@@ -28,7 +28,7 @@ from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from results_schema.status import Status
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) 
     found: list[Audit] = []
 
     def of_scene(grid: SceneGrid, own: Counts) -> None:
-        values = LaneValues(grid.scene.study, plan.cases.columns_of(own), own.size)
+        values = VariantValues(grid.scene.study, plan.cases.columns_of(own), own.size)
         truth = converge(grid, values, in_full(grid), REFERENCE_PART, beyond=1, halted=halted, share=within)
         groups = [g for g in plan.groups if g.grid is grid and np.isin(own, g.variants).any()]
         within([partial(compare, group, own, truth) for group in groups])

@@ -11,7 +11,7 @@ from engine.accuracy.results import results_of, tolerances
 from engine.batch.plan import Plan
 from engine.march.envelopes import envelope_places
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneValues, moving_mass
+from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases
 from results_schema.store.parts import Rows, joined
 from results_schema.variables import QUANTITY_UNITS, Variable, axes, declarations, expand
@@ -87,7 +87,7 @@ def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
     """The bodies of an unswept scene, by group: frequencies, damping and mode shapes on the track, length and mass."""
     import xarray as xr
 
-    values = LaneValues(model.study, {}, 1)
+    values = VariantValues(model.study, {}, 1)
     declared = {variable.name: variable for variable in declarations("/model")}
     found = {}
     for part in model.bodies:

@@ -166,13 +166,13 @@ def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
 def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
     from engine.march.march import Halted
-    from engine.march.richardson import march_chosen
+    from engine.march.richardson import march_scheme
     from engine.march.tables import SceneTables
 
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
     with suppress(Halted):
         values = grid.values.part(np.zeros(1, dtype=np.int64)).padded
-        march_chosen(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
+        march_scheme(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 
 def _compute(

@@ -27,7 +27,7 @@ from engine.march.tables import SceneTables
 from engine.model.distinct_models import base_scene, scenes, split
 from engine.model.scene_model import SceneModel, check_moves
 from engine.model.timeline import Window
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
 from engine.observation.reduction import Reduction
 from engine.scene.study import Study
@@ -38,7 +38,7 @@ from results_schema.variables import declarations, registered
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-CheckSteps = Callable[[SceneModel, LaneValues, Counts], None]
+CheckSteps = Callable[[SceneModel, VariantValues, Counts], None]
 
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that
 LEAST_TASK_SECONDS = 0.05  # of one chunk: less is not worth its overhead
@@ -125,7 +125,7 @@ class Plan:
         """Variants on a rung, those that must take more steps apart."""
         ladder = ladder_of(self.asked, grid)
         column, cut = divmod(rung, len(ladder.cuts))
-        values = LaneValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
+        values = VariantValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
         numerics = ladder.columns[column]
         by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
         pace = values.time_scale(grid.scene.carriages[0].name)
@@ -187,9 +187,9 @@ class Plan:
             lanes = min(lanes, group.variants.size // 2 + LANES)
         return int(np.clip(lanes // LANES * LANES, LANES, MOST_LANES))
 
-    def values(self, group: Group, variants: Counts) -> LaneValues:
+    def values(self, group: Group, variants: Counts) -> VariantValues:
         """Numbers of some variants of a group."""
-        return LaneValues(group.scene.study, self.cases.columns_of(variants), variants.size)
+        return VariantValues(group.scene.study, self.cases.columns_of(variants), variants.size)
 
 
 def _even(size: int, most: int) -> int:
@@ -234,7 +234,7 @@ def _grids(
     asked: Asked, cases: Cases, scene: SceneModel, variants: Counts, check_steps: CheckSteps
 ) -> Iterator[tuple[SceneGrid, Counts]]:
     """The variants of a scene, by their steps where the study fixes these. Raises BadInput."""
-    values = LaneValues(scene.study, cases.columns_of(variants), variants.size)
+    values = VariantValues(scene.study, cases.columns_of(variants), variants.size)
     check_readings(scene, asked.window)
     if scene.fidelity is Fidelity.STATIC or not fixed_steps(values):
         if scene.fidelity is not Fidelity.STATIC:

@@ -93,9 +93,9 @@ def kernel(function: Callable[..., None]) -> Callable[..., None]:
 def _mended(load: Callable[..., Any]) -> Callable[..., Any]:
     """Loads as ``load`` does; a cache that cannot be read is thrown away and holds nothing."""
 
-    def load_or_forget(*given: Any) -> Any:
+    def load_or_forget(*prescribed: Any) -> Any:
         try:
-            return load(*given)
+            return load(*prescribed)
         except Exception:  # whatever garbage in its files leads to
             shutil.rmtree(_FOLDER, ignore_errors=True)
             _private(_FOLDER)

@@ -29,7 +29,7 @@ class Ties(NamedTuple):
     drive: (stations, ties): the same kinematics of the track's own unevenness (per unit gravity where it is the
            body's sag).
     level: (stations, ties): likewise its gap.
-    reacting, given: numbers of the ties whose force depends on the motion, and of those that are dead loads.
+    reactive, prescribed: numbers of the ties whose force depends on the motion, and of those that are dead loads.
     moves, springs (ties): whether a tie's force depends on its kinematics, and whether on its gap.
     residual: (stations, ties, ties), m/N: what the kept modes miss of the gap of a spring (row) per unit force of any
            tie (column); (0, 0, 0) where they miss nothing.
@@ -40,8 +40,8 @@ class Ties(NamedTuple):
     rows: FloatArray
     drive: FloatArray
     level: FloatArray
-    reacting: IntArray
-    given: IntArray
+    reactive: IntArray
+    prescribed: IntArray
     moves: BoolArray
     springs: BoolArray
     residual: FloatArray
@@ -53,17 +53,18 @@ class Lanes(NamedTuple):
     """What differs from variant to variant.
 
     stiffness (blocks, modes, LANES): (omega h)^2;  damping (blocks, modes, LANES): 2 zeta omega h;
-    mobility (blocks, modes, LANES): acceleration per unit modal force, 1 for a mode of unit modal mass, 1/m for a
-    coordinate that is the place of a mass m;
-    gain (blocks, ties, LANES): m (kg), or c h for a damper;  stiff (blocks, ties, LANES): k h^2 of a spring;
+    inverse_modal_mass (blocks, modes, LANES): acceleration per unit modal force, 1 for a mode of unit modal mass, 1/m
+    for a coordinate that is the place of a mass m;
+    coupling_mass (blocks, ties, LANES): m (kg), or c h for a damper;
+    coupling_stiffness (blocks, ties, LANES): k h^2 of a spring;
     load (blocks, ties, LANES): the tie's dead load times h^2;  gravity, step (blocks, LANES): m/s^2, and h in s.
     """
 
     stiffness: FloatArray
     damping: FloatArray
-    mobility: FloatArray
-    gain: FloatArray
-    stiff: FloatArray
+    inverse_modal_mass: FloatArray
+    coupling_mass: FloatArray
+    coupling_stiffness: FloatArray
     load: FloatArray
     gravity: FloatArray
     step: FloatArray
@@ -81,7 +82,7 @@ class State(NamedTuple):
     memory: FloatArray
 
 
-class Watch(NamedTuple):
+class Observation(NamedTuple):
     """Which sums of the modal coordinates are observed at every step, and how they make signals.
 
     Channels are ordered by what they multiply: displacement, velocity, acceleration. A row array has one station
@@ -110,25 +111,25 @@ class Watch(NamedTuple):
 class Record(NamedTuple):
     """What is kept of the signals; updated in place.
 
-    marks (blocks, signals, MARKS, LANES): the columns named below; counts are -1 where there is none.
+    statistics (blocks, signals, STATISTICS, LANES): the columns named below; counts are -1 where there is none.
     sample (stations): row of ``history`` that a station fills, or -1.
     history (blocks, rows, sensors, LANES): of the first signals, as many as it has room for; NaN where a signal
     does not count.
     """
 
-    marks: FloatArray
+    statistics: FloatArray
     sample: IntArray
     history: FloatArray
 
 
-# columns of Record.marks: extremes and the counts of the stations where they occur, the first count with a negative
-# value, the integral of the square over time and how long it took (s), the magnitude beyond which a variant has
-# diverged, the first count where it had, the value at the station observed last
+# columns of Record.statistics: extremes and the counts of the stations where they occur, the first count with a
+# negative value, the integral of the square over time and how long it took (s), the magnitude beyond which a variant
+# has diverged, the first count where it had, the value at the station observed last
 LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, BELOW_AT, SQUARES, SECONDS, BOUND, DIVERGED_AT, VALUE = range(10)
-MARKS = 10
+STATISTICS = 10
 
 
-class Blow(NamedTuple):
+class Impulse(NamedTuple):
     """An impulse on the body: ties that arrive or reverse at one instant, and all that are in contact then.
 
     shape, slope (ties, modes): phi and phi' where each touches;  sag_slope (ties): slope of the body's own sag per

@@ -5,7 +5,7 @@ from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE
 
 
 @kernel
-def add_grip(rows, tie, first, factor, shapes, motion):
+def add_attachment(rows, tie, first, factor, shapes, motion):
     """Add a place where a tie holds a body to its rows p, A and B.
 
     rows (stations, modes, ties, 4);  first: number of the body's first mode;  factor: the force there over the tie's;

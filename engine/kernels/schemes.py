@@ -202,7 +202,7 @@ def generalized_alpha(rho_inf: float) -> AlphaScheme:
 
 
 def _newmark(name: str, beta: float) -> Callable[[Mapping[str, float]], Scheme]:
-    return lambda given: NewmarkScheme(name, beta, 0.5)
+    return lambda prescribed: NewmarkScheme(name, beta, 0.5)
 
 
 #: The scheme where the study names none and nothing speaks for another.
@@ -214,9 +214,11 @@ SCHEMES: Mapping[str, Callable[[Mapping[str, float]], Scheme]] = {
     "linear-acceleration": _newmark("linear-acceleration", 1 / 6),
     "fox-goodwin": _newmark("fox-goodwin", 1 / 12),
     "central-difference": _newmark("central-difference", 0.0),
-    "newmark": lambda given: NewmarkScheme("newmark", given["beta"], given["gamma"], 2 if given["gamma"] == 0.5 else 1),
-    "hht-alpha": lambda given: hht_alpha(given["alpha"]),
-    "generalized-alpha": lambda given: generalized_alpha(given["rho_inf"]),
+    "newmark": lambda prescribed: NewmarkScheme(
+        "newmark", prescribed["beta"], prescribed["gamma"], 2 if prescribed["gamma"] == 0.5 else 1
+    ),
+    "hht-alpha": lambda prescribed: hht_alpha(prescribed["alpha"]),
+    "generalized-alpha": lambda prescribed: generalized_alpha(prescribed["rho_inf"]),
     # average acceleration with h and 2h: the march is the same, `engine.march.richardson` makes the pair
-    "richardson": lambda given: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2),
+    "richardson": lambda prescribed: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2),
 }

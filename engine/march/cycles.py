@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.march.tables import SceneTables
-from engine.model.variant_values import LaneValues, weights
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.reduction import Cycle, Reduction
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ Counts = NDArray[np.int64]
 
 
 def reduced(
-    reduction: Reduction | None, tables: SceneTables, values: LaneValues, counts: Counts, history: Array
+    reduction: Reduction | None, tables: SceneTables, values: VariantValues, counts: Counts, history: Array
 ) -> dict[str, NDArray[Any]]:
     """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
     if reduction is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from engine.march.tables import Missed, SceneTables, SegmentTable
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
+from engine.model.station_path import StationPath
 from engine.model.timeline import Segment, coarsened
 from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
@@ -43,11 +43,11 @@ class Places(Sensor):
     every: Array
     known: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
-    def places(self, along: tuple[Way, ...]) -> Array:
+    def places(self, along: tuple[StationPath, ...]) -> Array:
         """(X, 1), to be broadcast against loads."""
         return self.every[:, None]
 
-    def lines(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
+    def lines(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array) -> Array:
         """(X, S) static readings per unit force at places of the track (S,)."""
         found = self.known.get(id(loaded))
         if found is None:
@@ -62,7 +62,7 @@ class Place(Sensor):
     number: int
     together: Places
 
-    def _full(self, model: SceneModel, along: tuple[Way, ...], loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
         if isinstance(loaded, str) or loaded.size == 1:
             return super()._full(model, along, loaded)
         return np.asarray(self.together.lines(model, along, loaded)[self.number])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from engine.kernels.layout import State
 from engine.model.attachment import rows
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
+from engine.model.station_path import StationPath
 from engine.model.track import rate_rows
 from engine.model.variant_values import LaneTable
 from engine.statics.equilibrium import StaticState, static_state
@@ -37,30 +37,30 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
     return State(q, v, np.zeros(shape), np.zeros(shape))
 
 
-def _first_places(model: SceneModel) -> tuple[Way, ...]:
+def _first_places(model: SceneModel) -> tuple[StationPath, ...]:
     """Where all riders are at time 0, and their speed per unit of scene time."""
     found = []
     for rider in model.riders:
         change = min(time for time in rider.events() if time > NOW * rider.end)
         path = rider.path(np.zeros(1), 0.0, change)
-        found.append(Way(np.clip(path.S, 0.0, rider.length), path.dS, path.ddS, rider.touches(0.0, change)))
+        found.append(StationPath(np.clip(path.S, 0.0, rider.length), path.dS, path.ddS, rider.touches(0.0, change)))
     return tuple(found)
 
 
-def _coordinates(model: SceneModel, along: tuple[Way, ...], state: StaticState) -> Array:
+def _coordinates(model: SceneModel, along: tuple[StationPath, ...], state: StaticState) -> Array:
     """(N, L) static modal coordinates per unit weight of each carriage and per unit gravity."""
     found = np.zeros((model.omega.size, state.force.shape[2]))
-    for r, grips in enumerate(model.grips):
-        for grip in grips:
-            if grip.rider is None or along[grip.rider].active:
-                part = model.bodies[grip.body]
-                soft = grip.factor * rows(model, grip, along)[0] * part.modal.modal_flexibility
+    for r, attachments in enumerate(model.attachments):
+        for attachment in attachments:
+            if attachment.rider is None or along[attachment.rider].active:
+                part = model.bodies[attachment.body]
+                soft = attachment.factor * rows(model, attachment, along)[0] * part.modal.modal_flexibility
                 found[part.modes] += soft[:, None] * state.force[0, r]
     found[state.loose] = state.coordinate[0]
     return found
 
 
-def _meet(model: SceneModel, lanes: LaneTable, along: tuple[Way, ...], state: tuple[Array, Array]) -> None:
+def _meet(model: SceneModel, lanes: LaneTable, along: tuple[StationPath, ...], state: tuple[Array, Array]) -> None:
     """Speeds at which bodies on rigid joints follow the track from the first instant, while that is at rest like under
     a rigid mass: the smallest ones,  y' = v (v.v)^-1 s' (phi'.q + sag')."""
     joints = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.rigid]
@@ -69,7 +69,7 @@ def _meet(model: SceneModel, lanes: LaneTable, along: tuple[Way, ...], state: tu
     q, v = state
     rows, slope, sag = rate_rows(model, joints, along)
     for place, r in enumerate(joints):
-        rows[model.bodies[model.grips[r][0].body].modes, place] = 0.0
+        rows[model.bodies[model.attachments[r][0].body].modes, place] = 0.0
     rate = np.einsum("kr,bkj->rbj", slope, q) + sag[:, None, None] * lanes.gravity
     pull = np.linalg.lstsq(rows.T @ rows, (rate / lanes.time_scale).reshape(len(joints), -1), rcond=None)[0]
     v -= np.einsum("kr,rbj->bkj", rows, pull.reshape(rate.shape))

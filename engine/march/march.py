@@ -15,22 +15,22 @@ from engine.kernels.layout import (
     LANES,
     LARGEST,
     LARGEST_AT,
-    MARKS,
     SMALLEST,
     SMALLEST_AT,
+    STATISTICS,
     Lanes,
+    Observation,
     Record,
     State,
     Ties,
-    Watch,
 )
 from engine.kernels.stepping.march import march_many, march_one
-from engine.kernels.stepping.start import settle, strike, watch_start
+from engine.kernels.stepping.start import solve_initial_acceleration, strike, watch_start
 from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables, SegmentTable
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_blow
-from engine.model.variant_values import LaneTable, LaneValues, from_blocks, lane_table
+from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import rows_sampled
 
@@ -42,12 +42,12 @@ DIVERGED = 1e6  # times its static value a signal has left every meaning
 
 @dataclass(frozen=True, eq=False)
 class Marched:
-    """What a march of V variants leaves: marks (J, MARKS, V) of all signals over the recorded part, of the contact
-    forces before it (C, MARKS, V), the samples of the first signals (H, S, V), and whether the final state is finite
-    (V,)."""
+    """What a march of V variants leaves: statistics (J, STATISTICS, V) of all signals over the recorded part, of the
+    contact forces before it (C, STATISTICS, V), the samples of the first signals (H, S, V), and whether the final state
+    is finite (V,)."""
 
-    marks: Array
-    guard: Array
+    statistics: Array
+    unrecorded: Array
     history: Array
     finite: NDArray[np.bool_]
 
@@ -64,8 +64,8 @@ class March:
     lanes: LaneTable
     counts: Counts
     state: State
-    marks: Array
-    guard: Array
+    statistics: Array
+    unrecorded: Array
     history: Array
 
     def go(self, halted: Callable[[], bool] = lambda: False) -> None:
@@ -90,7 +90,7 @@ class March:
             self._board(segment)
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
         if segment.fresh:
-            settle(table.ties, stepped, self.state)
+            solve_initial_acceleration(table.ties, stepped, self.state)
         if unseen:
             watch_start(table.ties, stepped, self.state, watch, record, segment.first)
         self._steps(segment, table.ties, stepped, watch, record)
@@ -109,13 +109,13 @@ class March:
             if spring.carriage in arriving:
                 self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0
 
-    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Watch, Record]:
+    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Observation, Record]:
         """What is observed along a segment, and where it is kept."""
         if not segment.recorded:
-            return table.guard, Record(self.guard, rows_sampled(segment, self.counts[:0]), self.history)
-        return table.watch, Record(self.marks, rows_sampled(segment, self.counts), self.history)
+            return table.unrecorded, Record(self.unrecorded, rows_sampled(segment, self.counts[:0]), self.history)
+        return table.watch, Record(self.statistics, rows_sampled(segment, self.counts), self.history)
 
-    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Watch, record: Record) -> None:
+    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Observation, record: Record) -> None:
         """The steps of a segment, from its station 0, which is settled and seen."""
         kernel = march_one if self.tables.model.ties == 1 else march_many
         kernel(ties, stepped, self.state, watch, record, self.tables.scheme, segment.first)
@@ -123,27 +123,29 @@ class March:
     def result(self, size: int) -> Marched:
         """What the march of the first ``size`` variants left."""
         finite = np.isfinite(self.state.q).all(axis=1) & np.isfinite(self.state.v).all(axis=1)
-        marks, guard, history = (from_blocks(part, size) for part in (self.marks, self.guard, self.history))
-        return Marched(marks, guard, history, finite.reshape(-1)[:size])
+        statistics, unrecorded, history = (
+            from_blocks(part, size) for part in (self.statistics, self.unrecorded, self.history)
+        )
+        return Marched(statistics, unrecorded, history, finite.reshape(-1)[:size])
 
 
-def prepare(tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None = None) -> March:
+def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None = None) -> March:
     """Set up variants whose number is a multiple of LANES, with signals sampled at ``counts``: the first ``sampled``
     of the tables' signals, or the sensors."""
     lanes = lane_table(tables.model, values)
     blocks = lanes.gravity.shape[0]
     sensors, signals = len(tables.sensors), len(tables.signals)
     guarded = sensors if signals > sensors else 0  # where no contacts are read, all signals stand guard
-    marks, guard = _blank_marks(blocks, signals), _blank_marks(blocks, signals - guarded)
+    statistics, unrecorded = _blank_statistics(blocks, signals), _blank_statistics(blocks, signals - guarded)
     bounds = _bounds(tables, lanes)
-    marks[:, :, BOUND], guard[:, :, BOUND] = bounds, bounds[:, guarded:]
+    statistics[:, :, BOUND], unrecorded[:, :, BOUND] = bounds, bounds[:, guarded:]
     history = np.full((blocks, counts.size, sensors if sampled is None else sampled, LANES), np.nan)
-    return March(tables, lanes, counts, initial_state(tables.model, lanes), marks, guard, history)
+    return March(tables, lanes, counts, initial_state(tables.model, lanes), statistics, unrecorded, history)
 
 
 def march(
     tables: SceneTables,
-    values: LaneValues,
+    values: VariantValues,
     counts: Counts,
     size: int,
     halted: Callable[[], bool] = lambda: False,
@@ -155,11 +157,11 @@ def march(
     return prepared.result(size)
 
 
-def _blank_marks(blocks: int, signals: int) -> Array:
-    marks = np.zeros((blocks, signals, MARKS, LANES))
-    marks[:, :, LARGEST], marks[:, :, SMALLEST] = -np.inf, np.inf
-    marks[:, :, [LARGEST_AT, SMALLEST_AT, BELOW_AT, DIVERGED_AT]] = -1.0
-    return marks
+def _blank_statistics(blocks: int, signals: int) -> Array:
+    statistics = np.zeros((blocks, signals, STATISTICS, LANES))
+    statistics[:, :, LARGEST], statistics[:, :, SMALLEST] = -np.inf, np.inf
+    statistics[:, :, [LARGEST_AT, SMALLEST_AT, BELOW_AT, DIVERGED_AT]] = -1.0
+    return statistics
 
 
 def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:

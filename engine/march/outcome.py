@@ -23,11 +23,11 @@ from engine.kernels.schemes import Scheme
 from engine.march.cycles import reduced
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
-from engine.march.richardson import march_chosen
+from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
-from engine.model.variant_values import LaneValues, weights
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import counts_reduced
 from engine.observation.reduction import Reduction
@@ -104,7 +104,7 @@ class Outcome:
 def outcome(
     asked: Asked,
     tables: SceneTables,
-    values: LaneValues,
+    values: VariantValues,
     stations: Counts,
     halted: Callable[[], bool] = lambda: False,
 ) -> Outcome:
@@ -112,7 +112,7 @@ def outcome(
     own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
     counts = np.unique(np.concatenate([own, stations, *(side.counts for side in tables.kinks)]))
     lanes, size = values.padded, values.size
-    marched = march_chosen(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
+    marched = march_scheme(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
@@ -162,34 +162,39 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
     found: Flat = {}
     for side in tables.kinks:
         reading = np.tensordot(side.weights, marched.history[np.searchsorted(counts, side.counts), side.sensor], 1)
-        _include(marched.marks[side.sensor], reading, side.at)
+        _include(marched.statistics[side.sensor], reading, side.at)
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
-        marks = marched.marks[j]
-        seen = np.isfinite(marks[LARGEST]) | np.isnan(marks[LARGEST])
-        found[f"{sensor.name}_max"] = np.where(seen, marks[LARGEST], np.nan)
-        found[f"{sensor.name}_min"] = np.where(seen, marks[SMALLEST], np.nan)
-        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, marks[LARGEST_AT])
-        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, marks[SMALLEST_AT])
-        found[f"{sensor.name}_rms"] = np.sqrt(marks[SQUARES] / np.where(marks[SECONDS] > 0.0, marks[SECONDS], 1.0))
+        statistics = marched.statistics[j]
+        seen = np.isfinite(statistics[LARGEST]) | np.isnan(statistics[LARGEST])
+        found[f"{sensor.name}_max"] = np.where(seen, statistics[LARGEST], np.nan)
+        found[f"{sensor.name}_min"] = np.where(seen, statistics[SMALLEST], np.nan)
+        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, statistics[LARGEST_AT])
+        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, statistics[SMALLEST_AT])
+        found[f"{sensor.name}_rms"] = np.sqrt(
+            statistics[SQUARES] / np.where(statistics[SECONDS] > 0.0, statistics[SECONDS], 1.0)
+        )
     return found
 
 
-def _include(marks: Array, reading: Array, at: float) -> None:
+def _include(statistics: Array, reading: Array, at: float) -> None:
     """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
     for value, place, beyond in ((LARGEST, LARGEST_AT, np.greater), (SMALLEST, SMALLEST_AT, np.less)):
-        more = beyond(reading, marks[value])
-        marks[value], marks[place] = np.where(more, reading, marks[value]), np.where(more, at, marks[place])
+        more = beyond(reading, statistics[value])
+        statistics[value], statistics[place] = (
+            np.where(more, reading, statistics[value]),
+            np.where(more, at, statistics[place]),
+        )
 
 
-def _envelopes(own: SceneTables, values: LaneValues, size: int, halted: Callable[[], bool]) -> Flat:
+def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Callable[[], bool]) -> Flat:
     """(V, places) largest and smallest values of every envelope, from marches that watch its places alone."""
     found: dict[str, list[Array]] = {name: [] for name in envelope_names(own.model.study)}
     nothing = np.zeros(0, dtype=np.int64)
     for tables in own.companions:
-        marched = march_chosen(tables, values, nothing, size, halted)
+        marched = march_scheme(tables, values, nothing, size, halted)
         for j, place in enumerate(tables.sensors):
             for end, mark in (("max", LARGEST), ("min", SMALLEST)):
-                found[f"{place.name}_envelope_{end}"].append(marched.marks[j, mark])
+                found[f"{place.name}_envelope_{end}"].append(marched.statistics[j, mark])
         if len(own.companions) > MOST_KEPT:
             tables.forget()
     return {name: np.stack(readings, axis=1) for name, readings in found.items()}
@@ -199,12 +204,14 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
     """Extremes of every contact force, and where it first was negative."""
     found: Flat = {}
     for c, carriage in enumerate(tables.model.carriages):
-        marks = marched.marks[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
-        seen = (marks[:, LARGEST_AT] >= 0.0).any(axis=0)
-        least = np.argmin(marks[:, SMALLEST], axis=0)[None]  # where a contact never counts, its smallest is infinite
-        found[f"{carriage.name}_contact_force_max"] = np.where(seen, marks[:, LARGEST].max(axis=0), np.nan)
-        found[f"{carriage.name}_contact_force_min"] = np.where(seen, marks[:, SMALLEST].min(axis=0), np.nan)
-        place = tables.timeline.positions(c, np.take_along_axis(marks[:, SMALLEST_AT], least, axis=0)[0])
+        statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
+        seen = (statistics[:, LARGEST_AT] >= 0.0).any(axis=0)
+        least = np.argmin(statistics[:, SMALLEST], axis=0)[
+            None
+        ]  # where a contact never counts, its smallest is infinite
+        found[f"{carriage.name}_contact_force_max"] = np.where(seen, statistics[:, LARGEST].max(axis=0), np.nan)
+        found[f"{carriage.name}_contact_force_min"] = np.where(seen, statistics[:, SMALLEST].min(axis=0), np.nan)
+        place = tables.timeline.positions(c, np.take_along_axis(statistics[:, SMALLEST_AT], least, axis=0)[0])
         found[f"{carriage.name}_contact_force_min_position"] = place
         opened = _opened_at(tables, marched, c)
         found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
@@ -215,9 +222,9 @@ def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
     """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
     contacts = _contacts_of(tables.model, carriage)
     if not tables.model.reacts(carriage):
-        return np.full(marched.marks.shape[-1], -1.0)
+        return np.full(marched.statistics.shape[-1], -1.0)
     after = [len(tables.sensors) + number for number in contacts]
-    below = np.concatenate([marched.guard[contacts, BELOW_AT], marched.marks[after, BELOW_AT]])
+    below = np.concatenate([marched.unrecorded[contacts, BELOW_AT], marched.statistics[after, BELOW_AT]])
     first = np.min(np.where(below >= 0.0, below, np.inf), axis=0)
     return np.asarray(np.where(np.isfinite(first), first, -1.0))
 
@@ -229,13 +236,13 @@ def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
     """Status of every variant, and the first step at which it had diverged, or -1."""
-    bad = np.concatenate([marched.marks[:, DIVERGED_AT], marched.guard[:, DIVERGED_AT]])
+    bad = np.concatenate([marched.statistics[:, DIVERGED_AT], marched.unrecorded[:, DIVERGED_AT]])
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     diverged = np.isfinite(first) | ~marched.finite
-    sensors = len(marched.marks) - len(marched.guard)
-    reacting = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
+    sensors = len(marched.statistics) - len(marched.unrecorded)
+    reactive = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
     below = np.concatenate(
-        [marched.marks[[sensors + c for c in reacting], BELOW_AT], marched.guard[reacting, BELOW_AT]]
+        [marched.statistics[[sensors + c for c in reactive], BELOW_AT], marched.unrecorded[reactive, BELOW_AT]]
     )
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))
@@ -243,7 +250,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     return status, np.where(np.isfinite(first), first, -1.0).astype(np.int64)
 
 
-def _statics(tables: SceneTables, values: LaneValues) -> Flat:
+def _statics(tables: SceneTables, values: VariantValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
     unit = tables.static_over_window
     loads, gravity = weights(tables.model, values), values.gravity
@@ -268,7 +275,7 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
     return found
 
 
-def _scale(tables: SceneTables, values: LaneValues, numbers: Flat) -> Array:
+def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
     """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body; of a rate its
     own largest; infinite where nothing is but rounding."""
     columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
@@ -282,9 +289,11 @@ def _scale(tables: SceneTables, values: LaneValues, numbers: Flat) -> Array:
     return np.where(found > 0.0, found, np.inf)
 
 
-def histories(tables: SceneTables, values: LaneValues, counts: Counts, halted: Callable[[], bool]) -> dict[str, Array]:
+def histories(
+    tables: SceneTables, values: VariantValues, counts: Counts, halted: Callable[[], bool]
+) -> dict[str, Array]:
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
-    marched = march_chosen(tables, values.padded, counts, values.size, halted)
+    marched = march_scheme(tables, values.padded, counts, values.size, halted)
     time_scale = values.time_scale(tables.model.carriages[0].name)
     arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):

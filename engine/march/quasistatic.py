@@ -13,16 +13,16 @@ from engine.kernels.layout import (
     BELOW_AT,
     LARGEST,
     LARGEST_AT,
-    MARKS,
     SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
+    STATISTICS,
 )
 from engine.march.march import Marched
 from engine.march.tables import SceneTables
-from engine.model.station_path import Way
-from engine.model.variant_values import LaneValues, weights
+from engine.model.station_path import StationPath
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal
@@ -35,31 +35,33 @@ Flags = NDArray[np.bool_]
 MOST_READINGS = 2**22  # stations x signals x variants at a time
 
 
-def rest(tables: SceneTables, values: LaneValues, counts: Counts, size: int, sampled: int | None = None) -> Marched:
-    """What a march of the first ``size`` variants would leave if it were infinitely slow: marks, and histories of the
-    first ``sampled`` signals, or of the sensors, at stations by their count."""
+def quasistatic_extremes(
+    tables: SceneTables, values: VariantValues, counts: Counts, size: int, sampled: int | None = None
+) -> Marched:
+    """What a march of the first ``size`` variants would leave if it were infinitely slow: statistics, and histories of
+    the first ``sampled`` signals, or of the sensors, at stations by their count."""
     model, signals = tables.model, tables.signals
     loads = np.stack([*weights(model, values), values.gravity])[:, :size]
     at = tables.static_counts
     unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
-    marks = np.zeros((len(signals), MARKS, distinct.shape[1]))
+    statistics = np.zeros((len(signals), STATISTICS, distinct.shape[1]))
     piece = max(1, MOST_READINGS // unit[:, :, 0].size)
     for first in range(0, distinct.shape[1], piece):
         part = slice(first, first + piece)
-        marks[:, :, part] = _marks(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
-    marks = marks[:, :, inverse.reshape(-1)]
+        statistics[:, :, part] = _statistics(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
+    statistics = statistics[:, :, inverse.reshape(-1)]
     sensors = len(tables.sensors)
     time_scale = values.time_scale(model.carriages[0].name)[:size]
-    marks[:sensors, SQUARES], marks[:sensors, SECONDS] = _squares(tables, loads, time_scale)
-    guard = np.full((len(signals) - sensors, MARKS, size), -1.0)
+    statistics[:sensors, SQUARES], statistics[:sensors, SECONDS] = _squares(tables, loads, time_scale)
+    unrecorded = np.full((len(signals) - sensors, STATISTICS, size), -1.0)
     shown = sensors if sampled is None else sampled
     history = np.zeros((counts.size, shown, size))
     if counts.size:
         here = _counted(tables, signals[:shown], tables.ways_at(counts))[:, :, None]
         found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
-    return Marched(marks, guard, history, np.ones(size, dtype=np.bool_))
+    return Marched(statistics, unrecorded, history, np.ones(size, dtype=np.bool_))
 
 
 def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
@@ -75,7 +77,7 @@ def _reader(tables: SceneTables, contact: ContactForce) -> Sensor:
     return ContactSensor("", "contact_force", body, 0.0, carriage, carriage, contact.contact)
 
 
-def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Flags:
+def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[StationPath, ...]) -> Flags:
     """(S, J) where each signal reads anything."""
     found = []
     for signal in signals:
@@ -85,9 +87,9 @@ def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[Way,
     return np.stack(found, axis=1)
 
 
-def _marks(readings: Array, counted: Flags, at: Array) -> Array:
-    """(J, MARKS, V) of readings (S, J, V) at stations by their count (S,)."""
-    found = np.full((readings.shape[1], MARKS, readings.shape[2]), -1.0)  # none has diverged
+def _statistics(readings: Array, counted: Flags, at: Array) -> Array:
+    """(J, STATISTICS, V) of readings (S, J, V) at stations by their count (S,)."""
+    found = np.full((readings.shape[1], STATISTICS, readings.shape[2]), -1.0)  # none has diverged
     seen = counted[:, :, None]
     for value, where, sign in ((LARGEST, LARGEST_AT, 1.0), (SMALLEST, SMALLEST_AT, -1.0)):
         signed = np.where(seen, sign * readings, -np.inf)

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import LANES, LARGEST, SMALLEST, Record, Watch
+from engine.kernels.layout import LANES, LARGEST, SMALLEST, Observation, Record
 from engine.kernels.stepping.pairs import extrapolate, integrate, survey
 from engine.march.march import Halted, March, Marched, march, prepare
-from engine.march.quasistatic import rest
+from engine.march.quasistatic import quasistatic_extremes
 from engine.march.tables import SceneTables, SegmentTable
 from engine.model.timeline import Segment
-from engine.model.variant_values import LaneValues, from_blocks
+from engine.model.variant_values import VariantValues, from_blocks
 from engine.observation.histories import rows_sampled
 from results_schema.status import Fidelity
 
@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
-def march_chosen(
+def march_scheme(
     tables: SceneTables,
-    values: LaneValues,
+    values: VariantValues,
     counts: Counts,
     size: int,
     halted: Callable[[], bool] = lambda: False,
@@ -36,7 +36,7 @@ def march_chosen(
 ) -> Marched:
     """March by the model's scheme, or rest at every place; sampled: so many signals, or the sensors. Raises Halted."""
     if tables.model.fidelity is Fidelity.STATIC:
-        return rest(tables, values, counts, size, sampled)
+        return quasistatic_extremes(tables, values, counts, size, sampled)
     if tables.model.scheme.stride == 1:
         return march(tables, values, counts, size, halted, sampled)
     return march_pair(tables, values, counts, size, halted, sampled)[0]
@@ -44,7 +44,7 @@ def march_chosen(
 
 def march_pair(
     tables: SceneTables,
-    values: LaneValues,
+    values: VariantValues,
     counts: Counts,
     size: int,
     halted: Callable[[], bool] = lambda: False,
@@ -68,37 +68,40 @@ def march_pair(
 class _Histories(March):
     """A march that hands over the histories of all its signals, segment by segment."""
 
-    def along(self, segment: Segment) -> tuple[Array, Watch]:
+    def along(self, segment: Segment) -> tuple[Array, Observation]:
         """March a segment: its signals (blocks, S, signals, LANES) at all stations, and what was observed."""
         table = self.tables.table(segment)
         watch = _watched(segment, table)
-        history = np.empty((self.marks.shape[0], segment.steps + 1, watch.offset.shape[1], LANES))
+        history = np.empty((self.statistics.shape[0], segment.steps + 1, watch.offset.shape[1], LANES))
         replace(self, history=history)._segment(segment, table, True)
         return history, watch
 
-    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Watch, Record]:
+    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Observation, Record]:
         watch = _watched(segment, table)
-        marks = np.zeros_like(self.marks[:, : watch.offset.shape[1]])
-        marks[:, :, LARGEST], marks[:, :, SMALLEST] = np.inf, -np.inf  # nothing is news: `survey` looks for extremes
-        record = Record(marks, np.arange(segment.steps + 1), self.history)
+        statistics = np.zeros_like(self.statistics[:, : watch.offset.shape[1]])
+        statistics[:, :, LARGEST], statistics[:, :, SMALLEST] = (
+            np.inf,
+            -np.inf,
+        )  # nothing is news: `survey` looks for extremes
+        record = Record(statistics, np.arange(segment.steps + 1), self.history)
         everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)  # `survey` sums squares
         return watch._replace(counted=everywhere, summed=nowhere), record
 
 
-def _watched(segment: Segment, table: SegmentTable) -> Watch:
+def _watched(segment: Segment, table: SegmentTable) -> Observation:
     """What is observed along a segment."""
-    return table.watch if segment.recorded else table.guard
+    return table.watch if segment.recorded else table.unrecorded
 
 
-def _whole_histories(tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None) -> _Histories:
+def _whole_histories(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None) -> _Histories:
     """A march that is ready to go."""
     ready = prepare(tables, values, counts, sampled)
-    return _Histories(ready.tables, ready.lanes, counts, ready.state, ready.marks, ready.guard, ready.history)
+    return _Histories(ready.tables, ready.lanes, counts, ready.state, ready.statistics, ready.unrecorded, ready.history)
 
 
 def _blank(fine: March) -> tuple[Array, Array]:
     """What a pair carries over from segment to segment before the first."""
-    blocks, signals = fine.marks.shape[:2]
+    blocks, signals = fine.statistics.shape[:2]
     return np.zeros((blocks, signals, 3, LANES)), np.zeros((blocks, signals, LANES))
 
 
@@ -119,10 +122,10 @@ class _Pair:
         counted, signals = watch.counted, fine.shape[2]
         gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
         extrapolate(fine, coarse, counted, gap)
-        marks = self.fine.marks if segment.recorded else self.fine.guard
+        statistics = self.fine.statistics if segment.recorded else self.fine.unrecorded
         carry = np.ascontiguousarray(self.carry[:, :signals])
-        survey(fine, counted, marks, carry, _joined(self.before, segment), segment.first)
-        integrate(fine, watch.summed, marks, self.fine.step(segment))
+        survey(fine, counted, statistics, carry, _joined(self.before, segment), segment.first)
+        integrate(fine, watch.summed, statistics, self.fine.step(segment))
         self.carry[:, :signals] = carry
         self.before = segment
         if segment.recorded:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from engine.kernels.schemes import Scheme
 from engine.model.scene_model import SceneModel
 from engine.model.ties import CarriageTie, SpringTie
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ TRACK_PLACES = 257  # along the track, at which the mobility is looked for: four
 ALIAS_CELL = 0.01  # of a time scale: the alias rule is solved once for variants that are no further apart
 
 
-def least_steps(model: SceneModel, values: LaneValues) -> Array:
+def least_steps(model: SceneModel, values: VariantValues) -> Array:
     """(V,) the fewest steps per unit of scene time that a march may take whatever its accuracy: inside the scheme's
     stability limit, by the alias rule, and none longer than a period of a contact on its spring."""
     scale = values.time_scale(model.carriages[0].name)
@@ -105,7 +105,7 @@ def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Count
         _check_alias(model, time_scale, steps)
 
 
-def allow_any_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
+def allow_any_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
     """In place of `resonance.check_steps` where accuracy is not the question."""
 
 
@@ -158,7 +158,7 @@ def check_even_steps(model: SceneModel, steps: Counts) -> None:
         )
 
 
-def check_slowest(model: SceneModel, values: LaneValues) -> None:
+def check_slowest(model: SceneModel, values: VariantValues) -> None:
     """Refuse variants so slow that no march could resolve them. Raises BadInput."""
     periods = values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * math.pi)
     check_most_steps(model, SLOWEST * periods)
@@ -176,12 +176,12 @@ def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
         )
 
 
-def contact_omega(model: SceneModel, values: LaneValues) -> Array:
+def contact_omega(model: SceneModel, values: VariantValues) -> Array:
     """(V,) rad/s: omega_c of all springs, the root of the sum of squares; 0 without any."""
     return np.sqrt(sum((_contact_square(model, values, one) for one in model.springs), np.zeros(values.size)))
 
 
-def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) -> Array:
+def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie) -> Array:
     if spring.rigid:
         return np.zeros(values.size)
     body = model.bodies[model.carriages[spring.carriage].body].modal
@@ -194,7 +194,7 @@ def _contact_square(model: SceneModel, values: LaneValues, spring: SpringTie) ->
     return np.asarray(stiffness * (1.0 / values.sprung_mass(spring) + contact))
 
 
-def check_steps(model: SceneModel, values: LaneValues, steps: Counts) -> None:
+def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
     """Refuse fixed steps (V,) that cannot be right. Raises BadInput with limit and suggestion."""
     time_scale = values.time_scale(model.carriages[0].name)
     check_fixed_steps(model, time_scale, steps)
@@ -225,7 +225,7 @@ def check_free_vibration(model: SceneModel) -> None:
             )
 
 
-def limit_with_springs(model: SceneModel, values: LaneValues) -> Array:
+def limit_with_springs(model: SceneModel, values: VariantValues) -> Array:
     """(V,) steps at which the coupled scene reaches the scheme's limit, at most."""
     highest = np.sqrt(float(model.omega.max()) ** 2 + contact_omega(model, values) ** 2)
     return np.asarray(highest * values.time_scale(model.carriages[0].name) / model.scheme.stability_limit)

@@ -11,12 +11,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import Alpha, Newmark, Ties, Watch
+from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way, ways
-from engine.model.ties import Grip
+from engine.model.station_path import StationPath, ways
+from engine.model.ties import Attachment
 from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import tabulate_ties
 from engine.observation import kinks
@@ -40,8 +40,8 @@ class SegmentTable(NamedTuple):
     """What the march needs of one segment besides its lanes."""
 
     ties: Ties
-    watch: Watch
-    guard: Watch
+    watch: Observation
+    unrecorded: Observation
 
     @property
     def bytes(self) -> int:
@@ -158,8 +158,8 @@ class SceneTables:
             found = missed[0], missed[1]
         watch = tabulate_watch(self.model, self.signals, along, found[1])
         contacts = sum(isinstance(signal, ContactForce) for signal in self.signals)
-        guard = last_signals(watch, contacts) if contacts else watch
-        return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, guard)
+        unrecorded = last_signals(watch, contacts) if contacts else watch
+        return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, unrecorded)
 
     def _missed_of(self, key: SegmentKey) -> Missed:
         """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate
@@ -169,7 +169,7 @@ class SceneTables:
             self._missed[key] = found
         return found
 
-    def _ways(self, segment: Segment) -> tuple[Way, ...]:
+    def _ways(self, segment: Segment) -> tuple[StationPath, ...]:
         """The ways of all carriages along a segment."""
         return ways(self.model, segment)
 
@@ -208,22 +208,22 @@ class SceneTables:
         for sensor in self.sensors:
             body = self.model.bodies[sensor.body].modal
             s = np.linspace(0.0, body.length, 65)
-            everywhere = Way(s, np.zeros_like(s), np.zeros_like(s), True)
+            everywhere = StationPath(s, np.zeros_like(s), np.zeros_like(s), True)
             reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
             if sensor.under is not None:
                 reader = replace(reader, under=0)
-            largest = np.abs(reader.unit_reading(self.model, (everywhere,), Grip(1.0, sensor.body, 0))).max()
+            largest = np.abs(reader.unit_reading(self.model, (everywhere,), Attachment(1.0, sensor.body, 0))).max()
             found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 
-    def ways_at(self, counts: Array | Counts) -> tuple[Way, ...]:
+    def ways_at(self, counts: Array | Counts) -> tuple[StationPath, ...]:
         """Places of all riders at stations by their count; ``active`` says whether it is on its body at any of them."""
         found = []
         for rider in range(len(self.model.riders)):
             place = self.timeline.positions(rider, counts)
             here = np.isfinite(place)
             nowhere = np.zeros_like(place)
-            found.append(Way(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any()), here))
+            found.append(StationPath(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any()), here))
         return tuple(found)
 
     def static_at(self, counts: Array | Counts) -> StaticUnit:
@@ -241,11 +241,11 @@ class SceneTables:
             return np.zeros((counts.size, len(self.sensors)))
         return np.where(first.here[:, None], self._slope(along), 0.0)
 
-    def _readings(self, along: tuple[Way, ...]) -> Array:
+    def _readings(self, along: tuple[StationPath, ...]) -> Array:
         """(S, J, C + 1) static readings of every sensor per unit weight of each carriage, and last per unit gravity."""
         return static_readings(self.model, self.sensors, along)
 
-    def _slope(self, along: tuple[Way, ...]) -> Array:
+    def _slope(self, along: tuple[StationPath, ...]) -> Array:
         """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
         apart, which it reaches with all its contacts."""
         riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length

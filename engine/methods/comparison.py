@@ -15,7 +15,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import CURVE, FORCE, LANES, MARKS, RATE, Alpha, Lanes, Newmark, Record, State, Ties, Watch
+from engine.kernels.layout import (
+    CURVE,
+    FORCE,
+    LANES,
+    RATE,
+    STATISTICS,
+    Alpha,
+    Lanes,
+    Newmark,
+    Observation,
+    Record,
+    State,
+    Ties,
+)
 from engine.kernels.schemes import NewmarkScheme
 from engine.kernels.stepping.comparison import (
     Carried,
@@ -30,11 +43,11 @@ from engine.kernels.stepping.comparison_steps import ITERATIONS, KEPT, OWN_A, OW
 from engine.march.march import March, Marched, prepare
 from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
+from engine.model.station_path import StationPath
 from engine.model.ties import CarriageTie
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_ties
-from engine.model.variant_values import LaneValues, from_blocks
+from engine.model.variant_values import VariantValues, from_blocks
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -159,7 +172,7 @@ class Propagated(NamedTuple):
 def march_comparison(
     scheme: ComparisonScheme,
     tables: SceneTables,
-    values: LaneValues,
+    values: VariantValues,
     counts: Counts,
     size: int,
     halted: Callable[[], bool] = lambda: False,
@@ -176,7 +189,7 @@ def march_comparison(
 
 
 def prepare_comparison(
-    scheme: ComparisonScheme, tables: SceneTables, values: LaneValues, counts: Counts, sampled: int | None = None
+    scheme: ComparisonScheme, tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None = None
 ) -> ComparisonMarch:
     """Set up a march by a comparison scheme as `engine.march.march.prepare` does. Raises BadInput."""
     check_comparison(scheme, tables.model)
@@ -198,7 +211,9 @@ def propagate_comparison(scheme: ComparisonScheme, track: Track, lanes: Lanes, s
     kept = np.zeros((blocks, KEPT, LANES))
     start_own(kept, track, free, moved)
     record = Record(
-        np.zeros((blocks, 0, MARKS, LANES)), np.full(steps + 1, -1, dtype=np.int64), np.zeros((blocks, 0, 0, LANES))
+        np.zeros((blocks, 0, STATISTICS, LANES)),
+        np.full(steps + 1, -1, dtype=np.int64),
+        np.zeros((blocks, 0, 0, LANES)),
     )
     march_by_rule(scheme.rule, track, free, Carried(*moved, kept), _nothing_watched(modes), record, 0)
     return Propagated(moved, _effort(kept, steps, blocks * LANES))
@@ -211,7 +226,7 @@ def frozen_track(scheme: ComparisonScheme, model: SceneModel, place: float, step
     """
     check_comparison(scheme, model)
     still = np.zeros(steps)
-    way = Way(still + place, still + advance, still, active=True)
+    way = StationPath(still + place, still + advance, still, active=True)
     return _tabulated(model, tuple(way for _ in scheme.offsets))
 
 
@@ -255,7 +270,7 @@ class ComparisonMarch(March):
     scheme: ComparisonScheme
     kept: Array
 
-    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Watch, record: Record) -> None:
+    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Observation, record: Record) -> None:
         """The steps of a segment by the rule; only those in contact count for its effort."""
         track = moving_track(self.scheme, self.tables.model, self._unit(segment))
         if segment.fresh:
@@ -283,21 +298,21 @@ def start_own(kept: Array, track: Track, lanes: Lanes, state: State) -> None:
     kept[:, OWN_A] = over(FORCE, state.a) + over(RATE, state.v) / h + over(CURVE, state.q) / h**2
 
 
-def _way(carriage: CarriageTie, segment: Segment, offset: float) -> Way:
+def _way(carriage: CarriageTie, segment: Segment, offset: float) -> StationPath:
     """The way of a carriage at the same place of every step of a segment."""
     tau = segment.start + (np.arange(segment.steps) + offset) * segment.step
     if not segment.active[0]:
         nowhere = np.zeros_like(tau)
-        return Way(nowhere, nowhere, nowhere, active=False)
+        return StationPath(nowhere, nowhere, nowhere, active=False)
     inside = np.minimum(tau, segment.end)
     path, beyond = carriage.rider.path(inside, segment.start, segment.end), tau - inside
     place = path.S + path.dS * beyond + 0.5 * path.ddS * beyond**2
     speed = path.dS + path.ddS * beyond
     place = np.clip(place, 0.0, carriage.rider.length)
-    return Way(place, speed * segment.step, path.ddS * segment.step**2, active=True)
+    return StationPath(place, speed * segment.step, path.ddS * segment.step**2, active=True)
 
 
-def _tabulated(model: SceneModel, along: tuple[Way, ...]) -> Track:
+def _tabulated(model: SceneModel, along: tuple[StationPath, ...]) -> Track:
     """Rows of the one tie along a way per offset."""
     ties = [tabulate_ties(model, (way,), _NO_IMPLICIT_PART) for way in along]
     rows = np.ascontiguousarray(np.stack([tie.rows[:, :, 0] for tie in ties]))
@@ -309,9 +324,9 @@ def _effort(kept: Array, steps: int, size: int) -> Effort:
     return Effort(found[ITERATIONS] / max(1, steps), found[UNCONVERGED])
 
 
-def _nothing_watched(modes: int) -> Watch:
+def _nothing_watched(modes: int) -> Observation:
     """A watch without signals."""
     rows, none = np.zeros((1, 0, 4 * -(-modes // 4))), np.zeros(0, dtype=np.int64)
     still = np.zeros((1, 0))
     never = still.astype(np.bool_)
-    return Watch(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, never, never[0])
+    return Observation(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, never, never[0])

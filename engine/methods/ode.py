@@ -21,7 +21,7 @@ from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Segment, build_timeline
-from engine.model.variant_values import LaneValues, lane_table, moving_mass, weight
+from engine.model.variant_values import VariantValues, lane_table, moving_mass, weight
 from engine.observation.contact_forces import ContactForce
 from results_schema.errors import BadInput, Interrupted
 
@@ -57,8 +57,8 @@ class ModalEquations:
         return build_timeline(self.model.riders, 1, "whole").segments
 
     @cached_property
-    def _values(self) -> LaneValues:
-        return LaneValues(self.model.study, {}, LANES)
+    def _values(self) -> VariantValues:
+        return VariantValues(self.model.study, {}, LANES)
 
     @cached_property
     def time_scale(self) -> float:

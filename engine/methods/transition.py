@@ -13,16 +13,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import LANES, MARKS, Alpha, Lanes, Record, State, Ties
+from engine.kernels.layout import LANES, STATISTICS, Alpha, Lanes, Record, State, Ties
 from engine.kernels.stepping.march import march_many, march_one
-from engine.kernels.stepping.start import settle
+from engine.kernels.stepping.start import solve_initial_acceleration
 from engine.march.march import prepare
 from engine.march.tables import SceneTables
 from engine.methods.comparison import ComparisonScheme, frozen_track, propagate_comparison
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
+from engine.model.station_path import StationPath
 from engine.model.track import tabulate_ties
-from engine.model.variant_values import LaneTable, LaneValues, from_blocks, lane_table, padded, to_blocks
+from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table, padded, to_blocks
 from engine.observation.contact_forces import ContactForce
 from engine.observation.signals import tabulate_watch
 
@@ -49,8 +49,8 @@ class Frozen:
         """The state of all lanes after some steps; the given one is used up."""
         watch = tabulate_watch(self.model, (ContactForce(0),), self._along(steps))
         blocks = lanes.step.shape[0]
-        marks, history = np.zeros((blocks, 1, MARKS, LANES)), np.zeros((blocks, 0, 0, LANES))
-        record = Record(marks, np.full(steps + 1, -1, dtype=np.int64), history)
+        statistics, history = np.zeros((blocks, 1, STATISTICS, LANES)), np.zeros((blocks, 0, 0, LANES))
+        record = Record(statistics, np.full(steps + 1, -1, dtype=np.int64), history)
         kernel = march_one if self.model.ties == 1 else march_many
         kernel(self.ties(steps), lanes, state, watch, record, self.model.scheme.coefficients, 0)
         return state
@@ -59,10 +59,10 @@ class Frozen:
         """The ties along so many steps."""
         return tabulate_ties(self.model, self._along(steps), self.model.scheme.coefficients)
 
-    def _along(self, steps: int) -> tuple[Way, ...]:
+    def _along(self, steps: int) -> tuple[StationPath, ...]:
         """The ways of all carriages at the stations 0..steps."""
         still = np.zeros(steps + 1)
-        way = Way(still + self.place, still + self.advance, still, active=True)
+        way = StationPath(still + self.place, still + self.advance, still, active=True)
         return tuple(way for _ in self.model.riders)
 
 
@@ -81,7 +81,7 @@ class FrozenCompared(Frozen):
         return propagate_comparison(self.scheme, track, lanes, state).state
 
 
-def transitions(tables: SceneTables, values: LaneValues) -> Array:
+def transitions(tables: SceneTables, values: VariantValues) -> Array:
     """(V, 2N, 2N) matrices of a scene from its start to its end, one passage or one period, on (q, q'/omega).
 
     Accelerations are those of the equations of motion at the start, and an alpha scheme starts without memory.
@@ -95,7 +95,7 @@ def transitions(tables: SceneTables, values: LaneValues) -> Array:
     >>> study = Study(kind="passage", body={"bed": bed}, carriage={"car": dict(on="bed", kind="mass", mass=1e-9,
     ...               motion=crossing)})
     >>> tables = SceneTables(build_model(study, {}, {}), 1000, "whole")
-    >>> transitions(tables, LaneValues(study, {}, 1))[0].round(3) + 0.0
+    >>> transitions(tables, VariantValues(study, {}, 1))[0].round(3) + 0.0
     array([[ 0.,  1.],
            [-1.,  0.]])
     """
@@ -107,17 +107,17 @@ def transitions(tables: SceneTables, values: LaneValues) -> Array:
     return _matrices(ready.state, scales, values.size)
 
 
-def held_transitions(frozen: Frozen, values: LaneValues, step: Array, steps: int) -> Array:
+def held_transitions(frozen: Frozen, values: VariantValues, step: Array, steps: int) -> Array:
     """(V, 2N, 2N) matrices of several steps (V,) in s at a frozen station, on (q, q'/omega), as `transitions`."""
     model = frozen.model
     lanes = _held_lanes(model, values, 2 * model.omega.size, step)
     scales = _velocities(model, lanes.step.size)
     state = _unit_states(lanes, scales)
-    settle(frozen.ties(0), lanes, state)
+    solve_initial_acceleration(frozen.ties(0), lanes, state)
     return _matrices(frozen.march(lanes, state, steps), scales, values.size)
 
 
-def step_matrices(frozen: Frozen, values: LaneValues, step: Array, steps: int = 1) -> Array:
+def step_matrices(frozen: Frozen, values: VariantValues, step: Array, steps: int = 1) -> Array:
     """(V, M, M) matrices of one step (V,) in s, or several, at a frozen station, on all that the scheme carries on.
 
     (q, h q', h^2 q''), so that M = 3N, and h^2 memory of an alpha scheme, M = 4N. What follows from the rest, as the
@@ -141,7 +141,7 @@ def spectral_radius(matrices: Array) -> Array:
     return np.where(finite, found, np.inf)
 
 
-def _held_lanes(model: SceneModel, values: LaneValues, units: int, step: Array) -> Lanes:
+def _held_lanes(model: SceneModel, values: VariantValues, units: int, step: Array) -> Lanes:
     """Lanes without loads: every variant, with its step (V,) in s, once for each of so many unit states."""
     table = _unloaded(lane_table(model, _spread(values, units)))
     return table.steps_of(to_blocks(step[_variants(values.size, units)]))
@@ -159,10 +159,10 @@ def _variants(size: int, units: int) -> NDArray[np.int64]:
     return padded(np.repeat(np.arange(size), units))
 
 
-def _spread(values: LaneValues, units: int) -> LaneValues:
+def _spread(values: VariantValues, units: int) -> VariantValues:
     """The numbers of those lanes."""
     lanes = _variants(values.size, units)
-    return LaneValues(values.study, {path: column[lanes] for path, column in values.columns.items()}, lanes.size)
+    return VariantValues(values.study, {path: column[lanes] for path, column in values.columns.items()}, lanes.size)
 
 
 def _unloaded(lanes: LaneTable) -> LaneTable:

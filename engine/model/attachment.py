@@ -12,62 +12,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
-from engine.model.ties import Grip
+from engine.model.station_path import StationPath
+from engine.model.ties import Attachment
 
 Array = NDArray[np.float64]
-Along = tuple[Way, ...]
+Along = tuple[StationPath, ...]
 
 
-def holds(grip: Grip, along: Along) -> bool:
-    """Whether a grip touches its body anywhere along a segment."""
-    return grip.rider is None or along[grip.rider].active
+def holds(attachment: Attachment, along: Along) -> bool:
+    """Whether an attachment touches its body anywhere along a segment."""
+    return attachment.rider is None or along[attachment.rider].active
 
 
-def place(grip: Grip, along: Along) -> Array | str:
+def place(attachment: Attachment, along: Along) -> Array | str:
     """Where it holds: (S,) or (1,) places of the track in m, or the name of a point."""
-    if grip.rider is not None:
-        return along[grip.rider].s
-    return grip.at if isinstance(grip.at, str) else np.array([grip.at])
+    if attachment.rider is not None:
+        return along[attachment.rider].s
+    return attachment.at if isinstance(attachment.at, str) else np.array([attachment.at])
 
 
-def rows(model: SceneModel, grip: Grip, along: Along, derivative: int = 0) -> Array:
+def rows(model: SceneModel, attachment: Attachment, along: Along, derivative: int = 0) -> Array:
     """(S or 1, N of its body) derivative of the mode shapes where it holds; 0 where it does not."""
-    if grip.rider is None and derivative > 0:
-        return np.zeros((1, model.bodies[grip.body].modal.omega.size))
-    return np.asarray(shape_derivatives(model, grip, along, derivative)[derivative])
+    if attachment.rider is None and derivative > 0:
+        return np.zeros((1, model.bodies[attachment.body].modal.omega.size))
+    return np.asarray(shape_derivatives(model, attachment, along, derivative)[derivative])
 
 
-def shape_derivatives(model: SceneModel, grip: Grip, along: Along, highest: int) -> Array:
+def shape_derivatives(model: SceneModel, attachment: Attachment, along: Along, highest: int) -> Array:
     """(``highest`` + 1 or more, S or 1, N) the mode shapes and their derivatives; of a fixed place the shapes alone."""
-    modal = model.bodies[grip.body].modal
-    if grip.rider is None:
-        return grip.fixed_row(modal).copy()[None, None]
-    way = along[grip.rider]
+    modal = model.bodies[attachment.body].modal
+    if attachment.rider is None:
+        return attachment.fixed_row(modal).copy()[None, None]
+    way = along[attachment.rider]
     found = way.shapes(modal, highest)
     return found if way.here is None else np.where(way.here[:, None], found, 0.0)
 
 
-def kept_flexibility(model: SceneModel, one: Grip, other: Grip, along: Along) -> Array:
-    """(S or 1,) what the kept modes of one body carry of the motion of a grip per unit force of another tie, m/N."""
+def modal_flexibility_between(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
+    """(S or 1,) what the kept modes of a body carry of the motion of an attachment per unit force of another, m/N."""
     left, right = rows(model, one, along), rows(model, other, along)
     soft = model.bodies[one.body].modal.modal_flexibility
     return np.asarray(one.factor * other.factor * np.sum(left * right * soft, axis=1))
 
 
-def missed_flexibility(model: SceneModel, one: Grip, other: Grip, along: Along) -> Array:
+def residual_flexibility(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
     """(S or 1,) what they miss of it."""
     whole = model.bodies[one.body].modal.flexibility_between(place(one, along), place(other, along))
-    for grip in (one, other):
-        if grip.rider is not None and (here := along[grip.rider].here) is not None:
+    for attachment in (one, other):
+        if attachment.rider is not None and (here := along[attachment.rider].here) is not None:
             whole = np.where(here, whole, 0.0)
-    return np.asarray(one.factor * other.factor * whole - kept_flexibility(model, one, other, along))
+    return np.asarray(one.factor * other.factor * whole - modal_flexibility_between(model, one, other, along))
 
 
-def shared(model: SceneModel, r: int, s: int, along: Along) -> Iterator[tuple[Grip, Grip]]:
+def shared(model: SceneModel, r: int, s: int, along: Along) -> Iterator[tuple[Attachment, Attachment]]:
     """Grips of the ties r and s that hold the same body."""
-    for one in model.grips[r]:
-        for other in model.grips[s]:
+    for one in model.attachments[r]:
+        for other in model.attachments[s]:
             if one.body == other.body and holds(one, along) and holds(other, along):
                 yield one, other
 
@@ -79,7 +79,7 @@ def residual(model: SceneModel, along: Along) -> Array:
     felt = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.held and not spring.rigid]
     if not felt or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))
-    found, known = np.zeros((along[0].s.size, ties, ties)), dict[tuple[Grip, Grip], Array]()
+    found, known = np.zeros((along[0].s.size, ties, ties)), dict[tuple[Attachment, Attachment], Array]()
     for r in felt:
         for s in range(ties):
             if s in felt and s < r:
@@ -88,6 +88,6 @@ def residual(model: SceneModel, along: Along) -> Array:
             for one, other in shared(model, r, s, along):
                 first, second = sorted((one.unit, other.unit), key=str)  # dead loads and springs hold the same places
                 if (first, second) not in known:
-                    known[first, second] = missed_flexibility(model, first, second, along)
+                    known[first, second] = residual_flexibility(model, first, second, along)
                 found[:, r, s] += one.factor * other.factor * known[first, second]
     return found

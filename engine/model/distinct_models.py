@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import LANE_KEYS, LaneValues
+from engine.model.variant_values import LANE_KEYS, VariantValues
 from engine.scene.study import Study
 from engine.scene.sweep import Cases
 
@@ -19,7 +19,7 @@ def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneMo
     """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
     for variants in split(chosen, structure(cases, chosen)):
         own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
-        values = LaneValues(own, cases.columns_of(variants), variants.size)
+        values = VariantValues(own, cases.columns_of(variants), variants.size)
         timing = values.timing()
         columns = np.stack([column for pair in timing.values() for column in pair])
         codes = np.zeros(variants.size, dtype=np.int64)
@@ -31,10 +31,10 @@ def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneMo
 
 def base_scene(study: Study) -> SceneModel:
     """The scene of a study without its sweep."""
-    return build_model(study.without_sweep(), *_timing_of(LaneValues(study, {}, 1), 0))
+    return build_model(study.without_sweep(), *_timing_of(VariantValues(study, {}, 1), 0))
 
 
-def _timing_of(values: LaneValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
+def _timing_of(values: VariantValues, lane: int) -> tuple[dict[str, float], dict[str, float]]:
     """Paces and delays of one lane, by carriage."""
     timing = values.timing()
     return (

@@ -17,8 +17,8 @@ from engine.bodies.modal.description import Body
 from engine.bodies.modal.modal_body import ModalBody
 from engine.kernels.schemes import Scheme
 from engine.model.numerics import Numerics
-from engine.model.support_reactions import Place, Standing, stand
-from engine.model.ties import CarriageTie, DamperTie, Grip, Inertia, SpringTie
+from engine.model.support_reactions import Place, SupportReactions, stand
+from engine.model.ties import Attachment, CarriageTie, DamperTie, Inertia, SpringTie
 from engine.model.timeline import Rider
 from engine.scene.carriages import BodyCarriage, OscillatorCarriage
 from engine.scene.settings import SPRUNG
@@ -122,10 +122,10 @@ class SceneModel:
         return len(self.carriages) + len(self.dampers)
 
     @cached_property
-    def grips(self) -> tuple[tuple[Grip, ...], ...]:
+    def attachments(self) -> tuple[tuple[Attachment, ...], ...]:
         """Where every tie acts on the bodies."""
-        springs = (spring.grips(self.carriages[spring.carriage].body) for spring in self.springs)
-        return (*(c.grips for c in self.carriages), *(d.grips for d in self.dampers), *springs)
+        springs = (spring.attachments(self.carriages[spring.carriage].body) for spring in self.springs)
+        return (*(c.attachments for c in self.carriages), *(d.attachments for d in self.dampers), *springs)
 
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
@@ -197,11 +197,13 @@ def build_model(
         for key, at, coefficient in study.body[name].dampers()
         if coefficient > 0.0 or f"body.{name}.{key}" in swept
     ]
-    standing = _standing(study, numerics, carriages, parts, swept)
-    contacts = tuple(rider for stands in standing.values() for rider in stands.riders)
-    on_contacts = tuple(spring for stands in standing.values() for spring in stands.springs)
+    support_reactions = _standing(study, numerics, carriages, parts, swept)
+    contacts = tuple(rider for stands in support_reactions.values() for rider in stands.riders)
+    on_contacts = tuple(spring for stands in support_reactions.values() for spring in stands.springs)
     springs = (*_springs(study, numerics, first, swept), *on_contacts)
-    carried = tuple(standing[n].carried(tie) if n in standing else tie for n, tie in enumerate(carriages))
+    carried = tuple(
+        support_reactions[n].carried(tie) if n in support_reactions else tie for n, tie in enumerate(carriages)
+    )
     model = SceneModel(study, numerics, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
     _check_rigid_modes(model)
     return model
@@ -258,9 +260,9 @@ def _springs(study: Study, numerics: Numerics, first: int, swept: Collection[str
 
 def _standing(
     study: Study, numerics: Numerics, carriages: list[CarriageTie], parts: list[BodyPart], swept: Collection[str]
-) -> dict[int, Standing]:
+) -> dict[int, SupportReactions]:
     """The bodies that ride, by the number of their carriage."""
-    found: dict[int, Standing] = {}
+    found: dict[int, SupportReactions] = {}
     names, first = [part.name for part in parts], len(carriages)
     for number, tie in enumerate(carriages):
         carriage = study.carriage[tie.name]

@@ -20,7 +20,7 @@ NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class StationPath:
     """One rider along one segment, station by station: place (m), its first and second change per step, and whether
     it touches the body; where it does not, its rows are zero. here: at which stations, where that differs. highest:
     derivative of the mode shapes that its ties read."""
@@ -46,7 +46,7 @@ class Way:
         return found
 
 
-def ways(model: SceneModel, segment: Segment) -> tuple[Way, ...]:
+def ways(model: SceneModel, segment: Segment) -> tuple[StationPath, ...]:
     """The ways of all riders at the stations 0..steps of a segment."""
     tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end
@@ -62,7 +62,7 @@ def _highest(model: SceneModel) -> list[int]:
     return found
 
 
-def frozen(model: SceneModel, places: Array) -> tuple[Way, ...]:
+def frozen(model: SceneModel, places: Array) -> tuple[StationPath, ...]:
     """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track and every other one
     where it starts; whoever is off the body does not touch it."""
     starts = [np.full_like(places, float(c.rider.motion.path(0.0).S)) for c in model.carriages]
@@ -72,14 +72,16 @@ def frozen(model: SceneModel, places: Array) -> tuple[Way, ...]:
     for number, rider in enumerate(model.riders):
         place = along[number if number < len(along) else owners[number]] + rider.offset
         here = (place >= -NEAR * rider.length) & (place <= rider.length * (1.0 + NEAR))
-        found.append(Way(np.where(here, np.clip(place, 0.0, rider.length), 0.0), still, still, bool(here.any()), here))
+        found.append(
+            StationPath(np.where(here, np.clip(place, 0.0, rider.length), 0.0), still, still, bool(here.any()), here)
+        )
     return tuple(found)
 
 
-def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> Way:
+def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> StationPath:
     if not active:
         nowhere = np.zeros_like(tau)
-        return Way(nowhere, nowhere, nowhere, active)
+        return StationPath(nowhere, nowhere, nowhere, active)
     path = rider.path(tau, segment.start, segment.end)
     place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
-    return Way(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)
+    return StationPath(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.numerics import Numerics
-from engine.model.ties import CarriageTie, Grip, SpringTie
+from engine.model.ties import Attachment, CarriageTie, SpringTie
 from engine.model.timeline import AT_END, Rider
 from engine.scene.carriages import BodyCarriage, Contact
 from engine.scene.settings import SPRUNG
@@ -37,7 +37,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class SupportReactions:
     """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and the shares of its
     weight that they carry."""
 
@@ -55,7 +55,7 @@ class Standing:
         return replace(tie, loads=loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
 
 
-def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swept: Collection[str]) -> Standing:
+def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swept: Collection[str]) -> SupportReactions:
     """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
     name = place.tie.name
     carriage = study.carriage[name]
@@ -70,12 +70,12 @@ def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swep
     springs = []
     for number, (word, contact) in enumerate(carriage.contacts.items()):
         key = f"carriage.{name}.contacts.{word}"
-        held = Grip(-1.0, place.rides, None, _held_at(contact))
+        held = Attachment(-1.0, place.rides, None, _held_at(contact))
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
         rigid = contact.stiffness == "rigid"
         springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
     acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
-    return Standing(place.rides, modal.mass, reference, place.first, riders, acting, shares)
+    return SupportReactions(place.rides, modal.mass, reference, place.first, riders, acting, shares)
 
 
 def _held_at(contact: Contact) -> float | str:
@@ -96,9 +96,11 @@ def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tu
     """
     carriage = study.carriage[name]
     assert isinstance(carriage, BodyCarriage)
-    grips = [Grip(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
-    places = [grip.at if isinstance(grip.at, str) else np.array([grip.at]) for grip in grips]
-    shapes = np.stack([grip.fixed_row(modal) for grip in grips])
+    attachments = [Attachment(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
+    places = [
+        attachment.at if isinstance(attachment.at, str) else np.array([attachment.at]) for attachment in attachments
+    ]
+    shapes = np.stack([attachment.fixed_row(modal) for attachment in attachments])
     rigid = modal.omega == 0.0
     pull = modal.participation / modal.mass
     if not float(np.sum(pull[rigid] ** 2) * modal.mass) > 1.0 - HELD:
@@ -212,7 +214,7 @@ def _joints(carriage: BodyCarriage, riders: tuple[Rider, ...], below: ModalBody,
     middle, rows = 0.5 * sum(carriage.motion.range()), []
     for rider, contact in joints:
         under = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0]
-        held = Grip(1.0, 0, None, _held_at(contact)).fixed_row(above)
+        held = Attachment(1.0, 0, None, _held_at(contact)).fixed_row(above)
         rows.append(np.concatenate([under * np.sqrt(below.mass), held * np.sqrt(above.mass)]))
     return np.array(rows)
 

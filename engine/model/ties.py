@@ -17,7 +17,7 @@ Inertia = Literal["force", "mass", "mass-without-convective"]
 
 
 @dataclass(frozen=True)
-class Grip:
+class Attachment:
     """A place where a tie acts on a body with ``factor`` times its force: where a rider is (its number), or a fixed
     place of the body's track (m) or a point of it (by name)."""
 
@@ -27,7 +27,7 @@ class Grip:
     at: float | str = 0.0
 
     @property
-    def unit(self) -> Grip:
+    def unit(self) -> Attachment:
         """The same place with the factor 1."""
         return replace(self, factor=1.0)
 
@@ -57,9 +57,9 @@ class CarriageTie:
     reference: float = 0.0
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def attachments(self) -> tuple[Attachment, ...]:
         """Where its weight acts."""
-        return tuple(Grip(share, self.body, rider) for rider, share in self.loads)
+        return tuple(Attachment(share, self.body, rider) for rider, share in self.loads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +77,14 @@ class SpringTie:
     carriage: int
     rider: int
     key: str
-    held: Grip | None
+    held: Attachment | None
     mode: int | None
     damped: bool
     rigid: bool = False
 
-    def grips(self, body: int) -> tuple[Grip, ...]:
+    def attachments(self, body: int) -> tuple[Attachment, ...]:
         """Where its force acts; ``body`` is ridden."""
-        below = Grip(1.0, body, self.rider)
+        below = Attachment(1.0, body, self.rider)
         return (below,) if self.held is None else (below, self.held)
 
 
@@ -97,6 +97,6 @@ class DamperTie:
     key: str
 
     @property
-    def grips(self) -> tuple[Grip, ...]:
+    def attachments(self) -> tuple[Attachment, ...]:
         """Where its force acts."""
-        return (Grip(1.0, self.body, None, self.at),)
+        return (Attachment(1.0, self.body, None, self.at),)

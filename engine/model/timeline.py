@@ -144,7 +144,7 @@ def _passes(motion: Motion, place: float) -> tuple[float, ...]:
     )
 
 
-class Strike(NamedTuple):
+class Impact(NamedTuple):
     """A carriage that arrives at the beginning of a segment with a speed, or whose speed jumps there (m per tau)."""
 
     rider: int
@@ -166,7 +166,7 @@ class Segment(NamedTuple):
     first: int
     active: tuple[bool, ...]
     fresh: bool
-    strikes: tuple[Strike, ...]
+    strikes: tuple[Impact, ...]
     recorded: bool
     free: bool
 
@@ -335,7 +335,7 @@ class _Part(NamedTuple):
     end: float
     active: tuple[bool, ...]
     fresh: bool
-    strikes: tuple[Strike, ...]
+    strikes: tuple[Impact, ...]
     recorded: bool
 
     def stepped(self, total: int, count: int) -> Iterator[Segment]:
@@ -409,7 +409,7 @@ def _slices(total: int) -> list[int]:
 
 def _strikes(
     riders: tuple[Rider, ...], active: tuple[bool, ...], before: tuple[bool, ...], ends: tuple[float, float]
-) -> Iterator[Strike]:
+) -> Iterator[Impact]:
     """Arrivals and jumps of speed at the beginning of a segment; at time 0 the initial state holds just after."""
     start, stop = ends
     for number, rider in enumerate(riders):
@@ -417,10 +417,10 @@ def _strikes(
             continue
         if not before[number]:
             if start > 0.0:
-                yield Strike(number, "arrival", float(rider.path(np.array([start]), start, stop).dS[0]))
+                yield Impact(number, "arrival", float(rider.path(np.array([start]), start, stop).dS[0]))
             continue
         times, jumps = rider.speed_jumps
         place = int(np.searchsorted(times, start))
         for near in range(max(0, place - 1), min(place + 1, times.size)):
             if abs(times[near] - start) <= _SAME * rider.end:
-                yield Strike(number, "reversal", float(jumps[near]))
+                yield Impact(number, "reversal", float(jumps[near]))

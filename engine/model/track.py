@@ -10,50 +10,52 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import FORCE, RATE, Alpha, Blow, Newmark, Ties
-from engine.kernels.rows import add_grip, close_rows
+from engine.kernels.layout import FORCE, RATE, Alpha, Impulse, Newmark, Ties
+from engine.kernels.rows import add_attachment, close_rows
 from engine.model.attachment import holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
-from engine.model.ties import Grip, SpringTie
+from engine.model.station_path import StationPath
+from engine.model.ties import Attachment, SpringTie
 from engine.model.timeline import Segment
 
 Array = NDArray[np.float64]
 
 
 def tabulate_ties(
-    model: SceneModel, along: tuple[Way, ...], scheme: Newmark | Alpha, missed: Array | None = None
+    model: SceneModel, along: tuple[StationPath, ...], scheme: Newmark | Alpha, missed: Array | None = None
 ) -> Ties:
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
-    `grips.residual`, where it is known."""
+    `attachments.residual`, where it is known."""
     stations, modes = along[0].s.size, model.omega.size
     rows, reaches = np.zeros((stations, modes, model.ties, 4)), np.zeros((modes, model.ties), dtype=np.bool_)
     drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
-    for r, grips in enumerate(model.grips):
-        for grip in grips:
-            if holds(grip, along):
-                motion = _motion(model, r, grip, along)
-                shapes = shape_derivatives(model, grip, along, motion.highest)
-                add_grip(rows, r, model.bodies[grip.body].modes.start, grip.factor, shapes, motion.factors)
+    for r, attachments in enumerate(model.attachments):
+        for attachment in attachments:
+            if holds(attachment, along):
+                motion = _motion(model, r, attachment, along)
+                shapes = shape_derivatives(model, attachment, along, motion.highest)
+                add_attachment(
+                    rows, r, model.bodies[attachment.body].modes.start, attachment.factor, shapes, motion.factors
+                )
     for r, carriage in enumerate(model.carriages):
         if along[r].active and carriage.inertia == "mass":
-            drive[:, r] = _curved_sag(model, carriage.grips[0], along)
+            drive[:, r] = _curved_sag(model, carriage.attachments[0], along)
     for r, spring in enumerate(model.springs, start=model.first_spring):
         if spring.mode is not None:
             rows[:, spring.mode, r, FORCE] = -1.0
             rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
         if along[spring.rider].active:
-            drive[:, r], level[:, r] = _sag_under(model, spring, model.grips[r][0], along)
+            drive[:, r], level[:, r] = _sag_under(model, spring, model.attachments[r][0], along)
     inertial, springs = _kinds(model)
     close_rows(rows, inertial, scheme.beta, scheme.gamma, reaches)
     damped = [False] * len(model.carriages) + [True for _ in model.dampers] + [s.damped for s in model.springs]
     moves = inertial | np.array(damped, dtype=np.bool_)
-    given, reacting = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
+    prescribed, reactive = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
     unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
     missed = residual(model, along) if missed is None else missed
-    return Ties(rows, drive, level, reacting, given, moves, springs, missed, unity, reaches)
+    return Ties(rows, drive, level, reactive, prescribed, moves, springs, missed, unity, reaches)
 
 
 def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -65,17 +67,17 @@ def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 class _Motion(NamedTuple):
-    """How a grip moves along its body: the highest derivative of shapes that its ties read, and `add_grip`'s motion."""
+    """How an attachment moves along its body: the highest derivative of shapes that its ties read, and the motion."""
 
     highest: int
     factors: Array
 
 
-def _motion(model: SceneModel, r: int, grip: Grip, along: tuple[Way, ...]) -> _Motion:
-    """Of a grip of the tie r. Of a mass or rigid joint A = 2 s' phi', B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28); of
-    a damper A = phi, B = s' phi' (mechanics section 4)."""
+def _motion(model: SceneModel, r: int, attachment: Attachment, along: tuple[StationPath, ...]) -> _Motion:
+    """Of an attachment of tie r. Of a mass or rigid joint A = 2 s' phi', B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28);
+    of a damper A = phi, B = s' phi' (mechanics section 4)."""
     stations, number = along[0].s.size, r - model.first_spring
-    way = None if grip.rider is None else along[grip.rider]
+    way = None if attachment.rider is None else along[attachment.rider]
     if number < 0:
         convected = r < len(model.carriages) and model.carriages[r].inertia == "mass"
         damped = r >= len(model.carriages)
@@ -93,14 +95,16 @@ def _motion(model: SceneModel, r: int, grip: Grip, along: tuple[Way, ...]) -> _M
     return _Motion(1, factors)
 
 
-def _curved_sag(model: SceneModel, grip: Grip, along: tuple[Way, ...]) -> Array:
+def _curved_sag(model: SceneModel, attachment: Attachment, along: tuple[StationPath, ...]) -> Array:
     """(stations,) what the curve of the body's own sag accelerates a mass by on its way, per unit gravity."""
-    assert grip.rider is not None
-    way = along[grip.rider]
-    return np.asarray(way.ds**2 * model.sag(grip.body, way.s, 2) + way.dds * model.sag(grip.body, way.s, 1))
+    assert attachment.rider is not None
+    way = along[attachment.rider]
+    return np.asarray(way.ds**2 * model.sag(attachment.body, way.s, 2) + way.dds * model.sag(attachment.body, way.s, 1))
 
 
-def _sag_under(model: SceneModel, spring: SpringTie, below: Grip, along: tuple[Way, ...]) -> tuple[Array, Array]:
+def _sag_under(
+    model: SceneModel, spring: SpringTie, below: Attachment, along: tuple[StationPath, ...]
+) -> tuple[Array, Array]:
     """(stations,) rate, of a rigid joint acceleration, and gap of a spring by the sag of the body that it stands on."""
     way = along[spring.rider]
     if spring.rigid:
@@ -109,7 +113,7 @@ def _sag_under(model: SceneModel, spring: SpringTie, below: Grip, along: tuple[W
     return (way.ds * model.sag(below.body, way.s, 1) if spring.damped else np.zeros_like(level)), level
 
 
-def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tuple[Array, Array, Array]:
+def rate_rows(model: SceneModel, ties: list[int], along: tuple[StationPath, ...]) -> tuple[Array, Array, Array]:
     """p and s' phi' (N, R) of springs or joints at the first station, and s' times the slope of the body's own sag (R,)
     per unit gravity; s' as the ways have it."""
     force, slope, sag = (
@@ -118,10 +122,12 @@ def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tup
         np.zeros(len(ties)),
     )
     for place, r in enumerate(ties):
-        for grip in model.grips[r]:
-            if holds(grip, along):
-                force[model.bodies[grip.body].modes, place] += grip.factor * shape_rows(model, grip, along)[0]
-        below = model.grips[r][0]
+        for attachment in model.attachments[r]:
+            if holds(attachment, along):
+                force[model.bodies[attachment.body].modes, place] += (
+                    attachment.factor * shape_rows(model, attachment, along)[0]
+                )
+        below = model.attachments[r][0]
         if below.rider is not None and along[below.rider].active:
             way = along[below.rider]
             slope[model.bodies[below.body].modes, place] = way.ds[0] * shape_rows(model, below, along, 1)[0]
@@ -129,7 +135,7 @@ def rate_rows(model: SceneModel, ties: list[int], along: tuple[Way, ...]) -> tup
     return force, slope, sag
 
 
-def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: Array) -> Blow:
+def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: Array) -> Impulse:
     """The impulse at the beginning of a segment.
 
     mass (blocks, ties, LANES): kg, zero for ties without inertia;  time_scale (blocks, LANES): s per scene time.
@@ -152,4 +158,4 @@ def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: 
         arrives[strike.rider] = float(strike.kind == "arrival" and inertia != "force")
         if inertia == "mass":
             speed[:, strike.rider] = strike.speed / time_scale
-    return Blow(shape, slope, sag_slope, arrives, mass, speed)
+    return Impulse(shape, slope, sag_slope, arrives, mass, speed)

@@ -32,7 +32,7 @@ _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal rat
 
 
 @dataclass(frozen=True, eq=False)
-class LaneValues:
+class VariantValues:
     """Numbers of a study for some variants: swept columns (V,) by dotted key, the study's own value elsewhere."""
 
     study: Study
@@ -87,14 +87,14 @@ class LaneValues:
         return self._of(tie.key if isinstance(tie, DamperTie) else f"{tie.key}.damping")
 
     @property
-    def padded(self) -> LaneValues:
+    def padded(self) -> VariantValues:
         """The same filled up to whole blocks by repeating the last variant."""
         lanes = padded(np.arange(self.size))
-        return LaneValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+        return VariantValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
 
-    def part(self, lanes: NDArray[np.int64]) -> LaneValues:
+    def part(self, lanes: NDArray[np.int64]) -> VariantValues:
         """Some of the variants."""
-        return LaneValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+        return VariantValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
 
     def time_scale(self, carriage: str) -> Array:
         """(V,) seconds per unit of a carriage's own tau."""
@@ -137,13 +137,13 @@ class LaneValues:
         return 2.0 * self._of(key) * omega[:, None]
 
 
-def moving_mass(model: SceneModel, values: LaneValues, carriage: int) -> Array:
+def moving_mass(model: SceneModel, values: VariantValues, carriage: int) -> Array:
     """(V,) kg of a whole carriage."""
     tie = model.carriages[carriage]
     return values.own_mass(tie.name) + tie.own_mass
 
 
-def weight(model: SceneModel, values: LaneValues, carriage: int) -> Array:
+def weight(model: SceneModel, values: VariantValues, carriage: int) -> Array:
     """(V,) N of a carriage along the deflections of the track that it rides."""
     tie = model.carriages[carriage]
     if not model.study.carriage[tie.name].inertial:
@@ -151,7 +151,7 @@ def weight(model: SceneModel, values: LaneValues, carriage: int) -> Array:
     return moving_mass(model, values, carriage) * values.gravity * model.bodies[tie.body].modal.gravity_share
 
 
-def weights(model: SceneModel, values: LaneValues) -> Array:
+def weights(model: SceneModel, values: VariantValues) -> Array:
     """(C, V) N of all carriages."""
     return np.stack([weight(model, values, number) for number in range(len(model.carriages))])
 
@@ -183,15 +183,15 @@ def from_blocks(blocks: Array, size: int) -> Array:
 class LaneTable:
     """Numbers of whole blocks of variants of one scene, in SI units.
 
-    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  mobility (blocks, N, LANES): 1, and 1/m (1/kg) of sprung
-    masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches
-    the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES):
-    N s/m and N/m, zero for carriages;  time_scale, gravity (blocks, LANES).
+    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  inverse_modal_mass (blocks, N, LANES): 1, and 1/m (1/kg) of
+    sprung masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what
+    touches the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties,
+    LANES): N s/m and N/m, zero for carriages;  time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
     rates: Array
-    mobility: Array
+    inverse_modal_mass: Array
     mass: Array
     joint: Array
     weight: Array
@@ -206,16 +206,16 @@ class LaneTable:
         return Lanes(
             stiffness=(self.omega[:, None] * h) ** 2,
             damping=self.rates * h,
-            mobility=self.mobility,
-            gain=self.mass + self.joint + self.damper * h,
-            stiff=self.spring * h**2,
+            inverse_modal_mass=self.inverse_modal_mass,
+            coupling_mass=self.mass + self.joint + self.damper * h,
+            coupling_stiffness=self.spring * h**2,
             load=self.weight * h**2,
             gravity=self.gravity,
             step=step,
         )
 
 
-def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
+def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     """The lanes of some variants, whose number must be a multiple of LANES."""
     rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
     none, numbers = np.zeros(values.size), range(len(model.carriages))
@@ -228,7 +228,9 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     return LaneTable(
         omega=model.omega,
         rates=to_blocks(np.concatenate([*rates, np.zeros((len(model.sprung), values.size))])),
-        mobility=to_blocks(np.concatenate([ones, *(1.0 / values.sprung_mass(s)[None] for s in model.sprung)])),
+        inverse_modal_mass=to_blocks(
+            np.concatenate([ones, *(1.0 / values.sprung_mass(s)[None] for s in model.sprung)])
+        ),
         mass=to_blocks(np.stack(masses + dampers + springs)),
         joint=to_blocks(np.stack(carriages + dampers + rigid)),
         weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs])),
@@ -239,7 +241,7 @@ def lane_table(model: SceneModel, values: LaneValues) -> LaneTable:
     )
 
 
-def _contact_mass(model: SceneModel, values: LaneValues, number: int) -> Array:
+def _contact_mass(model: SceneModel, values: VariantValues, number: int) -> Array:
     """(V,) kg of a carriage whose inertia acts where it touches its body."""
     carriage = model.carriages[number]
     if carriage.inertia == "force":

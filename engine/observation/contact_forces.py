@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
-from engine.model.ties import Grip
+from engine.model.station_path import StationPath
+from engine.model.ties import Attachment
 from engine.model.timeline import Rider
 from engine.observation.readings import Channel, Sensor
 
@@ -27,13 +27,13 @@ class ContactForce:
     carriage: int
     contact: int | None = None
 
-    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         return []
 
-    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
-    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros(along[0].s.size)
 
     @property
@@ -44,7 +44,7 @@ class ContactForce:
         """The rider whose place it is."""
         return self.carriage if self.contact is None else self.contact
 
-    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         rider = self.rides(model)
         way, body = along[rider], model.carriages[self.carriage].body
@@ -62,28 +62,28 @@ class ContactSensor(Sensor):
     carriage: int
     contact: int | None
 
-    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         return []
 
-    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
-    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return self.missed(model, along)
 
-    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros((1, model.omega.size))
 
-    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
+    def unit_reading(self, model: SceneModel, along: tuple[StationPath, ...], attachment: Attachment) -> Array:
         return np.ones(1)
 
     def rides(self, model: SceneModel) -> int:
         return ContactForce(self.carriage, self.contact).rides(model)
 
-    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         return np.full(along[0].s.size, along[self.rides(model)].active)
 
-    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros(along[0].s.size)
 
 

@@ -18,8 +18,8 @@ from engine.bodies.modal.modal_body import ModalBody, Sections
 from engine.model.attachment import holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.scene_model import BodyPart, SceneModel
-from engine.model.station_path import Way
-from engine.model.ties import Grip
+from engine.model.station_path import StationPath
+from engine.model.ties import Attachment
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -48,16 +48,16 @@ class Sensor:
     at: float
     under: int | None
 
-    def places(self, along: tuple[Way, ...]) -> Array:
+    def places(self, along: tuple[StationPath, ...]) -> Array:
         """Where it reads, m: one place, or one per station."""
         return np.array([self.at]) if self.under is None else along[self.under].s
 
-    def shape(self, model: SceneModel, along: tuple[Way, ...], derivative: int) -> Array:
+    def shape(self, model: SceneModel, along: tuple[StationPath, ...], derivative: int) -> Array:
         """(1 or stations, modes of its body) mode shapes where it reads."""
         body = model.bodies[self.body].modal
         return body.shape_at(self.at, derivative) if self.under is None else along[self.under].shape(body, derivative)
 
-    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         """Its sums over the modes."""
         part = model.bodies[self.body]
         if self.quantity in DERIVATIVE:
@@ -74,38 +74,38 @@ class Sensor:
             material = {"q": ds**2 * self.shape(model, along, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
         return [Channel(of, order, _spread(model, part, rows)) for of, rows in material.items()]
 
-    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(stations, ties): static response per unit force of each tie that the kept modes miss."""
         found = np.zeros((along[0].s.size, model.ties))
         if self.quantity not in DERIVATIVE or not model.numerics.static_correction:
             return found
-        known = dict[Grip, Array]()
-        for r, grip in self._felt(model, along):
-            if grip.unit not in known:  # a carriage's weight and its springs hold the same places
-                kept = self._kept(model, along, shape_rows(model, grip, along))
-                known[grip.unit] = self._full(model, along, place(grip, along)) - kept
-            found[:, r] += grip.factor * known[grip.unit]
+        known = dict[Attachment, Array]()
+        for r, attachment in self._felt(model, along):
+            if attachment.unit not in known:  # a carriage's weight and its springs hold the same places
+                kept = self._kept(model, along, shape_rows(model, attachment, along))
+                known[attachment.unit] = self._full(model, along, place(attachment, along)) - kept
+            found[:, r] += attachment.factor * known[attachment.unit]
         return found
 
-    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(stations, ties) static reading per unit force of each tie, by what the march tends to when it is slow: the
         whole influence line with the static correction, else the kept modes."""
         found = np.zeros((along[0].s.size, model.ties))
         if self.offset_order == 0:
-            for r, grip in self._felt(model, along):
-                found[:, r] += grip.factor * self.unit_reading(model, along, grip)
+            for r, attachment in self._felt(model, along):
+                found[:, r] += attachment.factor * self.unit_reading(model, along, attachment)
         return found
 
-    def unit_reading(self, model: SceneModel, along: tuple[Way, ...], grip: Grip) -> Array:
-        """(1 or stations,) static reading per unit force where a grip holds its body."""
+    def unit_reading(self, model: SceneModel, along: tuple[StationPath, ...], attachment: Attachment) -> Array:
+        """(1 or stations,) static reading per unit force where an attachment holds its body."""
         if not model.numerics.static_correction:
-            return self._kept(model, along, shape_rows(model, grip, along))
-        whole = self._full(model, along, place(grip, along))
-        here = None if grip.rider is None else along[grip.rider].here
+            return self._kept(model, along, shape_rows(model, attachment, along))
+        whole = self._full(model, along, place(attachment, along))
+        here = None if attachment.rider is None else along[attachment.rider].here
         return whole if here is None else np.where(here, whole, 0.0)
 
-    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
-        """(1 or stations, N) what it reads of the coordinates that only contacts hold (`statics.loose_modes`)."""
+    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+        """(1 or stations, N) what it reads of `equilibrium.unrestrained_coordinates`, which only contacts hold."""
         if self.offset_order:
             return np.zeros((1, model.omega.size))
         return _spread(model, model.bodies[self.body], self._rows(model, along))
@@ -123,12 +123,12 @@ class Sensor:
         """The rider that it moves with."""
         return self.under
 
-    def _felt(self, model: SceneModel, along: tuple[Way, ...]) -> Iterator[tuple[int, Grip]]:
-        """The grips of all ties on its body, with the ties' numbers."""
-        for r, grips in enumerate(model.grips):
-            for grip in grips:
-                if grip.body == self.body and holds(grip, along):
-                    yield r, grip
+    def _felt(self, model: SceneModel, along: tuple[StationPath, ...]) -> Iterator[tuple[int, Attachment]]:
+        """The attachments of all ties on its body, with the ties' numbers."""
+        for r, attachments in enumerate(model.attachments):
+            for attachment in attachments:
+                if attachment.body == self.body and holds(attachment, along):
+                    yield r, attachment
 
     def _modal(self, model: SceneModel) -> ModalBody:
         return model.bodies[self.body].modal
@@ -137,7 +137,7 @@ class Sensor:
         """What reads section forces where the body is not one uniform beam."""
         return self._modal(model).sections if self.quantity in OF_SECTIONS else None
 
-    def _rows(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def _rows(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(1 or stations, modes of its body) what it reads of every mode."""
         sections = self._sections(model)
         if sections is not None:
@@ -145,7 +145,7 @@ class Sensor:
         shape = self.shape(model, along, DERIVATIVE[self.quantity])
         return np.asarray(_factor(model.bodies[self.body], self.quantity) * shape)
 
-    def _full(self, model: SceneModel, along: tuple[Way, ...], loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
         """Static reading per unit force at places of the track (m), or at a point (its name)."""
         part, sections = model.bodies[self.body], self._sections(model)
         if isinstance(loaded, str):
@@ -155,7 +155,7 @@ class Sensor:
         line = part.modal.influence_at(self.places(along), loaded, DERIVATIVE[self.quantity])
         return np.asarray(_factor(part, self.quantity) * line)
 
-    def _under_point(self, model: SceneModel, along: tuple[Way, ...], point: str) -> Array:
+    def _under_point(self, model: SceneModel, along: tuple[StationPath, ...], point: str) -> Array:
         """Static reading per unit force at a point."""
         part, x = model.bodies[self.body], self.places(along)
         assert part.modal.points is not None
@@ -165,11 +165,11 @@ class Sensor:
             _factor(part, self.quantity) * part.modal.points.influence(point, x, DERIVATIVE[self.quantity])
         )
 
-    def _kept(self, model: SceneModel, along: tuple[Way, ...], loaded: Array) -> Array:
+    def _kept(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
         return np.asarray(np.sum(self._rows(model, along) * loaded * self._modal(model).modal_flexibility, axis=1))
 
-    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""
         stations = along[0].s.size
         x = self.places(along)
@@ -189,7 +189,7 @@ class Sensor:
             return way.ds * slope
         return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
 
-    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def sagging(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(stations,): its static reading by the body's own weight per unit gravity."""
         return self.offset(model, along) if self.offset_order == 0 else np.zeros(along[0].s.size)
 
@@ -198,7 +198,7 @@ class Sensor:
         """The power of 1/h that makes the offset SI."""
         return RATE_ORDER.get(self.quantity, 0)
 
-    def counted(self, model: SceneModel, along: tuple[Way, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, self.under is None or along[self.under].active)
 
@@ -210,26 +210,26 @@ class SprungSensor(Sensor):
 
     mode: int
 
-    def channels(self, model: SceneModel, along: tuple[Way, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         row = np.zeros((1, model.omega.size))
         row[0, self.mode] = 1.0
         return [Channel("qva"[self.offset_order], self.offset_order, row)]
 
-    def missed(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros((along[0].s.size, model.ties))
 
-    def unit_static(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros((along[0].s.size, model.ties))
 
-    def loose(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         found = np.zeros((1, model.omega.size))
         found[0, self.mode] = float(self.offset_order == 0)
         return found
 
-    def offset(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros(along[0].s.size)
 
-    def sagging(self, model: SceneModel, along: tuple[Way, ...]) -> Array:
+    def sagging(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros(along[0].s.size)
 
 

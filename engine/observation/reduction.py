@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.motion_base import Motion
 from engine.scene.study import Study
 from results_schema.status import Fidelity
@@ -60,7 +60,7 @@ class Compared:
     other: Mapping[str, NDArray[Any]]
     scale: Array
     apart: Array
-    values: LaneValues
+    values: VariantValues
 
     def gap(self, name: str) -> Array:
         """|difference| of a result; 0 where neither has a number, NaN where only one has."""

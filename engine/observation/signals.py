@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import Watch
+from engine.kernels.layout import Observation
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
+from engine.model.station_path import StationPath
 from engine.model.ties import CarriageTie
 from engine.observation.contact_forces import ContactForce, ContactSensor, contact_forces
 from engine.observation.readings import Sensor, SprungSensor
@@ -54,21 +54,21 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     )
 
 
-def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...]) -> Array:
+def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: tuple[StationPath, ...]) -> Array:
     """(stations, signals, ties) static responses per unit force of each tie that the kept modes miss."""
     return np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1))
 
 
 def tabulate_watch(
-    model: SceneModel, signals: tuple[Signal, ...], along: tuple[Way, ...], missed: Array | None = None
-) -> Watch:
+    model: SceneModel, signals: tuple[Signal, ...], along: tuple[StationPath, ...], missed: Array | None = None
+) -> Observation:
     """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
     modes = 4 * -(-model.omega.size // 4)
     counted = np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1))
-    return Watch(
+    return Observation(
         on_q=_stacked(rows["q"], modes),
         on_v=_stacked(rows["v"], modes),
         on_a=_stacked(rows["a"], modes),
@@ -82,10 +82,10 @@ def tabulate_watch(
     )
 
 
-def last_signals(watch: Watch, count: int) -> Watch:
+def last_signals(watch: Observation, count: int) -> Observation:
     """The last so many signals of a watch, which have no channels, such as contact forces."""
     part = slice(watch.counted.shape[1] - count, None)
-    return Watch(
+    return Observation(
         on_q=_stacked([], watch.on_q.shape[2]),
         on_v=_stacked([], watch.on_v.shape[2]),
         on_a=_stacked([], watch.on_a.shape[2]),

@@ -138,7 +138,7 @@ class OutAndBack(Motion):
         return Path(position, velocity, way * folded.ddS)
 
     def _there(self, tau: Array) -> Path:
-        """Way gone on the way out, 0 <= tau <= 1/2; the three branches of the law."""
+        """StationPath gone on the way out, 0 <= tau <= 1/2; the three branches of the law."""
         depth, fast, half = self.turn * self.stroke, self.max_speed, self.half_turn
         way, speed, change = depth + fast * (tau - half), np.full_like(tau, fast), np.zeros_like(tau)
         if depth == 0.0:

@@ -6,9 +6,9 @@ ties: each pulls the rows of G together with a force h over a compliance,
 
     M x'' + K x + G h = 0,    G^T x = S h,    S = diag(1/k) + R,
 
-with M and K diagonal, R the static flexibility between ties that the kept modes miss (`grips.missed_flexibility`), and
-1/k = 0 for masses and joints. S may be singular, so the inverse is what is computed, shifted by sigma M, as rigid-body
-motions have no stiffness: with D = (K + sigma M)^-1
+with M and K diagonal, R the static flexibility between ties that the kept modes miss
+(`attachment.residual_flexibility`), and 1/k = 0 for masses and joints. S may be singular, so the inverse is what is
+computed, shifted by sigma M, as rigid-body motions have no stiffness: with D = (K + sigma M)^-1
 
     (K + sigma M + G S^-1 G^T)^-1 = D - D G (S + G^T D G)^-1 G^T D,
 
@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES
-from engine.model.attachment import holds, missed_flexibility, rows, shared
+from engine.model.attachment import holds, residual_flexibility, rows, shared
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
-from engine.model.variant_values import LaneValues, from_blocks, lane_table
+from engine.model.station_path import StationPath
+from engine.model.variant_values import VariantValues, from_blocks, lane_table
 
 Array = NDArray[np.float64]
-Along = tuple[Way, ...]
+Along = tuple[StationPath, ...]
 
 UNRESISTED = 1e-10  # of the shift: omega^2 below it is a motion that nothing resists, and rounding
 ENDLESS = 1e-13  # of the largest: what no force moves, as a joint or a massless wheel forbids it
@@ -72,7 +72,7 @@ class _System:
         return np.asarray(0.5 * (found + np.swapaxes(found, 2, 3)))
 
 
-def coupled_frequencies(model: SceneModel, values: LaneValues, along: Along, count: int) -> Array:
+def coupled_frequencies(model: SceneModel, values: VariantValues, along: Along, count: int) -> Array:
     """(V, S, count) lowest natural frequencies in rad/s of some variants of a scene, with the riders at `along`."""
     system = _system(model, values, along)
     found = np.full((values.size, along[0].s.size, count), np.nan)
@@ -82,7 +82,7 @@ def coupled_frequencies(model: SceneModel, values: LaneValues, along: Along, cou
     return found
 
 
-def coupled_modes(model: SceneModel, values: LaneValues, along: Along, count: int) -> CoupledModes:
+def coupled_modes(model: SceneModel, values: VariantValues, along: Along, count: int) -> CoupledModes:
     """The same with their shapes, which are those of the kept modes."""
     system, modes = _system(model, values, along), model.omega.size
     omega = np.full((values.size, along[0].s.size, count), np.nan)
@@ -118,10 +118,10 @@ def _parts(system: _System, size: int) -> Iterator[slice]:
         yield slice(first, min(first + step, size))
 
 
-def _system(model: SceneModel, values: LaneValues, along: Along) -> _System:
+def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     """The matrices of all variants at all stations."""
     padding = (0, -values.size % LANES)
-    whole = LaneValues(
+    whole = VariantValues(
         values.study,
         {path: np.pad(column, padding, mode="edge") for path, column in values.columns.items()},
         values.size + padding[1],
@@ -131,7 +131,7 @@ def _system(model: SceneModel, values: LaneValues, along: Along) -> _System:
     ties = np.array([*masses, *range(model.first_spring, model.ties)], dtype=np.int64)
     on_track = from_blocks(lanes.mass, values.size)[masses]
     least = MASSLESS * model.leading_body.modal.mass
-    mass = np.concatenate([1.0 / from_blocks(lanes.mobility, values.size), np.maximum(on_track, least)])
+    mass = np.concatenate([1.0 / from_blocks(lanes.inverse_modal_mass, values.size), np.maximum(on_track, least)])
     spring = from_blocks(lanes.spring, values.size)[ties]
     return _System(
         stiffness=np.concatenate([model.omega**2, np.zeros(len(masses))]),
@@ -147,9 +147,11 @@ def _rows(model: SceneModel, along: Along, ties: NDArray[np.int64], masses: int)
     """(S, n, T) what every tie holds together: the track, and the mass or what rides."""
     found = np.zeros((along[0].s.size, model.omega.size + masses, len(ties)))
     for place, r in enumerate(ties):
-        for grip in model.grips[r]:
-            if holds(grip, along):
-                found[:, model.bodies[grip.body].modes, place] += grip.factor * rows(model, grip, along)
+        for attachment in model.attachments[r]:
+            if holds(attachment, along):
+                found[:, model.bodies[attachment.body].modes, place] += attachment.factor * rows(
+                    model, attachment, along
+                )
         mode = model.springs[r - model.first_spring].mode if r >= model.first_spring else model.omega.size + place
         if mode is not None:
             found[:, mode, place] = -1.0
@@ -164,6 +166,6 @@ def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:
     for i, r in enumerate(ties):
         for j, s in enumerate(ties[: i + 1]):
             for one, other in shared(model, int(r), int(s), along):
-                found[:, i, j] += missed_flexibility(model, one, other, along)
+                found[:, i, j] += residual_flexibility(model, one, other, along)
             found[:, j, i] = found[:, i, j]
     return found

@@ -35,7 +35,7 @@ class StaticState:
     coordinate: Array
 
 
-def loose_modes(model: SceneModel) -> Indices:
+def unrestrained_coordinates(model: SceneModel) -> Indices:
     """Numbers of the coordinates that nothing but springs hold."""
     found: list[int] = []
     for carriage in model.carriages:
@@ -50,7 +50,7 @@ def static_state(model: SceneModel, along: Along) -> StaticState:
     count = len(model.carriages)
     weights = np.zeros((1, model.ties, count + 1))
     weights[0, np.arange(count), np.arange(count)] = 1.0
-    loose = loose_modes(model)
+    loose = unrestrained_coordinates(model)
     if not model.springs:
         return StaticState(weights, loose, np.zeros((1, len(loose), count + 1)))
     stations, springs = along[0].s.size, np.arange(model.first_spring, model.ties)
@@ -90,11 +90,11 @@ def _row(model: SceneModel, ties: Indices, along: Along, mode: int) -> Array:
     for place, r in enumerate(ties):
         if r >= model.first_spring and model.springs[r - model.first_spring].mode == mode:
             found[:, place] = -1.0
-        for grip in model.grips[r]:
-            modes = model.bodies[grip.body].modes
-            touches = grip.rider is None or along[grip.rider].active
+        for attachment in model.attachments[r]:
+            modes = model.bodies[attachment.body].modes
+            touches = attachment.rider is None or along[attachment.rider].active
             if touches and modes.start <= mode < modes.stop:
-                found[:, place] += grip.factor * rows(model, grip, along)[:, mode - modes.start]
+                found[:, place] += attachment.factor * rows(model, attachment, along)[:, mode - modes.start]
     return found
 
 

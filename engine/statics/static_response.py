@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Way
-from engine.model.variant_values import LaneValues, weights
+from engine.model.station_path import StationPath
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import ContactForce, contact_forces, contact_row
 from engine.observation.readings import Sensor
 from engine.observation.signals import build_signals
 from engine.statics.equilibrium import static_state
 
 Array = NDArray[np.float64]
-Along = tuple[Way, ...]
+Along = tuple[StationPath, ...]
 
 
 class StaticReadings(NamedTuple):
@@ -45,7 +45,7 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
     return found
 
 
-def static_values(model: SceneModel, values: LaneValues, along: Along) -> StaticReadings:
+def static_values(model: SceneModel, values: VariantValues, along: Along) -> StaticReadings:
     """Static readings of the study's sensors and of all contacts, for some variants of a scene."""
     sensors = [signal for signal in build_signals(model) if isinstance(signal, Sensor)]
     unit, loads = static_readings(model, sensors, along), _loads(model, values)
@@ -57,7 +57,7 @@ def static_values(model: SceneModel, values: LaneValues, along: Along) -> Static
     )
 
 
-def static_shapes(model: SceneModel, values: LaneValues, along: Along, body: int, x: Array) -> Array:
+def static_shapes(model: SceneModel, values: VariantValues, along: Along, body: int, x: Array) -> Array:
     """(V, S, X) deflection of a body at places x (X,) of its track, m, as a sensor there reads it."""
     places = [Sensor("", "displacement", body, float(place), None) for place in x]
     return np.asarray(np.einsum("sxl,lv->vsx", static_readings(model, places, along), _loads(model, values)))
@@ -75,7 +75,7 @@ def _name(model: SceneModel, contact: ContactForce) -> str:
     return f"{carriage}.{model.contact_names(contact.carriage)[contact.contact]}"
 
 
-def _loads(model: SceneModel, values: LaneValues) -> Array:
+def _loads(model: SceneModel, values: VariantValues) -> Array:
     """(C + 1, V) weight of every carriage in N, and gravity."""
     return np.stack([*weights(model, values), values.gravity])
 

@@ -22,7 +22,7 @@ from engine.bodies.frame.track import track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
 from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.rigid.rigid import Rigid
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.unreduced.track import FrameTrack, Rows, no_rows
 from results_schema.errors import BadInput
@@ -217,7 +217,7 @@ def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibil
     from scipy.sparse import csc_array
 
     body: Body = study.body[name]
-    values = LaneValues(study, {}, 1)
+    values = VariantValues(study, {}, 1)
     numbers, loads = point_loads(frame, assembly)
     points = [(loads[:, numbers[str(at)]], rate) for _, at, rate in frame.dampers() if rate > 0.0]
     rows = np.array([row for row, _ in points]).reshape(len(points), len(assembly.free))
@@ -280,7 +280,7 @@ class RigidTrack:
 def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:
     from scipy.sparse import csc_array
 
-    rates = LaneValues(study, {}, 1).damping_rates(name, np.zeros(2))[:, 0]
+    rates = VariantValues(study, {}, 1).damping_rates(name, np.zeros(2))[:, 0]
     mass = np.array([body.mass, body.inertia])
     nothing: Any = csc_array((2, 2))
     return FullBody(

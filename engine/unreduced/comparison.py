@@ -20,7 +20,7 @@ from engine.march.outcome import Flat
 from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel, build_model
 from engine.model.timeline import refined
-from engine.model.variant_values import LaneValues, weights
+from engine.model.variant_values import VariantValues, weights
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from engine.unreduced.march import Course, march_unreduced
@@ -58,16 +58,16 @@ class Compared:
 def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], None] = lambda: None) -> Compared:
     """Both models of one variant over the recorded part; spent: what it was computed with, as (1,). Raises BadInput as
     `unreduced_model`, and what `check` raises, which is called now and then."""
-    from engine.march.richardson import march_chosen  # here, as the check of a study marches nothing
+    from engine.march.richardson import march_scheme  # here, as the check of a study marches nothing
 
     number = next(number for number, members in enumerate(plan.members) if variant in members)
     study = reading_contacts(plan.cases.study_of(plan.study, variant))
     [(own, _)] = marches_again(plan.grids[number], spent)
     tables = _tables(own, study)
-    values = LaneValues(study, {}, LANES)
+    values = VariantValues(study, {}, LANES)
     wanted = plan.study.output.histories
     counts = counts_shown(tables.timeline, plan.window, "auto" if wanted == "none" else wanted)
-    marched = march_chosen(tables, values, counts, 1)
+    marched = march_scheme(tables, values, counts, 1)
     whole = unreduced_model(study, *plan.grids[number].scene.timing)
     by = int(np.clip(MOST_STEPS // tables.timeline.steps, 1, FINER))
     course = Course(
@@ -123,7 +123,7 @@ def _first_period(model: SceneModel) -> float:
     return 2.0 * np.pi / model.first_omega
 
 
-def _static(tables: SceneTables, values: LaneValues, counts: Counts) -> Array:
+def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
     """(H, J) static readings of the march's own model."""
     unit = tables.static_at(counts)
     loads = weights(tables.model, values)[:, 0]

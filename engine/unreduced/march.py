@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.timeline import Segment, Strike, Timeline, build_timeline
+from engine.model.timeline import Impact, Segment, Timeline, build_timeline
 from engine.observation.histories import rows_sampled
 from engine.unreduced.rows import Along, Readings, readings, rider_of, softness, softness_slopes, tie_rows
 from engine.unreduced.scene import Unreduced
@@ -258,7 +258,7 @@ class _March:
         force = np.linalg.solve(matrix, right)
         return free + reach @ force, force
 
-    def _strike(self, strikes: tuple[Strike, ...], along: Along, says: _Relations) -> None:
+    def _strike(self, strikes: tuple[Impact, ...], along: Along, says: _Relations) -> None:
         """Impulses of masses and rigid contacts that arrive or turn, and sprung masses that come from level ground."""
         model = self.model
         slope = tie_rows(model, along.some(slice(1)), 1).values[0]

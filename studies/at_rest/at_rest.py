@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Way
-    from engine.model.variant_values import LaneValues
+    from engine.model.station_path import StationPath
+    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from results_schema.status import Fidelity
 
@@ -40,10 +40,10 @@ class AtRest(Protocol):
 
     name: str
 
-    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> Named:
+    def variants(self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]) -> Named:
         """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V,) where a contact opens."""
 
-    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> Named:
+    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> Named:
         """Results (B, S, ...) along all bodies, of the scene without sweep."""
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> Named:
@@ -123,7 +123,7 @@ def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dat
 def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
     """Some variants, in the order of the scenes that they share."""
     from engine.model.distinct_models import scenes, structure
-    from engine.model.variant_values import LaneValues
+    from engine.model.variant_values import VariantValues
     from engine.scene.sweep import expand
 
     cases = expand(study)
@@ -132,14 +132,14 @@ def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: 
     numbers, found = [], []
     for model, variants in scenes(study, cases, chosen):
         work.check()
-        values = LaneValues(model.study, cases.columns_of(variants), variants.size)
+        values = VariantValues(model.study, cases.columns_of(variants), variants.size)
         numbers.append(variants)
         found.append(_evaluated(kind, model, values, places))
     joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
     return _plain({"number": np.concatenate(numbers), **joined})
 
 
-def _evaluated(kind: AtRest, model: SceneModel, values: LaneValues, places: Positions) -> dict[str, NDArray[Any]]:
+def _evaluated(kind: AtRest, model: SceneModel, values: VariantValues, places: Positions) -> dict[str, NDArray[Any]]:
     """Results of some variants of a scene, with NaN where a contact is off the body."""
     from engine.model.station_path import frozen
 
@@ -160,14 +160,14 @@ def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work:
     """Results with another number of modes of every body, with and without static correction."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
-    from engine.model.variant_values import LaneValues
+    from engine.model.variant_values import VariantValues
 
     found = []
     for correction in CORRECTED:
         model = base_scene(with_modes(study, modes, correction))
         along = frozen(model, places.all[places.checked])
         found.append(
-            {name: one[0] for name, one in kind.variants(model, LaneValues(model.study, {}, 1), along).items()}
+            {name: one[0] for name, one in kind.variants(model, VariantValues(model.study, {}, 1), along).items()}
         )
     names = [name for name in found[0] if name != "opened"]
     return _plain({name: np.stack([one[name] for one in found]) for name in names})
@@ -177,10 +177,10 @@ def _unreduced(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.
     """Results of the unreduced model, and those of the modes at the same positions."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
-    from engine.model.variant_values import LaneValues
+    from engine.model.variant_values import VariantValues
 
     model, positions = base_scene(study), places.all[places.unreduced]
-    reduced = kind.variants(model, LaneValues(model.study, {}, 1), frozen(model, positions))
+    reduced = kind.variants(model, VariantValues(model.study, {}, 1), frozen(model, positions))
     full = kind.unreduced(study.without_sweep(), model, positions)
     return _plain({**full, **{f"{name}_reduced": reduced[name][0] for name in full}})
 

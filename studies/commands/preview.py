@@ -15,7 +15,7 @@ from engine.batch.plan import Plan
 from engine.batch.plausibility import remarks
 from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneValues, moving_mass
+from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases, expand
 from studies.commands import chosen
 from studies.commands.forecast import Forecast, forecast
@@ -139,7 +139,7 @@ _START = {"rest": "undeformed, at rest", "equilibrium": "static equilibrium of t
 
 
 def _bodies(base: SceneModel) -> Table:
-    values, rows = LaneValues(base.study, {}, 1), []
+    values, rows = VariantValues(base.study, {}, 1), []
     for part in base.bodies:
         omega = part.modal.omega
         rates = values.damping_rates(part.name, omega)[:, 0]

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Way
-    from engine.model.variant_values import LaneValues
+    from engine.model.station_path import StationPath
+    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from results_schema.status import Fidelity
     from studies.pictures.common.figures import Figure
@@ -155,16 +155,18 @@ class _Coupled:
     def __init__(self, count: int) -> None:
         self.count = count
 
-    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+    def variants(
+        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
+    ) -> dict[str, NDArray[Any]]:
         from engine.statics.coupled_modes import coupled_frequencies
 
         return {"frequency": coupled_frequencies(model, values, along, self.count) / (2.0 * np.pi)}
 
-    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.model.variant_values import LaneValues
+    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
+        from engine.model.variant_values import VariantValues
         from engine.statics.coupled_modes import coupled_modes
 
-        found = coupled_modes(model, LaneValues(model.study, {}, 1), along, self.count)
+        found = coupled_modes(model, VariantValues(model.study, {}, 1), along, self.count)
         lines = []
         for part in model.bodies:
             rows = part.modal.shape(np.linspace(0.0, part.modal.length, BODY_PLACES))

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Way
-    from engine.model.variant_values import LaneValues
+    from engine.model.station_path import StationPath
+    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
@@ -169,7 +169,9 @@ class _Static:
 
     name = "influence"
 
-    def variants(self, model: SceneModel, values: LaneValues, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
+    def variants(
+        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
+    ) -> dict[str, NDArray[Any]]:
         from engine.observation.contact_forces import contact_forces
         from engine.statics.static_response import static_values
 
@@ -184,11 +186,11 @@ class _Static:
         named["opened"] = ((found.contacts < -LIFTS * size) & reacts).any(axis=2)
         return {**named, "contact_force": found.contacts}
 
-    def shapes(self, model: SceneModel, along: tuple[Way, ...]) -> dict[str, NDArray[Any]]:
-        from engine.model.variant_values import LaneValues
+    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
+        from engine.model.variant_values import VariantValues
         from engine.statics.static_response import static_shapes
 
-        values = LaneValues(model.study, {}, 1)
+        values = VariantValues(model.study, {}, 1)
         lines = [
             static_shapes(model, values, along, body, np.linspace(0.0, part.modal.length, BODY_PLACES))[0]
             for body, part in enumerate(model.bodies)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from engine.methods.comparison import ComparisonScheme
     from engine.methods.transition import Frozen
     from engine.model.scene_model import SceneModel
-    from engine.model.variant_values import LaneValues
+    from engine.model.variant_values import VariantValues
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
     from studies.protocol.measuring import Work
@@ -120,10 +120,10 @@ class MapScene:
         """omega_1 L/pi, m/s."""
         return self.model.first_omega * self.model.leading_body.modal.length / math.pi
 
-    def values(self, mass: Array, pace: Array | None = None, damping: Array | None = None) -> LaneValues:
+    def values(self, mass: Array, pace: Array | None = None, damping: Array | None = None) -> VariantValues:
         """Variants (V,) with masses over the body's, speeds over omega_1 L/pi or frequencies over omega_1, and damping
         ratios."""
-        from engine.model.variant_values import LaneValues
+        from engine.model.variant_values import VariantValues
 
         key = f"carriage.{CARRIAGE}"
         columns = {f"{key}.mass": mass * self.model.leading_body.modal.mass}
@@ -133,20 +133,20 @@ class MapScene:
             columns[f"{key}.motion.frequency"] = pace * self.model.first_omega / (2.0 * math.pi)
         if damping is not None:
             columns[f"body.{self.model.leading_body.name}.damping_ratio"] = damping
-        return LaneValues(self.study, columns, mass.size)
+        return VariantValues(self.study, columns, mass.size)
 
-    def oscillators(self, size: int) -> LaneValues:
+    def oscillators(self, size: int) -> VariantValues:
         """So many variants without mass and damping: the modes alone."""
         nothing = np.zeros(size)
         return self.values(nothing, damping=nothing)
 
-    def growth(self, steps: int, values: LaneValues) -> Array:
+    def growth(self, steps: int, values: VariantValues) -> Array:
         """(V,) spectral radius of one passage or period in so many steps."""
         from engine.methods.transition import spectral_radius, transitions
 
         return spectral_radius(transitions(self._tables(steps), values))
 
-    def march(self, steps: int, values: LaneValues, work: Work, sampled: Counts | None = None) -> Marched:
+    def march(self, steps: int, values: VariantValues, work: Work, sampled: Counts | None = None) -> Marched:
         """One passage from rest under the weight, V variants; signals and samples are of the contact force alone."""
         from engine.march.march import march
 
@@ -154,21 +154,21 @@ class MapScene:
         counts = np.zeros(0, dtype=np.int64) if sampled is None else sampled
         return march(tables, lanes, counts, values.size, work.halted, sampled=1)
 
-    def laid_out(self, steps: int, values: LaneValues) -> tuple[SceneTables, LaneValues]:
+    def laid_out(self, steps: int, values: VariantValues) -> tuple[SceneTables, VariantValues]:
         """Tables of so many steps, and the variants filled up to whole blocks of lanes."""
-        from engine.model.variant_values import LaneValues, padded
+        from engine.model.variant_values import VariantValues, padded
 
         lanes = padded(np.arange(values.size))
         columns = {path: column[lanes] for path, column in values.columns.items()}
-        return self._tables(steps), LaneValues(values.study, columns, lanes.size)
+        return self._tables(steps), VariantValues(values.study, columns, lanes.size)
 
-    def step_growth(self, values: LaneValues, step: Array, steps: int = 1, **held: Any) -> Array:
+    def step_growth(self, values: VariantValues, step: Array, steps: int = 1, **held: Any) -> Array:
         """(V,) spectral radius of one step (V,) in s, or several, the mass held at midspan; held: as of `frozen`."""
         from engine.methods.transition import spectral_radius, step_matrices
 
         return spectral_radius(step_matrices(self.frozen(**held), values, step, steps))
 
-    def multipliers(self, values: LaneValues, step: Array, **held: Any) -> NDArray[np.complex128]:
+    def multipliers(self, values: VariantValues, step: Array, **held: Any) -> NDArray[np.complex128]:
         """(V, M) what one step (V,) in s multiplies the motions by, the mass held at midspan; held: as of `frozen`.
         All infinite where the march overflows."""
         from engine.methods.transition import step_matrices

@@ -75,7 +75,7 @@ def contact(scene: MapScene, mass: float, speed: Array, work: Work) -> Contact:
     from engine.kernels.layout import BELOW_AT, SMALLEST
 
     values = scene.values(np.full_like(speed, mass), speed)
-    marks = scene.march(STEPS, values, work).marks[-1]
+    marks = scene.march(STEPS, values, work).statistics[-1]
     weight = mass * scene.model.leading_body.modal.mass * scene.study.gravity
     return Contact(marks[SMALLEST] / weight, np.where(marks[BELOW_AT] >= 0.0, marks[BELOW_AT] / STEPS, np.nan))
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
 from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
-from engine.model.variant_values import LaneValues, lane_table
+from engine.model.variant_values import VariantValues, lane_table
 
 Array = NDArray[np.float64]
 
@@ -40,10 +40,10 @@ def march(tables: SceneTables) -> tuple[Array, float]:
     jax.config.update("jax_enable_x64", True)
     segments = tables.timeline.segments
     rows, sensors, static = (np.concatenate(parts) for parts in zip(*(_rows(tables, s) for s in segments), strict=True))
-    lanes = lane_table(tables.model, LaneValues(tables.model.study, {}, LANES))
+    lanes = lane_table(tables.model, VariantValues(tables.model.study, {}, LANES))
     step = lanes.steps_of(lanes.time_scale * segments[0].step)
     stiffness, damping = step.stiffness[0, :, 0], step.damping[0, :, 0]
-    mass, load = step.gain[0, 0, 0], step.load[0, 0, 0]
+    mass, load = step.coupling_mass[0, 0, 0], step.load[0, 0, 0]
     start, first = initial_state(tables.model, lanes).q[0, :, 0], tables.table(segments[0]).ties.rows[0, :, 0]
     weight = 1.0 / step.step[0, 0] ** 2
     numpy = jax.numpy

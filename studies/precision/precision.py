@@ -24,9 +24,9 @@ from engine.march.tables import SceneTables
 from engine.methods.comparison import COMPARISON, march_comparison, prepare_comparison
 from engine.methods.ode import ModalEquations, Solved
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.station_path import Way, ways
+from engine.model.station_path import StationPath, ways
 from engine.model.timeline import Segment
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from studies.protocol.measuring import Work
@@ -117,16 +117,16 @@ def with_correction(model: SceneModel, corrected: bool) -> SceneModel:
 class SharedTables(SceneTables):
     """Tables whose ways are shared by all schemes of one body and number of steps: they take most of the time."""
 
-    shared: dict[Any, tuple[Way, ...]] = field(default_factory=dict)
+    shared: dict[Any, tuple[StationPath, ...]] = field(default_factory=dict)
 
-    def _ways(self, segment: Segment) -> tuple[Way, ...]:
+    def _ways(self, segment: Segment) -> tuple[StationPath, ...]:
         key = (segment.start, segment.end, segment.steps, segment.active)
         if key not in self.shared:
             self.shared[key] = ways(self.model, segment)
         return self.shared[key]
 
 
-def tables_of(model: SceneModel, steps: int, shared: dict[Any, tuple[Way, ...]] | None = None) -> SceneTables:
+def tables_of(model: SceneModel, steps: int, shared: dict[Any, tuple[StationPath, ...]] | None = None) -> SceneTables:
     """The tables of a scene, cut so that a Richardson pair can halve them. shared: ways of the same body and steps."""
     return SharedTables(model, steps, "whole", refinement=2, shared={} if shared is None else shared)
 
@@ -135,7 +135,7 @@ def run_scheme(tables: SceneTables, scheme: str, work: Work) -> Run:
     """March one variant by a scheme, or by a pair. tables: of a model with the scheme, where that is the march's."""
     work.check()
     counts = counts_shown(tables.timeline, "whole", "auto")
-    values, sampled = LaneValues(tables.model.study, {}, LANES), len(tables.signals)
+    values, sampled = VariantValues(tables.model.study, {}, LANES), len(tables.signals)
     with np.errstate(all="ignore"):
         if scheme == RICHARDSON:
             return _pair(tables, values, work)
@@ -146,7 +146,7 @@ def run_scheme(tables: SceneTables, scheme: str, work: Work) -> Run:
     return _run(tables, counts, found, found.history[:, :, 0])
 
 
-def _pair(tables: SceneTables, values: LaneValues, work: Work) -> Run:
+def _pair(tables: SceneTables, values: VariantValues, work: Work) -> Run:
     """A Richardson pair: its extremes as the march makes them, its histories from both marches at the coarse stations,
     (4 fine - coarse)/3."""
     coarse = tables.coarser
@@ -158,7 +158,7 @@ def _pair(tables: SceneTables, values: LaneValues, work: Work) -> Run:
 
 
 def _run(tables: SceneTables, counts: Counts, found: Marched, readings: Array) -> Run:
-    marks = found.marks[:, :, 0]
+    marks = found.statistics[:, :, 0]
     largest = np.maximum(marks[:, LARGEST], -marks[:, SMALLEST])[: len(tables.sensors)]
     gone = not bool(found.finite[0]) or bool((marks[:, DIVERGED_AT] >= 0).any()) or not np.isfinite(largest).all()
     return Run(tables, counts, readings, largest, gone)
@@ -202,7 +202,7 @@ def marched_reference(model: SceneModel, steps: int, work: Work) -> Reference:
     swiftest = with_scheme(model, "fox-goodwin")
     near = model.omega.max() * ModalEquations(model).time_scale / (steps // 2) > SAFE * swiftest.scheme.stability_limit
     tables = tables_of(with_scheme(model, "average-acceleration") if near else swiftest, steps)
-    values, sampled = LaneValues(model.study, {}, LANES), len(tables.signals)
+    values, sampled = VariantValues(model.study, {}, LANES), len(tables.signals)
     counts = np.arange(tables.coarser.timeline.window[1] + 1)
     fine = march(tables, values, 2 * counts, 1, work.halted, sampled).history[:, :, 0]
     rough = march(tables.coarser, values, counts, 1, work.halted, sampled).history[:, :, 0]
@@ -282,7 +282,7 @@ def seconds_per_variant(tables: SceneTables, scheme: str, work: Work) -> float:
 
 def _seconds(tables: SceneTables, scheme: str, size: int, threads: int) -> float:
     """Wall time of so many variants on every thread."""
-    values, nothing = LaneValues(tables.model.study, {}, size), np.zeros(0, dtype=np.int64)
+    values, nothing = VariantValues(tables.model.study, {}, size), np.zeros(0, dtype=np.int64)
     if scheme == RICHARDSON:
         return seconds_of_jobs([partial(march_pair, tables, values, nothing, size)] * threads, threads)
     known = COMPARISON.get(scheme)

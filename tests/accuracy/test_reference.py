@@ -11,7 +11,7 @@ import pytest
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from results_schema.status import Status
 from tests.accuracy.passages import OPEN, WEIGHT, ZETA, only_grid, passages
@@ -149,7 +149,7 @@ def test_lanes_may_stop_at_different_levels() -> None:
     grid = only_grid(passages(bed=OPEN, sweep=sweep, solver={"tolerance": 1e-4}))
     found = levels(grid)
     assert len(np.unique(found.used["work"])) > 1
-    assert isinstance(grid.values, LaneValues) and np.all(found.used["steps_used"] > 0)
+    assert isinstance(grid.values, VariantValues) and np.all(found.used["steps_used"] > 0)
 
 
 @pytest.mark.parametrize("modes", ["auto", 4, 20, 64])

@@ -22,7 +22,7 @@ from engine.batch.dataset import Collector, build
 from engine.batch.execution import execute, run
 from engine.batch.plan import Plan, make_plan
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneTable, LaneValues, to_blocks
+from engine.model.variant_values import LaneTable, VariantValues, to_blocks
 from engine.scene.study import Study
 from results_schema.errors import BadInput, Interrupted
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
@@ -164,7 +164,7 @@ def test_one_bad_lane_leaves_its_neighbours_alone(
     clean = run(given)
     table = engine.march.march.lane_table
 
-    def poisoned(model: SceneModel, lane_values: LaneValues) -> LaneTable:
+    def poisoned(model: SceneModel, lane_values: VariantValues) -> LaneTable:
         bad = np.isclose(lane_values.own_mass("car"), clean.weight.values[20])
         return poison(table(model, lane_values), to_blocks(bad))
 

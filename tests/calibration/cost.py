@@ -21,7 +21,7 @@ from engine.linear_algebra import one_thread
 from engine.march.outcome import Outcome, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from studies.protocol.study import kind_of
 from tests.calibration.scenes import draw
@@ -77,7 +77,7 @@ def compared(plan: Plan, judged: int, seed: int) -> dict[str, Any]:
     [grid], [members] = plan.grids, plan.members
     others = np.setdiff1d(members, plan.choice.pilots)
     picked = np.sort(np.random.default_rng(seed).permutation(others)[:judged])
-    values = LaneValues(grid.scene.study, plan.cases.columns_of(picked), picked.size)
+    values = VariantValues(grid.scene.study, plan.cases.columns_of(picked), picked.size)
     numerics, cut = REFERENCE
     truth = march(grid, values, numerics, int(grid.safe_cuts(numerics, values, cut).max()))
     work, error = [], []
@@ -98,7 +98,7 @@ def compared(plan: Plan, judged: int, seed: int) -> dict[str, Any]:
     return {"own": own, "least": least, "off": off, "besides": plan.choice.work}
 
 
-def _held(plan: Plan, grid: SceneGrid, values: LaneValues, numerics: Numerics, cut: int, truth: Outcome) -> Array:
+def _held(plan: Plan, grid: SceneGrid, values: VariantValues, numerics: Numerics, cut: int, truth: Outcome) -> Array:
     """(V,) the worst of what is held over its tolerance; infinite where a march is not allowed."""
     allowed = least_steps(grid.model(numerics), values) <= cut * grid.unit
     if not allowed.any():
@@ -107,7 +107,7 @@ def _held(plan: Plan, grid: SceneGrid, values: LaneValues, numerics: Numerics, c
     return np.where(allowed, worst_held(apart, results_of(plan.asked)), np.inf)
 
 
-def march(grid: SceneGrid, values: LaneValues, numerics: Numerics, cut: int) -> Outcome:
+def march(grid: SceneGrid, values: VariantValues, numerics: Numerics, cut: int) -> Outcome:
     """One march of all variants."""
     model = grid.model(numerics)
     return outcome(grid.asked, grid.tables(model, cut), values, grid.stations(model, cut))

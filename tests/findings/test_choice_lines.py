@@ -8,7 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from engine.batch.execution import run
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.reduction import Compared, Reduction
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction
@@ -51,7 +51,9 @@ def test_no_jumps_where_the_choice_changes(name: str) -> None:
         {key: side[key].values for key in reduction.outputs(given)} for side in (chosen[dict(line=places)], converged)
     )
     scale = np.stack([converged[f"{sensor}_static"].values for sensor in given.sensor], axis=1)
-    compared = Compared(one, two, scale, np.zeros_like(scale.T), LaneValues(given, {path: line[places]}, places.size))
+    compared = Compared(
+        one, two, scale, np.zeros_like(scale.T), VariantValues(given, {path: line[places]}, places.size)
+    )
     for jump in reduction.differences(compared).values():
         assert np.all(jump <= given.solver.tolerance)
 

@@ -14,7 +14,7 @@ from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, 
 from engine.march.tables import SceneTables
 from engine.methods.transition import spectral_radius, transitions
 from engine.model.scene_model import build_model
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study
@@ -131,7 +131,7 @@ def test_only_schemes_that_damp_enough_do_without_the_alias_rule(given: dict[str
             study(beam(modes=modes), mass(1.0, cruise(0.0, 1.0, speed * math.pi)), solver=solver), {}, {}
         )
         rule = least_steps(SCHEMES["average-acceleration"]({}), modes, speed * math.pi)
-        values = LaneValues(scene.study, {"carriage.car.mass": np.repeat([0.25, 0.5, 0.75, 1.0], 4)}, 16)
+        values = VariantValues(scene.study, {"carriage.car.mass": np.repeat([0.25, 0.5, 0.75, 1.0], 4)}, 16)
         for steps in {round(rule * part) for part in np.linspace(0.3, 1.0, 50)}:
             growth = spectral_radius(transitions(SceneTables(scene, steps, "whole"), values))
             worst = max(worst, float(growth.max()))

@@ -8,9 +8,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE, Lanes, Newmark, Record, State, Ties, Watch
+from engine.kernels.layout import (
+    CLOSED,
+    CURVE,
+    FORCE,
+    LANES,
+    RATE,
+    STATISTICS,
+    Lanes,
+    Newmark,
+    Observation,
+    Record,
+    State,
+    Ties,
+)
 from engine.kernels.stepping.march import march_many
-from engine.kernels.stepping.start import settle, watch_start
+from engine.kernels.stepping.start import solve_initial_acceleration, watch_start
 
 Array = NDArray[np.float64]
 STATIONS, BLOCKS = 12, 2
@@ -29,7 +42,7 @@ class System:
     kinds: tuple[str, ...]
     omega: Array
     zeta: Array
-    mobility: Array
+    inverse_modal_mass: Array
     p: Array
     rate: Array
     curve: Array
@@ -68,7 +81,7 @@ def system(kinds: tuple[str, ...], modes: int) -> System:
         kinds=kinds,
         omega=np.linspace(1.0, 9.0, modes),
         zeta=random.uniform(0.0, 0.1, (BLOCKS, modes, LANES)),
-        mobility=random.uniform(0.5, 2.0, (BLOCKS, modes, LANES)),
+        inverse_modal_mass=random.uniform(0.5, 2.0, (BLOCKS, modes, LANES)),
         p=p,
         rate=np.where(moved, varying(0.03), np.where(damped, p, 0.0)),
         curve=np.where(moved | damped, varying(0.01), 0.0),
@@ -98,8 +111,8 @@ def dense(one: System, scheme: Newmark, block: int, lane: int) -> tuple[Array, A
     spring and damper:  F + k (p.q + level + R F) + c (p.q' + B.q + drive) = 0
     """
     g, h = one.gravity[block, lane], one.h[block, lane]
-    mass = np.diag(1.0 / one.mobility[block, :, lane])
-    damp, stiff = mass * 2.0 * one.zeta[block, :, lane] * one.omega, mass * one.omega**2
+    mass = np.diag(1.0 / one.inverse_modal_mass[block, :, lane])
+    damp, coupling_stiffness = mass * 2.0 * one.zeta[block, :, lane] * one.omega, mass * one.omega**2
     c, k, rigid = one.damper[block, :, lane], one.spring[block, :, lane], one.are("rigid")
     inertia = (one.mass[block, :, lane] + rigid)[:, None]
     (q, v), a, places, forces = start_of(one), np.zeros(one.omega.size), [], []
@@ -112,11 +125,11 @@ def dense(one: System, scheme: Newmark, block: int, lane: int) -> tuple[Array, A
         of_q = inertia * curve / h**2 + c[:, None] * curve / h + k[:, None] * p
         of_f = np.diag(1.0 - rigid) + k[:, None] * one.residual[n]
         left = np.block(
-            [[mass + sooner * damp + later * stiff, -p.T], [of_a + sooner * of_v + later * of_q, of_f]],
+            [[mass + sooner * damp + later * coupling_stiffness, -p.T], [of_a + sooner * of_v + later * of_q, of_f]],
         )
         own = g * ((inertia[:, 0] / h**2 + c / h) * one.drive[n] + k * one.level[n])
         known = one.load[block, :, lane] - own - of_v @ v - of_q @ q
-        found = np.linalg.solve(left, np.concatenate([-damp @ v - stiff @ q, known]))
+        found = np.linalg.solve(left, np.concatenate([-damp @ v - coupling_stiffness @ q, known]))
         a = found[: one.omega.size]
         q, v = q + later * a, v + sooner * a
         places.append(q)
@@ -131,9 +144,11 @@ def ties_of(one: System, scheme: Newmark) -> Ties:
     rows[..., FORCE], rows[..., RATE], rows[..., CURVE] = one.p, one.rate, one.curve
     rows[..., CLOSED] = np.where(one.are("mass") | one.are("rigid"), one.p, 0.0)
     rows[1:, ..., CLOSED] += scheme.gamma * rows[1:, ..., RATE] + scheme.beta * rows[1:, ..., CURVE]
-    reacting, given = np.flatnonzero(moves | springs), np.flatnonzero(~(moves | springs))
+    reactive, prescribed = np.flatnonzero(moves | springs), np.flatnonzero(~(moves | springs))
     unity = np.where(one.are("rigid"), 0.0, 1.0)
-    return Ties(rows, one.drive, one.level, reacting, given, moves, springs, one.residual, unity, rows.any(axis=(0, 3)))
+    return Ties(
+        rows, one.drive, one.level, reactive, prescribed, moves, springs, one.residual, unity, rows.any(axis=(0, 3))
+    )
 
 
 def lanes_of(one: System) -> Lanes:
@@ -142,9 +157,9 @@ def lanes_of(one: System) -> Lanes:
     return Lanes(
         stiffness=(one.omega[:, None] * h) ** 2,
         damping=2.0 * one.zeta * one.omega[:, None] * h,
-        mobility=one.mobility,
-        gain=one.mass + one.damper * h + one.are("rigid")[:, None],
-        stiff=one.spring * h**2,
+        inverse_modal_mass=one.inverse_modal_mass,
+        coupling_mass=one.mass + one.damper * h + one.are("rigid")[:, None],
+        coupling_stiffness=one.spring * h**2,
         load=one.load * h**2,
         gravity=one.gravity,
         step=one.h,
@@ -155,7 +170,7 @@ def marched(one: System, scheme: Newmark) -> tuple[Array, Array]:
     """(blocks, n, modes, LANES) displacements and (blocks, n, ties, LANES) forces of the kernels."""
     modes, ties, shape = one.omega.size, len(one.kinds), one.zeta.shape
     fours, signals = 4 * ((modes + 3) // 4), modes + ties
-    watch = Watch(
+    watch = Observation(
         on_q=np.eye(modes, fours)[None],
         on_v=np.zeros((1, 0, fours)),
         on_a=np.zeros((1, 0, fours)),
@@ -168,11 +183,11 @@ def marched(one: System, scheme: Newmark) -> tuple[Array, Array]:
         summed=np.ones(signals, dtype=np.bool_),
     )
     history = np.full((BLOCKS, STATIONS, signals, LANES), np.nan)
-    record = Record(np.zeros((BLOCKS, signals, MARKS, LANES)), np.arange(STATIONS), history)
+    record = Record(np.zeros((BLOCKS, signals, STATISTICS, LANES)), np.arange(STATIONS), history)
     q, v = (np.ascontiguousarray(np.broadcast_to(x[:, None], shape)) for x in start_of(one))
     state = State(q, v, np.zeros(shape), np.zeros(shape))
     table, lanes = ties_of(one, scheme), lanes_of(one)
-    settle(table, lanes, state)
+    solve_initial_acceleration(table, lanes, state)
     watch_start(table, lanes, state, watch, record, 0)
     march_many(table, lanes, state, watch, record, scheme, 0)
     np.testing.assert_allclose(state.q, history[:, -1, :modes], rtol=1e-12, equal_nan=False)
@@ -228,12 +243,12 @@ def test_nothing_missed_may_be_left_out(kinds: tuple[str, ...]) -> None:
 def test_a_rigid_tie_is_one_body() -> None:
     """A mass of its own coordinate on a rigid tie swings with the body: omega^2 = k/(m1 + m2), as one such mode."""
     one = system(("rigid",), 2)
-    ones = np.ones_like(one.mobility)
+    ones = np.ones_like(one.inverse_modal_mass)
     both = replace(
         one,
         omega=np.array([3.0, 0.0]),
         zeta=0.0 * ones,
-        mobility=ones * np.array([[1.0], [0.25]]),
+        inverse_modal_mass=ones * np.array([[1.0], [0.25]]),
         p=np.broadcast_to(np.array([[1.0], [-1.0]]), (STATIONS, 2, 1)),
         **{name: 0.0 * getattr(one, name) for name in ("rate", "curve", "drive", "level", "residual")},
     )

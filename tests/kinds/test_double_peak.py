@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from engine.accuracy.groups import MarchGroup
 from engine.batch.execution import run
 from engine.batch.plan import CHUNK_BYTES, make_plan
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_reduced
 from engine.observation.reduction import Compared
 from studies.findings.indices import harmonics
@@ -31,7 +31,7 @@ def answers(*cycles: Array) -> dict[str, Array]:
 def gaps(one: Array, other: Array) -> tuple[float, tuple[float, float]]:
     """How far the peaks of two cycles are apart by what the study reports, and how many both have."""
     here, there = (answers(cycle) | {"harmonic": np.zeros((1, 1, 1))} for cycle in (one, other))
-    values = LaneValues(study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak"), {}, 1)
+    values = VariantValues(study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak"), {}, 1)
     compared = Compared(here, there, np.ones((1, 1)), np.zeros((1, 1)), values)
     numbers = float(here["peaks_per_cycle"][0, 0]), float(there["peaks_per_cycle"][0, 0])
     return float(DoublePeakReduction().differences(compared)["peak_value"][0, 0]), numbers
@@ -92,7 +92,7 @@ def test_a_peak_that_is_missing_is_told_by_harmonics() -> None:
     scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
     cycles = [TWO, TWO + bump(0.45, 0.1, 0.05)]
     one, other = (answers(cycle) | {"harmonic": harmonics(cycle[:, None, None]).T} for cycle in cycles)
-    compared = Compared(one, other, np.ones((1, 1)), np.zeros((1, 1)), LaneValues(scene, {}, 1))
+    compared = Compared(one, other, np.ones((1, 1)), np.zeros((1, 1)), VariantValues(scene, {}, 1))
     found = DoublePeakReduction().differences(compared)
     assert found["harmonic"][0, 0] == pytest.approx(2.0 * 0.1 * 0.05 * np.sqrt(np.pi), rel=0.05)
 
@@ -134,5 +134,5 @@ def test_peaks_are_told_no_less_than_half_of_what_histories_differ_by() -> None:
     """Of two cycles that are shifted the peaks are the same by chance."""
     scene = study(beam(), mass(0.2, swing(0.5, 0.4, 0.2, 4)), kind="double-peak")
     same = answers(TWO) | {"harmonic": np.zeros((1, 1, 1))}
-    compared = Compared(same, same, np.full((1, 1), 2.0), np.full((1, 1), 0.3), LaneValues(scene, {}, 1))
+    compared = Compared(same, same, np.full((1, 1), 2.0), np.full((1, 1), 0.3), VariantValues(scene, {}, 1))
     assert DoublePeakReduction().differences(compared)["peak_value"].tolist() == [[pytest.approx(0.3 / 2.0 / 2.0)]]

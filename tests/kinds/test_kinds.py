@@ -11,7 +11,7 @@ import pytest
 
 import studies
 from engine.batch.execution import run
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.observation.reduction import Compared
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
@@ -192,7 +192,7 @@ def test_odd_and_even_parts_are_told_no_less_than_half_of_what_histories_differ_
     names = ("lag", "loop_area", "odd_rms", "even_excess")
     one, other = ({name: np.full((1, 1), value) for name in names} for value in (0.1, 0.3))
     found = [
-        AsymmetryReduction().differences(Compared(one, two, np.full((1, 1), 2.0), apart, LaneValues(given, {}, 1)))
+        AsymmetryReduction().differences(Compared(one, two, np.full((1, 1), 2.0), apart, VariantValues(given, {}, 1)))
         for two, apart in ((one, np.full((1, 1), 0.8)), (other, np.zeros((1, 1))))
     ]
     assert [float(found[0][name].item()) for name in names] == pytest.approx([0.0, 0.0, 0.2, 0.2])

@@ -19,7 +19,7 @@ from engine.kernels.layout import LANES
 from engine.march.march import march
 from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.pictures.common import figures
@@ -89,7 +89,7 @@ def test_the_reference_agrees_with_a_fine_march_of_a_shuttle(start: str) -> None
     equations = ModalEquations(model)
     tables = SceneTables(measured.with_scheme(model, "fox-goodwin"), 20_000, "whole")
     counts = np.arange(0, 40_001, 500)
-    marched = march(tables, LaneValues(study, {}, LANES), counts, 1, sampled=3).history[:, :, 0]
+    marched = march(tables, VariantValues(study, {}, LANES), counts, 1, sampled=3).history[:, :, 0]
     found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11).states(counts / 20_000))
     for column, scale in zip(range(3), (*measured.static_scale(model)[0], equations.weight), strict=True):
         known = np.isfinite(marched[:, column])

@@ -16,7 +16,7 @@ from engine.kernels.layout import LANES, SECONDS, SQUARES
 from engine.march.march import march
 from engine.march.tables import SceneTables
 from engine.model.scene_model import build_model
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, under
 from tests.reference import closed_forms
@@ -58,7 +58,9 @@ def test_it_converges_with_the_steps(scheme: str) -> None:
     given, errors = crossing(solver={"scheme": scheme, "steps": 40}), []
     (grid,) = make_plan(given).grids
     for by in (2, 4, 8):
-        marked = march(grid.tables(grid.scene, by), LaneValues(given, {}, LANES), np.zeros(0, np.int64), 1).marks
+        marked = march(
+            grid.tables(grid.scene, by), VariantValues(given, {}, LANES), np.zeros(0, np.int64), 1
+        ).statistics
         errors.append(math.sqrt(marked[0, SQUARES, 0] / marked[0, SECONDS, 0]) - exact())
     assert -np.polyfit(np.log([2, 4, 8]), np.log(np.abs(errors)), 1)[0] == pytest.approx(2.0, abs=0.1)
     assert abs(errors[-1]) < 2e-4 * exact()
@@ -85,7 +87,7 @@ def test_parts_with_other_steps_weigh_what_they_last() -> None:
     given = crossing(sensor={"place": fixed(0.5)} | moments)
     tables = SceneTables(build_model(given, {}, {}), 100, "whole", stops="kinks")
     assert np.ptp([segment.step for segment in tables.timeline.segments if not segment.free]) > 2e-4
-    marks = march(tables, LaneValues(given, {}, LANES), np.zeros(0, np.int64), 1).marks[0, :, 0]
+    marks = march(tables, VariantValues(given, {}, LANES), np.zeros(0, np.int64), 1).statistics[0, :, 0]
     assert math.sqrt(marks[SQUARES] / marks[SECONDS]) == pytest.approx(exact(), rel=1e-3)
     assert float(engine.run(crossing(solver={"steps": 9000})).midspan_rms) == pytest.approx(exact(), rel=1e-4)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import make_plan
-from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, MARKS
+from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, STATISTICS
 from engine.kernels.stepping.pairs import survey
 from engine.march.richardson import march_pair
 from engine.march.tables import SceneTables
@@ -209,7 +209,7 @@ def test_a_peak_where_segments_meet_is_found() -> None:
     counted = np.ones((31, 1), dtype=np.bool_)
 
     def largest(*pieces: tuple[int, int, bool]) -> tuple[float, float]:
-        marks, carry = np.zeros((1, 1, MARKS, LANES)), np.zeros((1, 1, 3, LANES))
+        marks, carry = np.zeros((1, 1, STATISTICS, LANES)), np.zeros((1, 1, 3, LANES))
         for first, last, joined in pieces:
             survey(np.ascontiguousarray(x[:, first : last + 1]), counted[first : last + 1], marks, carry, joined, first)
         return float(marks[0, 0, LARGEST, 0]), float(marks[0, 0, LARGEST_AT, 0])

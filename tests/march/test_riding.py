@@ -13,7 +13,7 @@ import studies
 from engine.batch.plan import make_plan
 from engine.march.march import march
 from engine.march.step_rules import contact_omega
-from engine.model.variant_values import LaneValues, padded
+from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
 from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
@@ -113,11 +113,13 @@ def test_frequencies_of_contacts_on_their_springs() -> None:
     mobility = np.max(sum(2.0 * np.sin(n * np.pi * places) ** 2 for n in range(1, 6)))
     own = 1.0 / 0.5 + 0.15**2 / 0.01
     square = (400.0 + 500.0) * (own + mobility)
-    found = contact_omega(group.scene, LaneValues(group.scene.study, {}, 1))
+    found = contact_omega(group.scene, VariantValues(group.scene.study, {}, 1))
     assert float(found[0]) == pytest.approx(np.sqrt(square), rel=1e-9)
     rigid = {"rear": {"at": 0.05, "stiffness": "rigid"}, "front": TWO["front"]}
     model = make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid)).base
-    assert float(contact_omega(model, LaneValues(model.study, {}, 1))[0] ** 2) == pytest.approx(500.0 * square / 900.0)
+    assert float(contact_omega(model, VariantValues(model.study, {}, 1))[0] ** 2) == pytest.approx(
+        500.0 * square / 900.0
+    )
 
 
 def test_a_damper_that_only_a_sweep_has() -> None:

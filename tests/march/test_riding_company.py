@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from engine.batch.plan import make_plan
-from engine.march.richardson import march_chosen
+from engine.march.richardson import march_scheme
 from engine.model.variant_values import padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -89,7 +89,7 @@ def test_the_engine_agrees_with_the_differential_equations(name: str) -> None:
     counts = np.linspace(0, tables.timeline.steps, 31).astype(np.int64)
     times = tables.timeline.moments(counts.astype(np.float64))[1] * scale
     apart = np.array([min(abs(time - event) for event in events) > 1e-9 for time in times])
-    marched = march_chosen(tables, values, counts, 1)
+    marched = march_scheme(tables, values, counts, 1)
     twin = Company(case)
     states, touching = twin.march(times[apart], events)
     for j, sensor in enumerate(tables.sensors):

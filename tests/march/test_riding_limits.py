@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import engine
 import studies
 from engine.batch.plan import make_plan
-from engine.march.richardson import march_chosen
+from engine.march.richardson import march_scheme
 from engine.model.variant_values import padded
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
 from tests.engine.riders import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
@@ -101,7 +101,7 @@ def test_orders(scheme: Table, order: float) -> None:
         plan = make_plan(case)
         (group,) = plan.groups
         counts = np.linspace(0, group.tables.timeline.steps, 41).astype(np.int64)
-        marched = march_chosen(group.tables, plan.values(group, padded(group.variants)), counts, 1)
+        marched = march_scheme(group.tables, plan.values(group, padded(group.variants)), counts, 1)
         return marched.history[:, :, 0]
 
     exact = largest(25600, {"scheme": "richardson"})

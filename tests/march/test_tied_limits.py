@@ -13,7 +13,7 @@ from engine.march.step_rules import contact_omega, least_steps
 from engine.march.tables import SceneTables
 from engine.methods.transition import spectral_radius, transitions
 from engine.model.scene_model import build_model
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -187,7 +187,7 @@ def test_steps_follow_the_springs() -> None:
     least = []
     for stiffness in (100.0, 1e5):
         given = study(beam(modes=2), oscillator(0.5, stiffness, CROSSING))
-        model, one = build_model(given, {}, {}), LaneValues(given, {}, 1)
+        model, one = build_model(given, {}, {}), VariantValues(given, {}, 1)
         least.append(float(least_steps(model, one)[0]))
         assert least[-1] >= 1.25 * float(contact_omega(model, one)[0]) / (2.0 * np.pi)
         assert int(run(given, threads=1).steps_used) >= least[-1]
@@ -207,7 +207,7 @@ def test_why_a_stiff_spring_needs_short_steps(relative: float, grows: bool) -> N
     bed = beam(modes=8)
     given = study(bed, oscillator(1.0, 1e7 if grows else 1e4, cruise(0.0, 1.0, 0.15 * np.pi)))
     model = build_model(given, {}, {})
-    one = LaneValues(given, {}, 1)
+    one = VariantValues(given, {}, 1)
     steps = int(float(contact_omega(model, one)[0]) / (0.15 * np.pi) / relative)
     radius = float(spectral_radius(transitions(SceneTables(model, steps, "whole"), one))[0])
     assert (radius > 10.0) == grows and (grows or radius < 1.1)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from engine.batch.plan import make_plan
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Lanes
-from engine.kernels.stepping.start import settle
+from engine.kernels.stepping.start import solve_initial_acceleration
 from engine.march.march import prepare
 from engine.march.step_rules import allow_any_steps
 from studies.commands.bench import MIDSPAN, Scene
@@ -64,15 +64,15 @@ def twin_march(scene: Scene, folder: Path) -> tuple[float, Array]:
     lanes: Lanes = march.lanes.steps_of(march.lanes.time_scale * segment.step)
     rows = np.ascontiguousarray(table.ties.rows[..., [FORCE, CLOSED, RATE, CURVE]].transpose(0, 2, 1, 3))
     observed = np.ascontiguousarray(table.watch.on_q[0, 0, : scene.modes])
-    settle(table.ties, lanes, march.state)
+    solve_initial_acceleration(table.ties, lanes, march.state)
     start = march.state.a * lanes.step[:, None] ** 2
-    given = [eights(part) for part in (lanes.stiffness, lanes.damping, start, lanes.gain, lanes.load)]
-    peaks = aligned(np.zeros((given[0].shape[0], ABREAST)))
+    prescribed = [eights(part) for part in (lanes.stiffness, lanes.damping, start, lanes.coupling_mass, lanes.load)]
+    peaks = aligned(np.zeros((prescribed[0].shape[0], ABREAST)))
     twin, best = built(scene.ties, scene.modes, folder), np.inf
     for _ in range(BEST_OF):
         begun = time.thread_time()
         for block in range(peaks.shape[0]):
-            parts = [part[block].ctypes.data for part in given]
+            parts = [part[block].ctypes.data for part in prescribed]
             twin.march(
                 rows.shape[0], 0.25, 0.5, rows.ctypes.data, observed.ctypes.data, *parts, peaks[block].ctypes.data
             )
@@ -92,8 +92,8 @@ def engine_march(scene: Scene) -> tuple[float, Array]:
         begun = time.thread_time()
         march.go()
         best = min(best, time.thread_time() - begun)
-    marks = march.result(scene.variants).marks[[s.name for s in group.tables.sensors].index(MIDSPAN)]
-    found[group.variants] = np.maximum(marks[0], -marks[2])
+    statistics = march.result(scene.variants).statistics[[s.name for s in group.tables.sensors].index(MIDSPAN)]
+    found[group.variants] = np.maximum(statistics[0], -statistics[2])
     return best, found
 
 

@@ -24,7 +24,7 @@ from engine.methods.comparison import (
     wilson_theta,
 )
 from engine.model.scene_model import build_model
-from engine.model.variant_values import LaneValues, lane_table, padded
+from engine.model.variant_values import VariantValues, lane_table, padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, shuttle, study, swing
@@ -49,14 +49,14 @@ def run(scheme: ComparisonScheme, tables: SceneTables, **columns: Any) -> Compar
     size = max((len(column) for column in columns.values()), default=1)
     variants = padded(np.arange(size))
     swept = {path.replace("__", "."): np.asarray(column)[variants] for path, column in columns.items()}
-    values = LaneValues(tables.model.study, swept, variants.size)
+    values = VariantValues(tables.model.study, swept, variants.size)
     counts = np.arange(tables.timeline.steps + 1)
     return march_comparison(scheme, tables, values, counts, size, sampled=len(tables.signals))
 
 
 def marched(tables: SceneTables) -> Array:
     """(H, signals) of the march itself."""
-    values = LaneValues(tables.model.study, {}, 16)
+    values = VariantValues(tables.model.study, {}, 16)
     counts = np.arange(tables.timeline.steps + 1)
     return march(tables, values, counts, 1, sampled=len(tables.signals)).history[:, :, 0]
 
@@ -123,9 +123,9 @@ def same_history(found: Compared, expected: Array) -> None:
     history = found.history[:, :, 0]
     size = np.abs(expected).max(axis=0)
     np.testing.assert_allclose(history / size, expected / size, rtol=0, atol=1e-9, equal_nan=False)
-    np.testing.assert_array_equal(found.marks[:, LARGEST, 0], history.max(axis=0))
-    np.testing.assert_array_equal(found.marks[:, LARGEST_AT, 0], history.argmax(axis=0))
-    np.testing.assert_array_equal(found.marks[:, SMALLEST, 0], history.min(axis=0))
+    np.testing.assert_array_equal(found.statistics[:, LARGEST, 0], history.max(axis=0))
+    np.testing.assert_array_equal(found.statistics[:, LARGEST_AT, 0], history.argmax(axis=0))
+    np.testing.assert_array_equal(found.statistics[:, SMALLEST, 0], history.min(axis=0))
 
 
 ORDERS = {"rk4": 4.0, "wilson-theta": 2.0, "picard-relaxed": 2.0, "rigid-tie-calm": 2.0}
@@ -257,7 +257,7 @@ def test_a_moving_track_is_marched_without_loads() -> None:
     """Unit states over a whole passage: the sum of what they become is what the sum becomes."""
     tables = tables_of(crossing(), 50)
     model, rk4 = tables.model, COMPARISON["rk4"]
-    lanes = lane_table(model, LaneValues(model.study, {}, 16)).steps_of(np.full((1, 16), 0.7 / 1.3 / 50))
+    lanes = lane_table(model, VariantValues(model.study, {}, 16)).steps_of(np.full((1, 16), 0.7 / 1.3 / 50))
     q = np.zeros((1, 4, 16))
     q[0, np.arange(4), np.arange(4)], q[0, :, 4] = 1.0, 1.0
     state = State(q, 0.0 * q, 0.0 * q, 0.0 * q)

@@ -18,7 +18,7 @@ from engine.methods.comparison import (
     propagate_comparison,
 )
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import LaneValues, from_blocks, lane_table, padded, to_blocks
+from engine.model.variant_values import VariantValues, from_blocks, lane_table, padded, to_blocks
 from tests.engine.build import beam, cruise, force, mass, study
 from tests.naive.scene import Array
 
@@ -35,7 +35,7 @@ def one_step(scheme: ComparisonScheme, model: SceneModel, step: float, advance: 
     modes = model.omega.size
     units = 3 * modes
     size = padded(np.arange(units)).size
-    lanes = lane_table(model, LaneValues(model.study, {}, size)).steps_of(to_blocks(np.full(size, step)))
+    lanes = lane_table(model, VariantValues(model.study, {}, size)).steps_of(to_blocks(np.full(size, step)))
     unit = np.eye(units, size).reshape(3, modes, size)
     state = State(*(to_blocks(part / step**power) for power, part in enumerate(unit)), np.zeros_like(lanes.stiffness))
     moved = propagate_comparison(scheme, frozen_track(scheme, model, 0.5, 1, advance), lanes, state).state
@@ -77,7 +77,7 @@ def test_wilson_overshoots_57_times() -> None:
     """Section 7.7: displaced by 1 and let go at omega h = 20, it is at -57.2 after one step."""
     model = held(1, 0.0)
     omega = float(model.omega[0])
-    lanes = lane_table(model, LaneValues(model.study, {}, 16)).steps_of(np.full((1, 16), 20.0 / omega))
+    lanes = lane_table(model, VariantValues(model.study, {}, 16)).steps_of(np.full((1, 16), 20.0 / omega))
     one = np.ones((1, 1, 16))
     state = State(one, 0.0 * one, -(omega**2) * one, 0.0 * one)
     wilson = COMPARISON["wilson-theta"]

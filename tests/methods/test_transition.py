@@ -21,7 +21,7 @@ from engine.methods.transition import (
     transitions,
 )
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from tests.engine import build
 
@@ -106,7 +106,7 @@ def test_passages_of_many_variants_equal_the_dense_twin(name: str) -> None:
     study, model = scene(name)
     mass, speed, damping = np.array([0.1, 0.8, 0.8]), np.array([0.5, 1.1, 1.1]), np.array([0.0, 0.0, 0.03])
     columns = {"carriage.car.mass": mass, "carriage.car.motion.speed": speed, "body.bed.damping_ratio": damping}
-    found = transitions(SceneTables(model, 60, "whole"), LaneValues(study, columns, 3))
+    found = transitions(SceneTables(model, 60, "whole"), VariantValues(study, columns, 3))
     assert found.shape == (3, 2 * MODES, 2 * MODES)
     for one, m, v, zeta in zip(found, mass, speed, damping, strict=True):
         twin = Twin(m, zeta, lambda t, v=v: (v * t, v, 0.0))
@@ -116,7 +116,9 @@ def test_passages_of_many_variants_equal_the_dense_twin(name: str) -> None:
 def test_one_period_of_a_shuttle_equals_the_dense_twin() -> None:
     frequency = 0.9
     study, model = scene("hht", build.swing(0.5, 0.4, frequency, 1))
-    found = transitions(SceneTables(model, 80, "whole"), LaneValues(study, {"carriage.car.mass": np.array([0.6])}, 1))
+    found = transitions(
+        SceneTables(model, 80, "whole"), VariantValues(study, {"carriage.car.mass": np.array([0.6])}, 1)
+    )
     om = 2 * np.pi * frequency
 
     def place(t: float) -> Place:
@@ -129,7 +131,7 @@ def test_weights_and_gravity_do_not_enter() -> None:
     study, model = scene()
     heavy = build_model(other := study.with_values({"gravity": 1e6, "body.bed.own_weight": True}), {}, {})
     found = [
-        transitions(SceneTables(m, 50, "whole"), LaneValues(s, {}, 1)) for s, m in ((study, model), (other, heavy))
+        transitions(SceneTables(m, 50, "whole"), VariantValues(s, {}, 1)) for s, m in ((study, model), (other, heavy))
     ]
     assert np.array_equal(found[0], found[1])
 
@@ -142,8 +144,8 @@ def test_several_ties_give_the_same_matrix_as_one() -> None:
     }
     other = build.study(build.beam(modes=MODES), cars)
     both = build_model(other, {}, {})
-    found = transitions(SceneTables(both, 70, "whole"), LaneValues(other, {}, 1))
-    assert close(found, transitions(SceneTables(model, 70, "whole"), LaneValues(study, {}, 1)), 1e-12)
+    found = transitions(SceneTables(both, 70, "whole"), VariantValues(other, {}, 1))
+    assert close(found, transitions(SceneTables(model, 70, "whole"), VariantValues(study, {}, 1)), 1e-12)
 
 
 @pytest.mark.parametrize("advance", [0.0, 0.02])
@@ -151,7 +153,7 @@ def test_several_ties_give_the_same_matrix_as_one() -> None:
 def test_steps_at_a_frozen_station_equal_the_dense_twin(name: str, advance: float) -> None:
     study, model = scene(name)
     mass, step = np.array([0.2, 1.5]), np.array([0.004, 0.011])
-    values = LaneValues(study, {"carriage.car.mass": mass}, 2)
+    values = VariantValues(study, {"carriage.car.mass": mass}, 2)
     frozen = Frozen(model, 0.37, advance)
     few, whole = held_transitions(frozen, values, step, 7), step_matrices(frozen, values, step)
     size = whole.shape[-1]
@@ -171,21 +173,21 @@ def test_steps_at_a_frozen_station_equal_the_dense_twin(name: str, advance: floa
 
 def test_several_steps_at_once_are_a_power() -> None:
     study, model = scene("generalized")
-    values, step = LaneValues(study, {}, 1), np.array([0.01])
+    values, step = VariantValues(study, {}, 1), np.array([0.01])
     one, many = (step_matrices(Frozen(model, 0.5, 0.01), values, step, steps)[0] for steps in (1, 9))
     assert close(many, np.linalg.matrix_power(one, 9))
 
 
 def test_terms_of_the_speed_act_where_they_are_kept() -> None:
     study, model = scene()
-    values, step = LaneValues(study, {}, 1), np.array([0.01])
+    values, step = VariantValues(study, {}, 1), np.array([0.01])
     still, moving = (step_matrices(Frozen(model, 0.3, advance), values, step) for advance in (0.0, 0.01))
     assert np.abs(still - moving).max() > 1e-3
 
 
 def test_lagged_inertia_grows_from_its_threshold_on() -> None:
     study, model = scene()
-    values = LaneValues(study, {"carriage.car.mass": np.array([0.249, 0.251])}, 2)  # 2 m (1 + 0 + 1) = 1
+    values = VariantValues(study, {"carriage.car.mass": np.array([0.249, 0.251])}, 2)  # 2 m (1 + 0 + 1) = 1
     found = spectral_radius(
         step_matrices(FrozenCompared(model, 0.5, scheme=lagged_inertia()), values, np.full(2, 0.01))
     )
@@ -206,19 +208,21 @@ def test_comparison_schemes_tend_to_the_same_exact_matrix(advance: float) -> Non
     exact = expm(20 * h * np.vstack([upper, lower]))
     for scheme in (runge_kutta(), wilson_theta()):
         frozen = FrozenCompared(model, 0.37, advance / 20, scheme=scheme)
-        found = held_transitions(frozen, LaneValues(study, {}, 1), np.array([h]), 20)
+        found = held_transitions(frozen, VariantValues(study, {}, 1), np.array([h]), 20)
         assert close(found[0], exact, 1e-3), scheme.name
 
 
 def test_a_march_that_overflows_has_an_infinite_radius() -> None:
     study, model = scene("fox-goodwin")
-    values = LaneValues(study, {"carriage.car.motion.speed": np.array([0.001, 0.5])}, 2)
+    values = VariantValues(study, {"carriage.car.motion.speed": np.array([0.001, 0.5])}, 2)
     found = spectral_radius(transitions(SceneTables(model, 400, "whole"), values))
     assert found[0] == np.inf and np.isfinite(found[1])
 
 
 def test_a_rigid_mode_has_a_unit_state() -> None:
     study, model = scene(supports="free-free")
-    found = transitions(SceneTables(model, 100, "whole"), LaneValues(study, {"carriage.car.mass": np.array([1e-9])}, 1))
+    found = transitions(
+        SceneTables(model, 100, "whole"), VariantValues(study, {"carriage.car.mass": np.array([1e-9])}, 1)
+    )
     assert np.isfinite(found).all()
     assert found[0, 0, 0] == pytest.approx(1.0, abs=1e-6)

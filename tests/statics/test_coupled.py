@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
@@ -30,7 +30,7 @@ def frequencies(case: Study, places: Any, count: int, **columns: Any) -> Array:
     model = base_scene(case)
     swept = {path.replace("__", "."): np.asarray(column, dtype=float) for path, column in columns.items()}
     size = max((len(column) for column in swept.values()), default=1)
-    values = LaneValues(model.study, swept, size)
+    values = VariantValues(model.study, swept, size)
     return coupled_frequencies(model, values, frozen(model, np.asarray(places, dtype=float)), count)
 
 
@@ -166,7 +166,7 @@ def test_off_the_body_a_mass_does_nothing_and_missing_modes_are_missing() -> Non
 def test_shapes_have_unit_modal_mass_and_solve_the_equations() -> None:
     case = riding(cruise(0.3, 0.7, 1.0), THREE, FLEXIBLE, solver=PLAIN)
     model = base_scene(case)
-    found = coupled_modes(model, LaneValues(model.study, {}, 1), frozen(model, np.array([0.4])), 6)
+    found = coupled_modes(model, VariantValues(model.study, {}, 1), frozen(model, np.array([0.4])), 6)
     shapes, omega = found.shapes[0, 0], found.omega[0, 0]
     assert shapes.T @ shapes == pytest.approx(np.eye(6), abs=1e-9)
     assert omega == pytest.approx(frequencies(case, [0.4], 6)[0, 0], rel=1e-12)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import engine
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import LaneValues
+from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.statics.static_response import StaticReadings, contact_names, static_shapes, static_values
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
@@ -28,7 +28,7 @@ def readings(case: Study, places: Any = PLACES, **columns: Any) -> StaticReading
     model = base_scene(case)
     swept = {path.replace("__", "."): np.asarray(column, dtype=float) for path, column in columns.items()}
     size = max((len(column) for column in swept.values()), default=1)
-    return static_values(model, LaneValues(model.study, swept, size), frozen(model, np.asarray(places, dtype=float)))
+    return static_values(model, VariantValues(model.study, swept, size), frozen(model, np.asarray(places, dtype=float)))
 
 
 def line(x: float, s: Array) -> Array:
@@ -99,7 +99,7 @@ def test_a_slow_march_tends_to_the_static_readings() -> None:
 def test_shapes_are_what_sensors_read() -> None:
     case = riding(cruise(0.3, 0.7, 1.0), THREE, FLEXIBLE, beam(modes=4, own_weight=True))
     model, places = base_scene(case), np.array([0.3, 0.6])
-    values, along = LaneValues(model.study, {}, 1), frozen(model, places)
+    values, along = VariantValues(model.study, {}, 1), frozen(model, places)
     found, names = readings(case, places).sensors[0], list(case.sensor)
     bed, table = (
         static_shapes(model, values, along, body, np.array([0.1, 0.61]) * (1.0, 0.5)[body])[0] for body in (0, 1)

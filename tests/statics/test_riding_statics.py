@@ -10,7 +10,7 @@ from engine.batch.plan import make_plan
 from engine.march.march import march
 from engine.march.step_rules import allow_any_steps
 from engine.model.station_path import frozen
-from engine.model.variant_values import LaneValues, padded
+from engine.model.variant_values import VariantValues, padded
 from engine.statics.static_response import static_values
 from results_schema.status import Fidelity
 from tests.engine.build import Table, beam, cruise, fixed, shuttle
@@ -79,7 +79,7 @@ def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -
     (group,) = make_plan(case).groups
     twin, model = Twin(case), group.scene
     places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
-    found = static_values(model, LaneValues(case, {}, 1), frozen(model, places)).contacts[0]
+    found = static_values(model, VariantValues(case, {}, 1), frozen(model, places)).contacts[0]
     right = np.array([twin.static(float(place))[1] for place in places])
     assert np.abs(found - right).max() <= 1e-9 * np.abs(right).max()
 
@@ -93,6 +93,6 @@ def test_static_slopes_move_all_contacts() -> None:
         tables, counts = group.tables, np.array([40])
         (place,) = tables.timeline.positions(0, counts)
         apart = frozen(group.scene, place + np.array([-1e-4, 1e-4]))
-        left, right = static_values(group.scene, LaneValues(case, {}, 1), apart).influence[:, 0]
+        left, right = static_values(group.scene, VariantValues(case, {}, 1), apart).influence[:, 0]
         assert abs(right - left) > 1e-7
         assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.kernels.jit import chosen_for, kernel, piece
-from engine.kernels.layout import LANES, MARKS, Alpha, FloatArray, Newmark
+from engine.kernels.layout import LANES, STATISTICS, Alpha, FloatArray, Newmark
 from engine.kernels.stepping.comparison_steps import (
     FIELDS,
     MEMORY,
@@ -30,10 +30,10 @@ from engine.kernels.stepping.record import (
     RATE_2,
     TIE,
     V_NOW,
-    close_marks,
+    close_statistics,
     keep,
     observe,
-    open_marks,
+    open_statistics,
 )
 
 
@@ -135,10 +135,10 @@ def store_modes(now, b, carried, block):
 
 
 @kernel
-def note(marks, scratch, watch, record, block, n, count):
+def note(statistics, scratch, watch, record, block, n, count):
     """Observe and keep station n; a function of its own, so that it is compiled once and not for every rule."""
-    observe(marks, scratch.now, scratch.b, watch, n, KEPT)
-    keep(marks, record.history[block], watch, record.sample[n], n, float(count + n))
+    observe(statistics, scratch.now, scratch.b, watch, n, KEPT)
+    keep(statistics, record.history[block], watch, record.sample[n], n, float(count + n))
 
 
 @kernel
@@ -152,13 +152,13 @@ def march_by_rule(rule, track, lanes, carried, watch, record, count):
     now = np.zeros((4 * ((modes + 3) // 4), MEMORY + 1, LANES))
     sums = np.zeros((SUMS, LANES))
     b = np.zeros((TIE + 1, LANES))
-    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
+    statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     scratch = Scratch(now, work, sums, b)
     for block in range(lanes.step.shape[0]):
         load_modes(now, b, lanes, carried, block)
-        open_marks(marks, record.marks[block])
+        open_statistics(statistics, record.statistics[block])
         for n in range(track.rows.shape[1]):
             take_step(rule, scratch, track, lanes, carried.kept, block, n)
-            note(marks, scratch, watch, record, block, n + 1, count)
+            note(statistics, scratch, watch, record, block, n + 1, count)
         store_modes(now, b, carried, block)
-        close_marks(record.marks[block], marks, watch, lanes.step[block], track.rows.shape[1])
+        close_statistics(record.statistics[block], statistics, watch, lanes.step[block], track.rows.shape[1])

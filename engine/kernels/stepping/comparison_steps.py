@@ -131,20 +131,20 @@ def gather_now(sums, now, b, row, drive, modes):
 
 
 @piece
-def coupled_force(rule, sums, load, gain, kept, block, j):
+def coupled_force(rule, sums, load, coupling_mass, kept, block, j):
     """Contact force of one lane; NaN where the iteration did not converge.
 
-    F = load - gain (motion), each term of the motion new or old. The iteration puts the last force into the right
-    side; it contracts where r = gain times the inertial part per unit force is below 1.
+    F = load - m (motion), each term of the motion new or old. The iteration puts the last force into the right
+    side; it contracts where r = m times the inertial part per unit force is below 1.
     """
-    last = load - gain * (sums[LAST_INERTIAL, j] + sums[LAST_CONVECTIVE, j])
+    last = load - coupling_mass * (sums[LAST_INERTIAL, j] + sums[LAST_CONVECTIVE, j])
     inertial = rule.inertial * sums[FREE_INERTIAL, j] + (1.0 - rule.inertial) * sums[LAST_INERTIAL, j]
     convective = rule.convective * sums[FREE_CONVECTIVE, j] + (1.0 - rule.convective) * sums[LAST_CONVECTIVE, j]
-    unit = gain * (rule.inertial * sums[UNIT_INERTIAL, j] + rule.convective * sums[UNIT_CONVECTIVE, j])
-    known = load - gain * (inertial + convective)
+    unit = coupling_mass * (rule.inertial * sums[UNIT_INERTIAL, j] + rule.convective * sums[UNIT_CONVECTIVE, j])
+    known = load - coupling_mass * (inertial + convective)
     force = known / (1.0 + unit)
     if rule.iterations > 0:
-        share = 1.0 / (1.0 + rule.relaxed * gain * sums[UNIT_INERTIAL, j])
+        share = 1.0 / (1.0 + rule.relaxed * coupling_mass * sums[UNIT_INERTIAL, j])
         force, done = last, 0
         while done < rule.iterations:
             change = share * (known - unit * force - force)
@@ -166,7 +166,7 @@ def step_coupled(rule, scratch, track, lanes, kept, block, n):
     predict(rule.scheme, now, work, lanes, block)
     gather(rule.scheme, sums, work, b, track.rows[1, n], track.drive[1, n])
     for j in range(LANES):
-        b[TIE, j] = coupled_force(rule, sums, lanes.load[block, 0, j], lanes.gain[block, 0, j], kept, block, j)
+        b[TIE, j] = coupled_force(rule, sums, lanes.load[block, 0, j], lanes.coupling_mass[block, 0, j], kept, block, j)
     correct(rule.scheme, now, work, b, track.rows[1, n])
 
 
@@ -182,9 +182,9 @@ def step_wilson(rule, scratch, track, lanes, kept, block, n):
             release(rule, work, lanes, block, k, j)
     gather(rule, sums, work, b, track.rows[0, n], track.drive[0, n])
     for j in range(LANES):
-        gain = lanes.gain[block, 0, j]
-        known = lanes.load[block, 0, j] - gain * (sums[FREE_INERTIAL, j] + sums[FREE_CONVECTIVE, j])
-        b[TIE, j] = known / (1.0 + gain * (sums[UNIT_INERTIAL, j] + sums[UNIT_CONVECTIVE, j]))
+        coupling_mass = lanes.coupling_mass[block, 0, j]
+        known = lanes.load[block, 0, j] - coupling_mass * (sums[FREE_INERTIAL, j] + sums[FREE_CONVECTIVE, j])
+        b[TIE, j] = known / (1.0 + coupling_mass * (sums[UNIT_INERTIAL, j] + sums[UNIT_CONVECTIVE, j]))
     for k in range(work.shape[0]):
         p = track.rows[0, n, k, FORCE]
         for j in range(LANES):
@@ -196,7 +196,7 @@ def step_wilson(rule, scratch, track, lanes, kept, block, n):
     gather_now(sums, now, b, track.rows[1, n], track.drive[1, n], work.shape[0])
     for j in range(LANES):
         motion = sums[LAST_INERTIAL, j] + sums[LAST_CONVECTIVE, j]
-        b[TIE, j] = lanes.load[block, 0, j] - lanes.gain[block, 0, j] * motion
+        b[TIE, j] = lanes.load[block, 0, j] - lanes.coupling_mass[block, 0, j] * motion
 
 
 @piece
@@ -216,9 +216,9 @@ def accelerate(work, sums, b, row, drive, lanes, block):
             sums[FREE_CONVECTIVE, j] += rate * v + curve * u
             sums[UNIT_INERTIAL, j] += inertial * p
     for j in range(LANES):
-        gain = lanes.gain[block, 0, j]
-        known = lanes.load[block, 0, j] - gain * (sums[FREE_INERTIAL, j] + sums[FREE_CONVECTIVE, j])
-        b[TIE, j] = known / (1.0 + gain * sums[UNIT_INERTIAL, j])
+        coupling_mass = lanes.coupling_mass[block, 0, j]
+        known = lanes.load[block, 0, j] - coupling_mass * (sums[FREE_INERTIAL, j] + sums[FREE_CONVECTIVE, j])
+        b[TIE, j] = known / (1.0 + coupling_mass * sums[UNIT_INERTIAL, j])
     for k in range(work.shape[0]):
         p = row[k, FORCE]
         for j in range(LANES):
@@ -278,7 +278,7 @@ def step_rigid(rule, scratch, track, lanes, kept, block, n):
     gather(scheme, sums, work, b, track.rows[1, n], track.drive[1, n])
     for j in range(LANES):
         rate, rate_2 = b[RATE_1, j], b[RATE_2, j]
-        load, m = lanes.load[block, 0, j], lanes.gain[block, 0, j]
+        load, m = lanes.load[block, 0, j], lanes.coupling_mass[block, 0, j]
         y, v, a = kept[block, OWN_Q, j], kept[block, OWN_V, j] / rate, kept[block, OWN_A, j] / rate_2
         y, v, e = first_predictors(scheme, y, v, a, kept[block, OWN_MEMORY, j] / rate_2)
         gap = sums[PLACE, j] - (y + scheme.beta * load / m)

@@ -3,23 +3,23 @@
 Derivation (mechanics section 2), in step units: with predictors u*, v* and D = 1/(1 + gamma c + beta k),
 c_k* = (c v* + k u*) D, an equation of mode k gives  a_k = p_k D_k F - c_k*.  Put into the tie's kinematics
 G = P.a + A.(v* + gamma a) + B.(u* + beta a) this is  G = w.(D p) F - (w.c* - A.v* - B.u*),  and with
-F = load - gain (G + drive):
+F = load - m (G + drive):
 
-    F = (load + gain (w.c* - A.v* - B.u* - drive)) / (1 + gain w.(D p))        one tie; r ties: an r x r system
+    F = (load + m (w.c* - A.v* - B.u* - drive)) / (1 + m w.(D p))        one tie; r ties: an r x r system
 
 A spring reads its gap  p.u = beta p.(D p) F - p.(beta c* - u*)  in the same way (section 4):
 
-    F = load - gain (G + drive) - stiff (p.u + level + residual F/h^2)
+    F = load - m (G + drive) - k (p.u + level + residual F/h^2)
 
 A rigid tie has 0 in place of F on the left. Where there are several ties, what dead loads give is taken from c* first.
-``mobility`` multiplies D where it meets a force. The pass over the modes corrects step n, observes it, predicts step
-n + 1 and gathers the sums of its tie equation.
+``inverse_modal_mass`` multiplies D where it meets a force. The pass over the modes corrects step n, observes it,
+predicts step n + 1 and gathers the sums of its tie equation.
 """
 
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, MARKS, RATE
+from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE, STATISTICS
 from engine.kernels.stepping.one_mode import advance, corrected, fields_of, first_predictors, remember
 from engine.kernels.stepping.record import (
     CD,
@@ -38,11 +38,11 @@ from engine.kernels.stepping.record import (
     D,
     U,
     V,
-    close_marks,
+    close_statistics,
     keep,
     leading,
     observe,
-    open_marks,
+    open_statistics,
     put_leads,
     put_modes,
 )
@@ -80,7 +80,7 @@ def load_block(work, b, lanes, state, scheme, block):
             c = lanes.damping[block, k, j]
             s = lanes.stiffness[block, k, j]
             d = 1.0 / (1.0 + gamma * c + beta * s)
-            m = lanes.mobility[block, k, j]
+            m = lanes.inverse_modal_mass[block, k, j]
             q, v, a = state.q[block, k, j], state.v[block, k, j] * h, state.a[block, k, j] * h * h
             u, v, e = first_predictors(scheme, q, v, a, state.memory[block, k, j] * h * h)
             work[k, D, j] = m * d
@@ -107,7 +107,7 @@ def store_mode(work, b, state, scheme, block, k):
 @piece
 def load_tie(b, work, lanes, rows, block):
     """What the one tie of a block has to itself, and the sums of its equation at station 1."""
-    put_lanes(b, (GAIN,), lanes_at(lanes.gain, (block, 0)))
+    put_lanes(b, (GAIN,), lanes_at(lanes.coupling_mass, (block, 0)))
     put_lanes(b, (LOAD,), lanes_at(lanes.load, (block, 0)))
     motion, moved, factor = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
     for k in range(work.shape[0]):
@@ -150,10 +150,10 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
-    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
+    statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
-        open_marks(marks, record.marks[block])
+        open_statistics(statistics, record.statistics[block])
         history = record.history[block]
         load_tie(b, work, lanes, rows, block)
         for n in range(1, stations):
@@ -184,48 +184,48 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
             put_lanes(b, (SUM,), motion - moved)
             put_lanes(b, (FACTOR,), factor)
             put_leads(b, leads, first, second)
-            observe(marks, now, b, watch, n, leads)
-            keep(marks, history, watch, record.sample[n], n, float(count + n))
-        close_marks(record.marks[block], marks, watch, lanes.step[block], stations - 1)
+            observe(statistics, now, b, watch, n, leads)
+            keep(statistics, history, watch, record.sample[n], n, float(count + n))
+        close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
 
 
 @kernel
 def march_many(ties, lanes, state, watch, record, scheme, count):
     """March one segment with any number of ties; otherwise as ``march_one``."""
-    rows, reacting, given, reaches = ties.rows, ties.reacting, ties.given, ties.reaches
+    rows, reactive, prescribed, reaches = ties.rows, ties.reactive, ties.prescribed, ties.reaches
     stations, modes, many = rows.shape[0], rows.shape[1], rows.shape[2]
-    half = (reacting.shape[0] + 1) // 2
+    half = (reactive.shape[0] + 1) // 2
     leads, lead_moves = leading(watch), 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
+    statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     own = np.zeros((many, 4, LANES))
     matrix = np.zeros((2 * half, 2 * half, LANES))
     # filled before they are put together: the compiler drops what is written into a local tuple's arrays where it is
     # not read again under that name
     member, moves, springs = np.zeros(2 * half, np.int64), np.zeros(half, np.bool_), np.zeros(half, np.bool_)
     shared, shares = np.zeros((half, half, modes), np.int64), np.zeros((half, half), np.int64)
-    pushing, pushes = np.zeros((modes, reacting.shape[0]), np.int64), np.zeros(modes, np.int64)
+    pushing, pushes = np.zeros((modes, reactive.shape[0]), np.int64), np.zeros(modes, np.int64)
     note_members(member, moves, springs, ties)
     note_shared(shared, shares, member, reaches)
-    note_pushing(pushing, pushes, reacting, reaches)
+    note_pushing(pushing, pushes, reactive, reaches)
     twos = Twos(member, moves, springs, shared, shares, pushing, pushes)
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
         load_own(own, b, ties, lanes, block)
-        open_marks(marks, record.marks[block])
+        open_statistics(statistics, record.statistics[block])
         history = record.history[block]
         for n in range(1, stations):
-            load_dead(work, b, rows, given, reaches, n)
-            load_ties(b, own, reacting, ties.drive[n], ties.level[n])
+            load_dead(work, b, rows, prescribed, reaches, n)
+            load_ties(b, own, reactive, ties.drive[n], ties.level[n])
             push_ties(b, work, rows, own, twos, n, scheme.beta)
             couple_motions(matrix, work, rows, own, twos, n)
             couple_gaps(matrix, work, rows, own, twos, n, scheme.beta)
             if ties.residual.shape[0] > 0:
                 miss(matrix, b, ties, own, n)
-            solve_ties(b, matrix, reacting)
+            solve_ties(b, matrix, reactive)
             if n == stations - 1:
                 for k in range(modes):
                     put_lanes(b, (PUSH,), pushed(b, rows, twos, n, k))
@@ -243,6 +243,6 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
                 elif leads < 0:
                     put_modes(now, k, q, v, a)
             put_leads(b, leads, first, second)
-            observe(marks, now, b, watch, n, leads)
-            keep(marks, history, watch, record.sample[n], n, float(count + n))
-        close_marks(record.marks[block], marks, watch, lanes.step[block], stations - 1)
+            observe(statistics, now, b, watch, n, leads)
+            keep(statistics, history, watch, record.sample[n], n, float(count + n))
+        close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)

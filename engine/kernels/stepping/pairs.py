@@ -63,28 +63,28 @@ def extrapolate(fine, coarse, counted, gap):
 
 
 @piece
-def raise_to(marks, i, j, x, at):
+def raise_to(statistics, i, j, x, at):
     """Take a value at a count among the extremes of a signal in a lane; a NaN goes in and stays."""
-    high, low = marks[i, LARGEST, j], marks[i, SMALLEST, j]
-    marks[i, LARGEST_AT, j] = marks[i, LARGEST_AT, j] if x <= high else at
-    marks[i, LARGEST, j] = high if x <= high else x
-    marks[i, SMALLEST_AT, j] = marks[i, SMALLEST_AT, j] if x >= low else at
-    marks[i, SMALLEST, j] = low if x >= low else x
+    high, low = statistics[i, LARGEST, j], statistics[i, SMALLEST, j]
+    statistics[i, LARGEST_AT, j] = statistics[i, LARGEST_AT, j] if x <= high else at
+    statistics[i, LARGEST, j] = high if x <= high else x
+    statistics[i, SMALLEST_AT, j] = statistics[i, SMALLEST_AT, j] if x >= low else at
+    statistics[i, SMALLEST, j] = low if x >= low else x
 
 
 @piece
-def judge(marks, i, j, x, at):
+def judge(statistics, i, j, x, at):
     """Note where a signal is negative for the first time, and where it has left every meaning."""
-    below, bad = marks[i, BELOW_AT, j], marks[i, DIVERGED_AT, j]
-    marks[i, BELOW_AT, j] = at if (x < 0.0) & (below < 0.0) else below
-    marks[i, DIVERGED_AT, j] = bad if (abs(x) <= marks[i, BOUND, j]) | (bad >= 0.0) else at
+    below, bad = statistics[i, BELOW_AT, j], statistics[i, DIVERGED_AT, j]
+    statistics[i, BELOW_AT, j] = at if (x < 0.0) & (below < 0.0) else below
+    statistics[i, DIVERGED_AT, j] = bad if (abs(x) <= statistics[i, BOUND, j]) | (bad >= 0.0) else at
 
 
 @kernel
-def survey(history, counted, marks, carry, joined, count):
+def survey(history, counted, statistics, carry, joined, count):
     """Observe a segment's history as the march observes its signals.
 
-    history (blocks, S, signals, LANES);  counted (S, signals);  marks (blocks, signals, MARKS, LANES);
+    history (blocks, S, signals, LANES);  counted (S, signals);  statistics (blocks, signals, STATISTICS, LANES);
     carry (blocks, signals, 3, LANES): the two values before, and how many of them are of equal step and no event
     away (0 to 2);  joined: whether this segment goes on from the one before at an equal step;  count: of the scene's
     stations at station 0. A station higher or lower than both its neighbours is replaced by the vertex of the parabola
@@ -94,7 +94,7 @@ def survey(history, counted, marks, carry, joined, count):
     before, last = np.empty(LANES), np.empty(LANES)
     highest, lowest = np.empty(LANES), np.empty(LANES)
     for block in range(history.shape[0]):
-        one = marks[block]
+        one = statistics[block]
         for i in range(history.shape[2]):
             run = carry[block, i, RUN, 0] if joined else 0.0
             for j in range(LANES):
@@ -136,10 +136,10 @@ def survey(history, counted, marks, carry, joined, count):
 
 
 @kernel
-def integrate(history, summed, marks, step):
+def integrate(history, summed, statistics, step):
     """Integrate squares over a segment's history by Simpson's rule, on top of what was summed before.
 
-    history, marks: as in `survey`, an odd number of stations;  summed (signals): which;  step (blocks, LANES): s.
+    history, statistics: as in `survey`, an odd number of stations;  summed (signals): which;  step (blocks, LANES): s.
     """
     steps = history.shape[1] - 1
     squares = np.empty(LANES)
@@ -153,5 +153,5 @@ def integrate(history, summed, marks, step):
                 for j in range(LANES):
                     squares[j] += weight * history[block, n, i, j] * history[block, n, i, j]
             for j in range(LANES):
-                marks[block, i, SQUARES, j] += step[block, j] * squares[j]
-                marks[block, i, SECONDS, j] += step[block, j] * steps
+                statistics[block, i, SQUARES, j] += step[block, j] * squares[j]
+                statistics[block, i, SECONDS, j] += step[block, j] * steps

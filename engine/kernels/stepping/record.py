@@ -13,11 +13,11 @@ from engine.kernels.layout import (
     LANES,
     LARGEST,
     LARGEST_AT,
-    MARKS,
     SECONDS,
     SMALLEST,
     SMALLEST_AT,
     SQUARES,
+    STATISTICS,
     VALUE,
 )
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes
@@ -57,7 +57,7 @@ def put_modes(now, k, q, v, a):
 
 
 @piece
-def add_modes(marks, i, now, b, row, field, order):
+def add_modes(statistics, i, now, b, row, field, order):
     """Signal i += h^-order sum over the modes of row times one field; four modes a pass, so the modes come in fours.
 
     Mode after mode, as the pass sums the leading channels: the same sensor in other company has the same bits.
@@ -68,16 +68,16 @@ def add_modes(marks, i, now, b, row, field, order):
         total = total + row[k + 1] * lanes_at(now, (k + 1, field))
         total = total + row[k + 2] * lanes_at(now, (k + 2, field))
         total = total + row[k + 3] * lanes_at(now, (k + 3, field))
-    put_lanes(marks, (i, VALUE), lanes_at(marks, (i, VALUE)) + lanes_at(b, (RATE_0 + order,)) * total)
+    put_lanes(statistics, (i, VALUE), lanes_at(statistics, (i, VALUE)) + lanes_at(b, (RATE_0 + order,)) * total)
 
 
 @piece
-def observe(marks, now, b, watch, n, leads):
+def observe(statistics, now, b, watch, n, leads):
     """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force.
 
     leads: how many sums stand in b[LEAD] and after it already, all of them, or KEPT.
     """
-    for i in range(marks.shape[0]):
+    for i in range(statistics.shape[0]):
         value, offset = all_lanes(0.0), watch.offset[n, i]
         if offset != 0.0:
             value = offset * lanes_at(b, (GRAVITY,)) * lanes_at(b, (RATE_0 + watch.offset_order[i],))
@@ -85,85 +85,89 @@ def observe(marks, now, b, watch, n, leads):
             missed = watch.static[n, i, r]
             if missed != 0.0:
                 value = value + missed * (lanes_at(b, (TIE + r,)) * lanes_at(b, (RATE_2,)))
-        put_lanes(marks, (i, VALUE), value)
+        put_lanes(statistics, (i, VALUE), value)
     of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
     for c in range(leads):
         i = watch.signal[c]
-        put_lanes(marks, (i, VALUE), lanes_at(marks, (i, VALUE)) + lanes_at(b, (LEAD + c,)))
+        put_lanes(statistics, (i, VALUE), lanes_at(statistics, (i, VALUE)) + lanes_at(b, (LEAD + c,)))
     if leads != KEPT:
         return
     for c in range(of_q):
         row = watch.on_q[n if watch.on_q.shape[0] > 1 else 0, c]
-        add_modes(marks, watch.signal[c], now, b, row, Q_NOW, watch.order[c])
+        add_modes(statistics, watch.signal[c], now, b, row, Q_NOW, watch.order[c])
     for c in range(of_v):
         row = watch.on_v[n if watch.on_v.shape[0] > 1 else 0, c]
-        add_modes(marks, watch.signal[of_q + c], now, b, row, V_NOW, watch.order[of_q + c])
+        add_modes(statistics, watch.signal[of_q + c], now, b, row, V_NOW, watch.order[of_q + c])
     for c in range(of_a):
         row = watch.on_a[n if watch.on_a.shape[0] > 1 else 0, c]
-        add_modes(marks, watch.signal[of_q + of_v + c], now, b, row, A_NOW, watch.order[of_q + of_v + c])
+        add_modes(statistics, watch.signal[of_q + of_v + c], now, b, row, A_NOW, watch.order[of_q + of_v + c])
 
 
 @piece
-def copy_marks(to, of):
-    """Copy the marks of one block; the march works on an array of its own, whose layout the compiler knows."""
+def copy_statistics(to, of):
+    """Copy the statistics of one block; the march works on an array of its own, whose layout the compiler knows."""
     for i in range(to.shape[0]):
-        for f in range(MARKS):
+        for f in range(STATISTICS):
             for j in range(LANES):
                 to[i, f, j] = of[i, f, j]
 
 
 @piece
-def open_marks(marks, of):
-    """Take the marks of one block along a segment, over which squares are summed anew: its first station, which was the
-    last one observed, counts half."""
-    copy_marks(marks, of)
-    for i in range(marks.shape[0]):
+def open_statistics(statistics, of):
+    """Take the statistics of one block along a segment, over which squares are summed anew: its first station, the last
+    one observed before, counts half."""
+    copy_statistics(statistics, of)
+    for i in range(statistics.shape[0]):
         for j in range(LANES):
-            marks[i, SQUARES, j] = 0.5 * marks[i, VALUE, j] * marks[i, VALUE, j]
+            statistics[i, SQUARES, j] = 0.5 * statistics[i, VALUE, j] * statistics[i, VALUE, j]
 
 
 @piece
-def close_marks(to, marks, watch, step, steps):
-    """Put the marks of one block back at the end of a segment: the sums of squares, whose last station counts half, as
-    an integral over time on top of what was there (the trapezoidal rule). step (LANES): s."""
-    for i in range(marks.shape[0]):
+def close_statistics(to, statistics, watch, step, steps):
+    """Put the statistics of one block back at the end of a segment: the sums of squares, whose last station counts
+    half, as an integral over time on top of what was there (the trapezoidal rule). step (LANES): s."""
+    for i in range(statistics.shape[0]):
         for j in range(LANES):
             squares, seconds = to[i, SQUARES, j], to[i, SECONDS, j]
             if watch.summed[i]:
-                squares += step[j] * (marks[i, SQUARES, j] - 0.5 * marks[i, VALUE, j] * marks[i, VALUE, j])
+                squares += step[j] * (
+                    statistics[i, SQUARES, j] - 0.5 * statistics[i, VALUE, j] * statistics[i, VALUE, j]
+                )
                 seconds += step[j] * steps
-            marks[i, SQUARES, j], marks[i, SECONDS, j] = squares, seconds
-    copy_marks(to, marks)
+            statistics[i, SQUARES, j], statistics[i, SECONDS, j] = squares, seconds
+    copy_statistics(to, statistics)
 
 
 @piece
-def judge(marks, i, now):
+def judge(statistics, i, now):
     """Update the extremes of signal i with its value, and what is known where its value is an extreme for the first
     time: that it is negative, and that it has left every meaning."""
-    value = lanes_at(marks, (i, VALUE))
-    high, low = lanes_at(marks, (i, LARGEST)), lanes_at(marks, (i, SMALLEST))
+    value = lanes_at(statistics, (i, VALUE))
+    high, low = lanes_at(statistics, (i, LARGEST)), lanes_at(statistics, (i, SMALLEST))
     below, above = value <= high, value >= low
     if not everywhere(below & above):
-        put_lanes(marks, (i, LARGEST), choose(below, high, value))
-        put_lanes(marks, (i, LARGEST_AT), choose(below, lanes_at(marks, (i, LARGEST_AT)), now))
-        put_lanes(marks, (i, SMALLEST), choose(above, low, value))
-        put_lanes(marks, (i, SMALLEST_AT), choose(above, lanes_at(marks, (i, SMALLEST_AT)), now))
-        before = lanes_at(marks, (i, BELOW_AT))
-        put_lanes(marks, (i, BELOW_AT), choose((value < 0.0) & (before < 0.0), now, before))
-        bound, bad = lanes_at(marks, (i, BOUND)), lanes_at(marks, (i, DIVERGED_AT))
+        put_lanes(statistics, (i, LARGEST), choose(below, high, value))
+        put_lanes(statistics, (i, LARGEST_AT), choose(below, lanes_at(statistics, (i, LARGEST_AT)), now))
+        put_lanes(statistics, (i, SMALLEST), choose(above, low, value))
+        put_lanes(statistics, (i, SMALLEST_AT), choose(above, lanes_at(statistics, (i, SMALLEST_AT)), now))
+        before = lanes_at(statistics, (i, BELOW_AT))
+        put_lanes(statistics, (i, BELOW_AT), choose((value < 0.0) & (before < 0.0), now, before))
+        bound, bad = lanes_at(statistics, (i, BOUND)), lanes_at(statistics, (i, DIVERGED_AT))
         sound = (value <= bound) & (value >= 0.0 - bound)
-        put_lanes(marks, (i, DIVERGED_AT), choose(sound | (bad >= 0.0), bad, now))
+        put_lanes(statistics, (i, DIVERGED_AT), choose(sound | (bad >= 0.0), bad, now))
 
 
 @piece
-def keep(marks, history, watch, sample, n, now):
+def keep(statistics, history, watch, sample, n, now):
     """Update extremes, sums and samples of every signal with station n; ``now`` counts stations of the scene."""
-    for i in range(marks.shape[0]):
+    for i in range(statistics.shape[0]):
         if watch.counted[n, i]:
-            judge(marks, i, now)
+            judge(statistics, i, now)
         if watch.summed[i]:
-            value = lanes_at(marks, (i, VALUE))
-            put_lanes(marks, (i, SQUARES), lanes_at(marks, (i, SQUARES)) + value * value)
+            value = lanes_at(statistics, (i, VALUE))
+            put_lanes(statistics, (i, SQUARES), lanes_at(statistics, (i, SQUARES)) + value * value)
     if sample >= 0:
-        for i in range(min(marks.shape[0], history.shape[1])):
-            put_lanes(history, (sample, i), lanes_at(marks, (i, VALUE)) if watch.counted[n, i] else all_lanes(np.nan))
+        for i in range(min(statistics.shape[0], history.shape[1])):
+            put_lanes(
+                history, (sample, i), lanes_at(statistics, (i, VALUE)) if watch.counted[n, i] else all_lanes(np.nan)
+            )

@@ -6,7 +6,7 @@ These run once per segment, so they are written lane by lane for reading, not fo
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
-from engine.kernels.layout import CURVE, FORCE, LANES, MARKS, RATE, SQUARES
+from engine.kernels.layout import CURVE, FORCE, LANES, RATE, SQUARES, STATISTICS
 from engine.kernels.stepping.record import (
     A_NOW,
     GRAVITY,
@@ -17,7 +17,7 @@ from engine.kernels.stepping.record import (
     RATE_2,
     TIE,
     V_NOW,
-    copy_marks,
+    copy_statistics,
     keep,
     observe,
 )
@@ -54,11 +54,11 @@ def tie_row(rows, k, r):
 
 @piece
 def yield_to(force, matrix, unknown, i, ties, stiffness):
-    """Add the residual's part of the gap of reacting tie i to its equation; stiffness: k of its spring."""
-    r = ties.reacting[i]
-    for t in range(ties.reacting.shape[0]):
-        matrix[i, t] += stiffness * ties.residual[0, r, ties.reacting[t]]
-    for s in ties.given:
+    """Add the residual's part of the gap of reactive tie i to its equation; stiffness: k of its spring."""
+    r = ties.reactive[i]
+    for t in range(ties.reactive.shape[0]):
+        matrix[i, t] += stiffness * ties.residual[0, r, ties.reactive[t]]
+    for s in ties.prescribed:
         unknown[i] -= stiffness * ties.residual[0, r, s] * force[s]
 
 
@@ -67,44 +67,44 @@ def forces_at_start(force, matrix, unknown, ties, lanes, state, at):
     """Forces of all ties of one lane at station 0, in step units, for the given displacements and velocities; at: its
     block and lane. matrix, unknown: room for the system of the ties that react.
 
-    The row w of station 0 holds P alone. unity F = load - gain (P.a + A.v + B.u + drive) - stiff (p.u + level +
-    residual F/h^2),  a = mobility p F - c v - k u.
+    The row w of station 0 holds P alone. unity F = load - m (P.a + A.v + B.u + drive) - k (p.u + level +
+    residual F/h^2),  a = inverse_modal_mass p F - c v - k u.
     """
-    rows, reacting, (block, j) = ties.rows, ties.reacting.shape[0], at
+    rows, reactive, (block, j) = ties.rows, ties.reactive.shape[0], at
     h, gravity = lanes.step[block, j], lanes.gravity[block, j]
     for r in range(rows.shape[2]):
         force[r] = lanes.load[block, r, j]
-    for i in range(reacting):
-        r = ties.reacting[i]
-        gain = lanes.gain[block, r, j]
+    for i in range(reactive):
+        r = ties.reactive[i]
+        coupling_mass = lanes.coupling_mass[block, r, j]
         total, gap = -ties.drive[0, r] * gravity, ties.level[0, r] * gravity
-        for t in range(reacting):
+        for t in range(reactive):
             matrix[i, t] = ties.unity[r] if i == t else 0.0
         for k in range(rows.shape[1]):
             inertial, rate, curve = tie_row(rows, k, r)
             u, v = state.q[block, k, j], state.v[block, k, j] * h
             elastic = lanes.damping[block, k, j] * v + lanes.stiffness[block, k, j] * u
-            mobile = lanes.mobility[block, k, j]
-            for s in ties.given:
+            mobile = lanes.inverse_modal_mass[block, k, j]
+            for s in ties.prescribed:
                 elastic -= mobile * rows[0, k, s, FORCE] * force[s]
             total += inertial * elastic - rate * v - curve * u
             gap += rows[0, k, r, FORCE] * u
-            for t in range(reacting):
-                matrix[i, t] += gain * inertial * mobile * rows[0, k, ties.reacting[t], FORCE]
-        unknown[i] = lanes.load[block, r, j] + gain * total - lanes.stiff[block, r, j] * gap
+            for t in range(reactive):
+                matrix[i, t] += coupling_mass * inertial * mobile * rows[0, k, ties.reactive[t], FORCE]
+        unknown[i] = lanes.load[block, r, j] + coupling_mass * total - lanes.coupling_stiffness[block, r, j] * gap
         if ties.residual.shape[0] > 0:
-            yield_to(force, matrix, unknown, i, ties, lanes.stiff[block, r, j] / (h * h))
+            yield_to(force, matrix, unknown, i, ties, lanes.coupling_stiffness[block, r, j] / (h * h))
     solve_in_place(matrix, unknown)
-    for i in range(reacting):
-        force[ties.reacting[i]] = unknown[i]
+    for i in range(reactive):
+        force[ties.reactive[i]] = unknown[i]
 
 
 @kernel
-def settle(ties, lanes, state):
+def solve_initial_acceleration(ties, lanes, state):
     """Accelerations that satisfy the equations of motion at station 0, for the given displacements and velocities."""
     rows = ties.rows
-    modes, many, reacting = rows.shape[1], rows.shape[2], ties.reacting.shape[0]
-    force, matrix, unknown = np.empty(many), np.empty((reacting, reacting)), np.empty(reacting)
+    modes, many, reactive = rows.shape[1], rows.shape[2], ties.reactive.shape[0]
+    force, matrix, unknown = np.empty(many), np.empty((reactive, reactive)), np.empty(reactive)
     for block in range(lanes.step.shape[0]):
         for j in range(LANES):
             h = lanes.step[block, j]
@@ -113,7 +113,7 @@ def settle(ties, lanes, state):
                 u, v = state.q[block, k, j], state.v[block, k, j] * h
                 a = -lanes.damping[block, k, j] * v - lanes.stiffness[block, k, j] * u
                 for r in range(many):
-                    a += lanes.mobility[block, k, j] * rows[0, k, r, FORCE] * force[r]
+                    a += lanes.inverse_modal_mass[block, k, j] * rows[0, k, r, FORCE] * force[r]
                 state.a[block, k, j] = a / (h * h)
                 state.memory[block, k, j] = 0.0
 
@@ -150,13 +150,13 @@ def strike(blow, gravity, state):
 @kernel
 def watch_start(ties, lanes, state, watch, record, count):
     """Observe station 0 of a segment: extremes and samples, but not the sums of squares."""
-    modes, many, reacting = ties.rows.shape[1], ties.rows.shape[2], ties.reacting.shape[0]
-    force, matrix, unknown = np.empty(many), np.empty((reacting, reacting)), np.empty(reacting)
+    modes, many, reactive = ties.rows.shape[1], ties.rows.shape[2], ties.reactive.shape[0]
+    force, matrix, unknown = np.empty(many), np.empty((reactive, reactive)), np.empty(reactive)
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
-    marks = np.zeros((watch.offset.shape[1], MARKS, LANES))
+    statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     for block in range(lanes.step.shape[0]):
-        copy_marks(marks, record.marks[block])
+        copy_statistics(statistics, record.statistics[block])
         for j in range(LANES):
             h = lanes.step[block, j]
             b[GRAVITY, j] = lanes.gravity[block, j]
@@ -170,9 +170,9 @@ def watch_start(ties, lanes, state, watch, record, count):
             forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for r in range(many):
                 b[TIE + r, j] = force[r]
-        observe(marks, now, b, watch, 0, KEPT)
-        keep(marks, record.history[block], watch, record.sample[0], 0, float(count))
-        for i in range(marks.shape[0]):
+        observe(statistics, now, b, watch, 0, KEPT)
+        keep(statistics, record.history[block], watch, record.sample[0], 0, float(count))
+        for i in range(statistics.shape[0]):
             for j in range(LANES):
-                marks[i, SQUARES, j] = record.marks[block, i, SQUARES, j]
-        copy_marks(record.marks[block], marks)
+                statistics[i, SQUARES, j] = record.statistics[block, i, SQUARES, j]
+        copy_statistics(record.statistics[block], statistics)

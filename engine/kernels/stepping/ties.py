@@ -21,11 +21,11 @@ GAINS, STIFFS, LOADS, UNITY = range(4)
 
 
 class Twos(NamedTuple):
-    """The reacting ties two by two, and which modes meet in them, by number.
+    """The reactive ties two by two, and which modes meet in them, by number.
 
     member (2 twos): the ties, a last one without another twice;  moves, springs (twos): whether one of the two does;
     shared (twos, twos, modes), shares (twos, twos): the modes that reach both a tie of the one and a tie of the other
-    two, and how many there are;  pushing (modes, reacting), pushes (modes): the reacting ties of a mode, and how many.
+    two, and how many there are;  pushing (modes, reactive), pushes (modes): the reactive ties of a mode, and how many.
     """
 
     member: IntArray
@@ -39,9 +39,9 @@ class Twos(NamedTuple):
 
 @piece
 def note_members(member, moves, springs, ties):
-    """Take the reacting ties two by two."""
+    """Take the reactive ties two by two."""
     for i in range(member.shape[0]):
-        r = ties.reacting[min(i, ties.reacting.shape[0] - 1)]
+        r = ties.reactive[min(i, ties.reactive.shape[0] - 1)]
         member[i] = r
         moves[i // 2] = moves[i // 2] or ties.moves[r]
         springs[i // 2] = springs[i // 2] or ties.springs[r]
@@ -60,10 +60,10 @@ def note_shared(shared, shares, member, reaches):
 
 
 @piece
-def note_pushing(pushing, pushes, reacting, reaches):
-    """List the reacting ties that reach a mode."""
+def note_pushing(pushing, pushes, reactive, reaches):
+    """List the reactive ties that reach a mode."""
     for k in range(reaches.shape[0]):
-        for r in reacting:
+        for r in reactive:
             if reaches[k, r]:
                 pushing[k, pushes[k]] = r
                 pushes[k] += 1
@@ -73,19 +73,19 @@ def note_pushing(pushing, pushes, reacting, reaches):
 def load_own(own, b, ties, lanes, block):
     """What all ties have to themselves in a block of lanes; and the forces of the dead loads, which stay."""
     for r in range(own.shape[0]):
-        put_lanes(own, (r, GAINS), lanes_at(lanes.gain, (block, r)))
-        put_lanes(own, (r, STIFFS), lanes_at(lanes.stiff, (block, r)))
+        put_lanes(own, (r, GAINS), lanes_at(lanes.coupling_mass, (block, r)))
+        put_lanes(own, (r, STIFFS), lanes_at(lanes.coupling_stiffness, (block, r)))
         put_lanes(own, (r, LOADS), lanes_at(lanes.load, (block, r)))
         put_lanes(own, (r, UNITY), all_lanes(ties.unity[r]))
-    for s in ties.given:
+    for s in ties.prescribed:
         put_lanes(b, (TIE + s,), lanes_at(lanes.load, (block, s)))
 
 
 @piece
-def load_dead(work, b, rows, given, reaches, n):
+def load_dead(work, b, rows, prescribed, reaches, n):
     """Take what the dead loads give at station n from c* of the modes, so that it need not be told apart any more."""
-    for i in range(given.shape[0]):
-        r = np.uint64(given[i])
+    for i in range(prescribed.shape[0]):
+        r = np.uint64(prescribed[i])
         force = lanes_at(b, (FORCES + r,))
         for k in range(work.shape[0]):
             if reaches[k, r]:
@@ -101,7 +101,7 @@ def two(twos, one):
 
 @piece
 def push_ties(b, work, rows, own, twos, n, beta):
-    """b[TIE] += gain (w.c* - A.v* - B.u*) + stiff p.(beta c* - u*) of every reacting tie."""
+    """b[TIE] += m (w.c* - A.v* - B.u*) + k p.(beta c* - u*) of every reactive tie."""
     for one in range(twos.shares.shape[0]):
         i, j = two(twos, one)
         motion_i, motion_j, gap_i, gap_j = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
@@ -127,10 +127,10 @@ def push_ties(b, work, rows, own, twos, n, beta):
 
 
 @piece
-def load_ties(b, own, reacting, drive, level):
-    """b[TIE] = load - gain drive - stiff level of every reacting tie; drive, level: those of the station."""
+def load_ties(b, own, reactive, drive, level):
+    """b[TIE] = load - m drive - k level of every reactive tie; drive, level: those of the station."""
     gravity = lanes_at(b, (GRAVITY,))
-    for r in reacting:
+    for r in reactive:
         track = lanes_at(own, (r, GAINS)) * (drive[r] * gravity) + lanes_at(own, (r, STIFFS)) * (level[r] * gravity)
         put_lanes(b, (TIE + r,), lanes_at(own, (r, LOADS)) - track)
 
@@ -158,7 +158,7 @@ def add_lanes(matrix, i, s, row):
 
 @piece
 def couple_motions(matrix, work, rows, own, twos, n):
-    """matrix = unity + gain w.(D p) of the reacting ties."""
+    """matrix = unity + m w.(D p) of the reactive ties."""
     for one in range(twos.shares.shape[0]):
         i, j = two(twos, one)
         gain_i, gain_j = lanes_at(own, (i, GAINS)), lanes_at(own, (j, GAINS))
@@ -176,7 +176,7 @@ def couple_motions(matrix, work, rows, own, twos, n):
 
 @piece
 def couple_gaps(matrix, work, rows, own, twos, n, beta):
-    """matrix += stiff beta p.(D p) of the reacting ties; the product is symmetric, so half of them do."""
+    """matrix += k beta p.(D p) of the reactive ties; the product is symmetric, so half of them do."""
     for one in range(twos.shares.shape[0]):
         i, j = two(twos, one)
         stiff_i, stiff_j = beta * lanes_at(own, (i, STIFFS)), beta * lanes_at(own, (j, STIFFS))
@@ -198,27 +198,27 @@ def couple_gaps(matrix, work, rows, own, twos, n, beta):
 
 @piece
 def miss(matrix, b, ties, own, n):
-    """Add what the kept modes miss of the gaps: stiff residual/h^2, of the dead loads on the right-hand side."""
+    """Add what the kept modes miss of the gaps: k residual/h^2, of the dead loads on the right-hand side."""
     rate = lanes_at(b, (RATE_2,))
-    for i in range(ties.reacting.shape[0]):
-        r = ties.reacting[i]
+    for i in range(ties.reactive.shape[0]):
+        r = ties.reactive[i]
         if ties.springs[r]:
-            stiff = lanes_at(own, (r, STIFFS)) * rate
-            for t in range(ties.reacting.shape[0]):
-                add_lanes(matrix, i, t, ties.residual[n, r, ties.reacting[t]] * stiff)
-            for s in ties.given:
-                dead = ties.residual[n, r, s] * (stiff * lanes_at(b, (TIE + s,)))
+            coupling_stiffness = lanes_at(own, (r, STIFFS)) * rate
+            for t in range(ties.reactive.shape[0]):
+                add_lanes(matrix, i, t, ties.residual[n, r, ties.reactive[t]] * coupling_stiffness)
+            for s in ties.prescribed:
+                dead = ties.residual[n, r, s] * (coupling_stiffness * lanes_at(b, (TIE + s,)))
                 put_lanes(b, (TIE + r,), lanes_at(b, (TIE + r,)) - dead)
 
 
 @piece
-def solve_ties(b, matrix, reacting):
+def solve_ties(b, matrix, reactive):
     """Solve for the forces, in b from TIE on; the matrix is used up.
 
     Without pivoting: the matrix is unity on the diagonal, or zero for rigid ties, plus a product that is positive
     wherever the march is stable. Its lower and upper part take its place, the diagonal inverted.
     """
-    count = reacting.shape[0]
+    count = reactive.shape[0]
     for i in range(count):
         for t in range(count):
             x = lanes_at(matrix, (i, t))
@@ -229,20 +229,20 @@ def solve_ties(b, matrix, reacting):
             if t == i:
                 x = 1.0 / x
             put_lanes(matrix, (i, t), x)
-        x = lanes_at(b, (TIE + reacting[i],))
+        x = lanes_at(b, (TIE + reactive[i],))
         for m in range(i):
-            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reacting[m],))
-        put_lanes(b, (TIE + reacting[i],), x)
+            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reactive[m],))
+        put_lanes(b, (TIE + reactive[i],), x)
     for i in range(count - 1, -1, -1):
-        x = lanes_at(b, (TIE + reacting[i],))
+        x = lanes_at(b, (TIE + reactive[i],))
         for m in range(i + 1, count):
-            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reacting[m],))
-        put_lanes(b, (TIE + reacting[i],), x * lanes_at(matrix, (i, i)))
+            x = x - lanes_at(matrix, (i, m)) * lanes_at(b, (TIE + reactive[m],))
+        put_lanes(b, (TIE + reactive[i],), x * lanes_at(matrix, (i, i)))
 
 
 @piece
 def pushed(b, rows, twos, n, k):
-    """Sum over the reacting ties of p F of mode k at station n."""
+    """Sum over the reactive ties of p F of mode k at station n."""
     push = all_lanes(0.0)
     for i in range(twos.pushes[k]):
         r = np.uint64(twos.pushing[k, i])
