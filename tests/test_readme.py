@@ -1,10 +1,12 @@
-"""The documentation tells the truth: its table of results, its study file, its links."""
+"""The documentation tells the truth: its table of results, its examples, its links."""
 
 from __future__ import annotations
 
 import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 from typing import Any
 
 from engine.batch.plan import make_plan
@@ -20,8 +22,21 @@ def test_the_table_of_results_is_the_declarations() -> None:
     assert finished.returncode == 0, "run: python -m tests.readme"
 
 
+def pages() -> list[Path]:
+    return [README, *sorted(README.parent.glob("docs/*.md"))]
+
+
+def examples(language: str) -> list[tuple[str, str]]:
+    """All blocks of a language, with the page that each stands on."""
+    return [
+        (page.name, block)
+        for page in pages()
+        for block in re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
+    ]
+
+
 def test_links_lead_somewhere() -> None:
-    for page in (README, *README.parent.glob("docs/*.md")):
+    for page in pages():
         text = page.read_text(encoding="utf-8")
         heads = {
             re.sub(r"[^\w -]", "", head).strip().lower().replace(" ", "-")
@@ -29,22 +44,41 @@ def test_links_lead_somewhere() -> None:
         }
         for link in re.findall(r"\]\(([^)]+)\)", text):
             path, _, anchor = link.partition("#")
-            assert link.startswith("http") or (page.parent / path).exists(), link
+            assert link.startswith("http") or (page.parent / path).exists(), f"{page.name}: {link}"
             assert path or anchor in heads, link
 
 
-def test_the_study_file_runs() -> None:
-    text = README.read_text(encoding="utf-8")
-    block = next(block for block in re.findall(r"```toml\n(.*?)```", text, re.S) if "schema_version" in block)
-    study = load(block)
-    kind = kind_of(study)
-    assert make_plan(study, reduction=kind.reduction(study), results=kind.name).size == 160
+def test_the_readme_leads_to_every_page() -> None:
+    linked = set(re.findall(r"\]\(docs/([^)#]+)\)", README.read_text(encoding="utf-8")))
+    assert linked == {page.name for page in pages()[1:]}
+
+
+def test_the_readme_is_two_screens() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 100
+
+
+def test_study_files_run() -> None:
+    whole = [load(block) for _, block in examples("toml") if "schema_version" in block]
+    sizes = [make_plan(s, reduction=kind_of(s).reduction(s), results=s.kind).size for s in whole]
+    assert sizes == [160]
+
+
+def test_pieces_of_study_files_are_toml() -> None:
+    assert all(tomllib.loads(block) for _, block in examples("toml"))
 
 
 def test_the_python_example_runs() -> None:
-    text = README.read_text(encoding="utf-8")
-    block = next(block for block in re.findall(r"```python\n(.*?)```", text, re.S))
+    ((_, block),) = examples("python")
     lines = [line for line in block.splitlines() if "engine.load" not in line and not line.endswith(".plot()")]
     names: dict[str, Any] = {}
     exec("\n".join(lines), names)
     assert names["ds"].dynamic_amplification.sel(sensor="midspan", mass=100).shape == (40,)
+
+
+def test_every_folder_of_code_is_in_the_plan_of_the_house() -> None:
+    text = (README.parent / "docs" / "house.md").read_text(encoding="utf-8")
+    folders = {path.parent.relative_to(README.parent).as_posix() for path in README.parent.glob("*/**/*.py")}
+    rooms = {folder for folder in folders if folder.startswith(("results_schema", "engine/", "studies/"))}
+    assert {
+        folder for folder in rooms if not folder.startswith("engine/bodies/") and f"`{folder}/`" not in text
+    } == set()
