@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from results_schema.errors import BadInput
+from studies.protocol.study import foreign_kinds, kind_named
 
 LIBRARY = Path(__file__).parents[1] / "library"
 STARTS = Path(__file__).parents[1] / "starts"
@@ -67,14 +68,20 @@ def start_text(kind: str) -> str:
 
     Raises BadInput for an unknown name.
     """
-    known = starts()
-    if kind not in known and kind in built_in():
+    known, shared = starts(), EVERY_STUDY.read_text(encoding="utf-8")
+    if kind in known:
+        return known[kind].read_text(encoding="utf-8") + shared
+    if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
-    if kind not in known:
+    start = getattr(kind_named(kind), "start", "") if kind in foreign_kinds() else ""
+    if not start:
         raise BadInput(
-            "no such kind of study", where=kind, expected=f"one of {', '.join(known)}", remedy=_nearest(kind, known)
+            "no such kind of study, or none with a file to start from",
+            where=kind,
+            expected=f"one of {', '.join([*known, *foreign_kinds()])}",
+            remedy=_nearest(kind, known),
         )
-    return known[kind].read_text(encoding="utf-8") + EVERY_STUDY.read_text(encoding="utf-8")
+    return str(start) + shared
 
 
 def _files(folder: Path) -> Mapping[str, Path]:

@@ -6,6 +6,7 @@ import pkgutil
 from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
     from studies.results.results import Results
 
 KINDS_FOLDER = Path(__file__).parents[1] / "kinds"
+GROUP = "wanderlast.kinds"  # of the entry points by which other packages bring kinds of study
 
 
 class Kind(Protocol):
     """One kind of question about one scene and its sweep. A module in `studies/kinds` has one as its attribute KIND,
-    and declares its results; or it has a `studies.protocol.measuring.MeasuringKind`.
+    and declares its results; or it has a `studies.protocol.measuring.MeasuringKind`. Another package names its own by
+    an entry point, and has a study file to start from as its attribute ``start``.
 
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
     """
@@ -51,12 +54,45 @@ class Kind(Protocol):
 
 
 def kind_names() -> tuple[str, ...]:
-    """The kinds of study that there are; a new one is one new file in the folder of kinds."""
-    modules = pkgutil.iter_modules([str(KINDS_FOLDER)])
-    return tuple(sorted(module.name.replace("_", "-") for module in modules))
+    """The kinds of study that there are; a new one is one new file in the folder of kinds, or an entry point of another
+    package."""
+    return tuple(sorted({*_own_names(), *foreign_kinds()}))
+
+
+def foreign_kinds() -> Mapping[str, EntryPoint]:
+    """The entry points of kinds that other packages bring, by name; those of the program's own names count for
+    nothing."""
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in _own_names()}
+
+
+def _own_names() -> set[str]:
+    return {module.name.replace("_", "-") for module in pkgutil.iter_modules([str(KINDS_FOLDER)])}
+
+
+def _foreign(point: EntryPoint) -> AnyKind:
+    """The kind that an entry point names. Raises BadInput where it cannot be had."""
+    try:
+        kind = point.load()
+    except Exception as error:
+        raise BadInput(
+            f"the kind of study {point.name} of another package cannot be imported",
+            where=f"entry point {point.name} = {point.value}",
+            received=f"{type(error).__name__}: {error}"[:200],
+            remedy="mend or remove that package",
+        ) from None
+    missing = [name for name in KIND_HAS if not hasattr(kind, name)]
+    if missing or kind.name != point.name:
+        raise BadInput(
+            f"{point.value} is no kind of study",
+            where=f"entry point {point.name} = {point.value}",
+            expected=f'an object with {", ".join(KIND_HAS)}, whose name is "{point.name}"',
+            received=f"without {', '.join(missing)}" if missing else f'the name "{kind.name}"',
+        )
+    return cast(AnyKind, kind)
 
 
 AnyKind = Kind | MeasuringKind
+KIND_HAS = ("name", "summary", "question", "check", "findings", "figures")
 
 
 def kind_named(name: str, where: str = "kind") -> AnyKind:
@@ -67,6 +103,9 @@ def kind_named(name: str, where: str = "kind") -> AnyKind:
         remedy = f'did you mean "{near[0]}"?' if near else ""
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
+    foreign = foreign_kinds()
+    if name in foreign:
+        return _foreign(foreign[name])
     return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
 
 

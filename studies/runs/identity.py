@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from results_schema.errors import BadInput
+from studies.protocol.study import foreign_kinds, kind_named
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -43,6 +45,7 @@ def run_key(study: Study, names: Sequence[str] = ()) -> str:
     from engine.kernels.jit import kernel_hash
 
     texts = [study.source.sha256, *files_of(study).values(), *names, kernel_hash(), sources_hash(sources())]
+    texts += [path.read_text(encoding="utf-8") for path in foreign_sources(study.kind)]
     texts += [f"{library} {version(library)}" for library in LIBRARIES]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()
 
@@ -51,6 +54,14 @@ def sources() -> list[Path]:
     """Every source of ours that has a say in the numbers of parts."""
     found = [path for package in PACKAGES for path in (PROGRAM / package).rglob("*.py")]
     return sorted(path for path in found if not path.is_relative_to(DRAWING))
+
+
+def foreign_sources(kind: str) -> list[Path]:
+    """The file of a kind of study that another package brings."""
+    if kind not in foreign_kinds():
+        return []
+    found = inspect.getsourcefile(type(kind_named(kind)))
+    return [Path(found)] if found else []
 
 
 def sources_hash(paths: Sequence[Path]) -> str:
