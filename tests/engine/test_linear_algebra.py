@@ -16,7 +16,7 @@ AFTER_A_RUN = """
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 import engine.batch.execution
-from engine.bodies import unit_modes
+from engine.bodies.beam import unit_modes
 from tests.engine.build import beam, cruise, mass, study
 
 def threads():

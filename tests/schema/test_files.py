@@ -125,7 +125,7 @@ import sys
 sys.path.insert(0, {root!r})
 import numpy as np
 from pathlib import Path
-from results_schema import files, parts
+from results_schema.store import files, parts
 from results_schema.errors import OutputFailed
 
 full, read_only = Path({full!r}), Path({read_only!r})
