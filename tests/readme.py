@@ -11,7 +11,7 @@ BEGIN, END = "<!-- declarations: begin -->\n", "<!-- declarations: end -->\n"
 
 def with_declarations(text: str) -> str:
     """A text with the table of all declared results between its marks."""
-    from results_schema.reference import reference_table
+    from results_schema.results_table import reference_table
     from studies.protocol.study import kind_named, kind_names
 
     for kind in kind_names():

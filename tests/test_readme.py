@@ -75,8 +75,8 @@ def test_the_python_example_runs() -> None:
     assert names["ds"].dynamic_amplification.sel(sensor="midspan", mass=100).shape == (40,)
 
 
-def test_every_folder_of_code_is_in_the_plan_of_the_house() -> None:
-    text = (README.parent / "docs" / "house.md").read_text(encoding="utf-8")
+def test_every_folder_of_code_is_told_of() -> None:
+    text = (README.parent / "docs" / "structure.md").read_text(encoding="utf-8")
     folders = {path.parent.relative_to(README.parent).as_posix() for path in README.parent.glob("*/**/*.py")}
     rooms = {folder for folder in folders if folder.startswith(("results_schema", "engine/", "studies/"))}
     assert {

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
+from engine.accuracy.neighbour_errors import TELLING, NeighbourErrors, nearest_others, neighbour_errors_of
 from engine.accuracy.reference import Halted, Share, across_and_within
 from engine.accuracy.results import Result, results_of
-from engine.accuracy.telling import TELLING, Telling, others_of, telling_of
-from engine.kernels.choice import cheapest, nearest
+from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
 from engine.model.variant_values import VariantValues
 from engine.scene.sweep import Cases
@@ -59,7 +59,7 @@ class Choice:
     measured: Measured
     neighbours: NDArray[np.int32]
     rung: NDArray[np.int32]
-    telling: Telling
+    neighbour_errors: NeighbourErrors
 
     @property
     def work(self) -> float:
@@ -68,12 +68,12 @@ class Choice:
 
     def errors(self, variants: Counts) -> Array:
         """(R, V) errors told for some variants; NaN where no estimate exists."""
-        return self.telling.errors(self._march[self.rung[variants, None], self.neighbours[variants]])
+        return self.neighbour_errors.errors(self._march[self.rung[variants, None], self.neighbours[variants]])
 
     def held(self, variants: Counts, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        return self.telling.worst(self.rung[variants], self.neighbours[variants], tighter)
+        return self.neighbour_errors.worst(self.rung[variants], self.neighbours[variants], tighter)
 
     @cached_property
     def _march(self) -> NDArray[np.int32]:
@@ -113,17 +113,17 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, 
     pilots = coordinates(cases, order)
     weights = _weights(pilots, measured)
     pilots = np.ascontiguousarray((pilots * weights).T)
-    others = others_of(pilots, NEIGHBOURS)
+    others = nearest_others(pilots, NEIGHBOURS)
     ranked = np.argsort(cost, kind="stable").astype(np.int32)
     ranked = ranked[np.any(np.isfinite(measured.held.reshape(cost.size, -1)[ranked]), axis=1)]
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
 
-    def work_of_pilots(telling: Telling) -> float:
+    def work_of_pilots(errors: NeighbourErrors) -> float:
         rung = np.empty(order.size, dtype=np.int32)
-        cheapest(telling.wanted, ranked, worth, others, np.full(order.size, span[0]), telling.spare, rung)
+        cheapest(errors.wanted, ranked, worth, others, np.full(order.size, span[0]), errors.spare, rung)
         return float(cost[rung].sum())
 
-    telling = min((telling_of(asked, measured, others, span, spare) for spare in SPARED), key=work_of_pilots)
+    errors = min((neighbour_errors_of(asked, measured, others, span, spare) for spare in SPARED), key=work_of_pilots)
     tighter, rung = cases_tolerance(asked, cases), np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=np.int32)
 
@@ -132,10 +132,10 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, 
         nearest(coordinates(cases, part) * weights, pilots, neighbours[own])
         inside = np.flatnonzero((order >= part[0]) & (order <= part[-1]))
         neighbours[order[inside]] = inside[:, None]  # pilots know their own errors
-        cheapest(telling.wanted, ranked, worth, neighbours[own], tighter[own], telling.spare, rung[own])
+        cheapest(errors.wanted, ranked, worth, neighbours[own], tighter[own], errors.spare, rung[own])
 
     share([partial(choose_for, part) for part in np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))])
-    return Choice(climbs[0].ladder, results_of(asked), order, measured, neighbours, rung, telling)
+    return Choice(climbs[0].ladder, results_of(asked), order, measured, neighbours, rung, errors)
 
 
 def usual_pilots(size: int) -> int:

@@ -17,7 +17,7 @@ from engine.march.outcome import Asked, Outcome
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
-from engine.observation.reduction import HISTORY_PART, Compared
+from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from engine.scene.study import Study
 from results_schema.status import Status
 

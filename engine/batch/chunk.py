@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.again import marches_again
 from engine.accuracy.groups import Found, Group
+from engine.accuracy.recomputed import marches_again
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import Plan
 from engine.march.outcome import Flat, histories

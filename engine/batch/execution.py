@@ -19,7 +19,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Group
 from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.linear_algebra import one_thread
-from engine.observation.reduction import Reduction
+from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.errors import BadInput, Interrupted
 

@@ -28,8 +28,8 @@ from engine.model.distinct_models import base_scene, scenes, split
 from engine.model.scene_model import SceneModel, check_moves
 from engine.model.timeline import Window
 from engine.model.variant_values import VariantValues
+from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
-from engine.observation.reduction import Reduction
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
 from results_schema.errors import BadInput

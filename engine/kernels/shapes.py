@@ -6,8 +6,8 @@ import numpy as np
 
 from engine.kernels.jit import kernel, piece
 from engine.kernels.layout import LANES, FloatArray
+from engine.kernels.sines import decay, sin_cos
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes
-from engine.kernels.waves import decay, sin_cos
 
 
 class Span(NamedTuple):

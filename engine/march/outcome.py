@@ -29,8 +29,8 @@ from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
+from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import counts_reduced
-from engine.observation.reduction import Reduction
 from engine.observation.signals import silent
 from engine.scene.study import Study
 from results_schema.status import Fidelity, SchemeUsed, Status

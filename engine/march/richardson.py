@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES, LARGEST, SMALLEST, Observation, Record
-from engine.kernels.stepping.pairs import extrapolate, integrate, survey
+from engine.kernels.stepping.richardson_pairs import extrapolate, integrate, survey
 from engine.march.march import Halted, March, Marched, march, prepare
 from engine.march.quasistatic import quasistatic_extremes
 from engine.march.tables import SceneTables, SegmentTable

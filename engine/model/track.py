@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import FORCE, RATE, Alpha, Impulse, Newmark, Ties
-from engine.kernels.rows import add_attachment, close_rows
+from engine.kernels.tie_rows import add_attachment, close_rows
 from engine.model.attachment import holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
 from engine.model.scene_model import SceneModel

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.again import marches_again
+from engine.accuracy.recomputed import marches_again
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.march.outcome import Flat

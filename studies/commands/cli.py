@@ -71,7 +71,7 @@ def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
     finished.
     """
     from studies.commands import actions, console
-    from studies.findings import choices
+    from studies.findings import numerics_used as choices
     from studies.protocol.options import RunOptions
     from studies.reporting import summary
     from studies.results.results import Results

@@ -125,7 +125,7 @@ def show_archive(summary: Summary) -> None:
 
 def show_outcome(outcome: Outcome) -> None:
     """What a run found: the range of every result and the variants there, statuses, the archive."""
-    from studies.findings.choices import told_choices
+    from studies.findings.numerics_used import told_choices
     from studies.reporting import summary
     from studies.results.results import Results
     from studies.runs.audit import told_audit

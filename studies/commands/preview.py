@@ -17,7 +17,7 @@ from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases, expand
-from studies.commands import chosen
+from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.measuring import disk_bytes
 from studies.results.formatting import counted, number, unit_text

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.legs import add_legs
+from engine.kernels.cycle_sums import add_legs
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from studies.results.results import VARIANT, Results, extreme
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.observation.reduction import Compared, Cycle
+    from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 

@@ -22,7 +22,7 @@ from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.observation.reduction import Compared, Cycle
+    from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 

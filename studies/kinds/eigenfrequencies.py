@@ -13,9 +13,9 @@ from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import pieces_of
+from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors
 from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
 from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.at_rest.resting import FREQUENCY_WANTED, enough_modes, frequency_errors
 from studies.protocol.measuring import Piece, question_of
 from studies.results.findings_common import first_carriage, in_words
 from studies.results.formatting import counted, listed, number, percent, quantity

@@ -13,9 +13,9 @@ from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import check_held, pieces_of
+from studies.at_rest.findings import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
 from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
 from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.at_rest.resting import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
 from studies.protocol.measuring import Piece, question_of
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, percent, quantity

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from studies.at_rest.resting import READING_WANTED, contacts_vary, reading_errors
+from studies.at_rest.findings import READING_WANTED, contacts_vary, reading_errors
 from studies.pictures.at_rest import (
     Errors,
     carriage_marks,

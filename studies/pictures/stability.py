@@ -26,7 +26,7 @@ from studies.pictures.common.figures import (
     printed,
     shades,
 )
-from studies.pictures.stability_more import OVERSHOOT, RIGID_TIE, SEPARATION, Drawn
+from studies.pictures.stability_details import OVERSHOOT, RIGID_TIE, SEPARATION, Drawn
 from studies.results.formatting import counted, number
 
 if TYPE_CHECKING:

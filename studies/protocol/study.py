@@ -16,7 +16,7 @@ from studies.protocol.measuring import MeasuringKind, Work, check_measurable, me
 if TYPE_CHECKING:
     import xarray as xr
 
-    from engine.observation.reduction import Reduction
+    from engine.observation.cycle_reduction import Reduction
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
     from studies.results.results import Results

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from studies.findings.choices import told_choices
+from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
 from studies.results.findings_common import told_envelopes
 from studies.results.results import Results
@@ -32,7 +32,8 @@ def findings_of(results: Results) -> list[str]:
 
 def figures_of(results: Results) -> list[Figure]:
     """The figures of the kind of study, then the envelopes, then what every variant took, cost and left out."""
-    from studies.pictures.common import choice, envelopes, estimates
+    from studies.pictures.common import envelopes, estimates
+    from studies.pictures.common import numerics_used as choice
 
     own = kind_named(results.study.kind).figures(results)
     return [*own, *envelopes.pictures(results), *choice.pictures(results), *estimates.pictures(results)]

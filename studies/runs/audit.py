@@ -13,7 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
-from studies.findings.choices import is_marched
+from studies.findings.numerics_used import is_marched
 from studies.protocol.measuring import Work, described
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results

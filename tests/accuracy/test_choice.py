@@ -17,7 +17,7 @@ from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, NEIGHBOURS, PILOT
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
-from engine.kernels.choice import ALIKE, cheapest, nearest
+from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
 from results_schema.status import Status
 from tests.accuracy.chosen import LENGTHS, SPEEDS, STUDIES, TOLERANCE, WEIGHTS, executed, observed, run_of
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages

@@ -11,8 +11,8 @@ import pytest
 from engine.accuracy.ladder import ENOUGH, Climb, ladder_of
 from engine.accuracy.reference import in_turn
 from tests.accuracy.passages import only_grid, passages
+from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, riding
 from tests.engine.build import Table, beam, cruise, fixed, force, oscillator
-from tests.engine.riders import FLEXIBLE, THREE, riding
 
 FIXED: dict[str, tuple[Table, dict[str, set[Any]]]] = {
     "nothing": ({}, {"fidelity": {"static", "force", "auto"}, "scheme": {"average-acceleration", "fox-goodwin"}}),

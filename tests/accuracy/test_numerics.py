@@ -16,8 +16,8 @@ from engine.scene.study import Study
 from tests.accuracy.passages import passages
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files
+from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, riding
 from tests.engine.build import beam, cruise, fixed
-from tests.engine.riders import FLEXIBLE, THREE, riding
 from tests.unreduced.test_unreduced import frame
 
 

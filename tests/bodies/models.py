@@ -12,7 +12,7 @@ from scipy.io import mmwrite
 from scipy.sparse import csc_matrix, save_npz
 
 from engine.batch.plan import make_plan
-from engine.bodies.files.child import READERS
+from engine.bodies.files.child_process import READERS
 from engine.bodies.files.model import FileModel
 from engine.bodies.files.reader import Request
 from engine.bodies.frame.assembly import Assembly, assemble

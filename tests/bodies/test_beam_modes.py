@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-import engine.bodies.beam.unit_modes
+import engine.bodies.beam.dimensionless_modes
+from engine.bodies.beam.dimensionless_modes import _decomposed, unit_modes
 from engine.bodies.beam.modes import MOST_MODES, BeamProperties, Spring, uniform_beam
 from engine.bodies.beam.statics import Restraint
-from engine.bodies.beam.unit_modes import _decomposed, unit_modes
 from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.waves import Support, WaveBeam, hermite_model
@@ -294,8 +294,8 @@ def test_waves_are_the_polynomials_that_they_stand_for(name: str, monkeypatch: p
         1.0, 1.0, 1.0, 1.0, 1.0, supports=tuple(Spring(*support) for support in SUPPORTS[name])
     ).restraints
     x = np.random.default_rng(6).random(200)
-    waves = engine.bodies.beam.unit_modes._solved(restraints, 40).derivatives(x, range(4))
-    monkeypatch.setattr(engine.bodies.beam.unit_modes, "BENT", math.inf)
-    series = engine.bodies.beam.unit_modes._solved(restraints, 40).derivatives(x, range(4))
+    waves = engine.bodies.beam.dimensionless_modes._solved(restraints, 40).derivatives(x, range(4))
+    monkeypatch.setattr(engine.bodies.beam.dimensionless_modes, "BENT", math.inf)
+    series = engine.bodies.beam.dimensionless_modes._solved(restraints, 40).derivatives(x, range(4))
     size = np.abs(series).max(axis=1, keepdims=True)
     assert np.all(np.abs(waves - series) <= 1e-12 * size)

@@ -14,12 +14,12 @@ import pytest
 
 from engine.bodies.files import ansys as import_ansys
 from engine.bodies.files import cards as import_cards
-from engine.bodies.files import extras as import_extras
+from engine.bodies.files import optional_packages as import_extras
 from engine.bodies.files import reader as import_files
+from engine.bodies.files.local_directions import turned
 from engine.bodies.files.model import FileModel, checked
 from engine.bodies.files.reader import Request, read_files
 from engine.bodies.files.text import Line, lines_of, read_lines, real, whole
-from engine.bodies.files.turn import turned
 from results_schema.errors import BadInput
 from tests.bodies.frames import PINNED, straight
 from tests.bodies.models import BULK, CDB, Files

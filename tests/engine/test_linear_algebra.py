@@ -16,15 +16,15 @@ AFTER_A_RUN = """
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 import engine.batch.execution
-from engine.bodies.beam import unit_modes
+from engine.bodies.beam import dimensionless_modes
 from tests.engine.build import beam, cruise, mass, study
 
 def threads():
     return {part["num_threads"] for part in threadpool_info() if part["user_api"] == "blas"}
 
 seen = []
-decompose, march = unit_modes._jacobi_svd, engine.batch.execution._task
-unit_modes._jacobi_svd = lambda matrix: seen.append(threads()) or decompose(matrix)
+decompose, march = dimensionless_modes._jacobi_svd, engine.batch.execution._task
+dimensionless_modes._jacobi_svd = lambda matrix: seen.append(threads()) or decompose(matrix)
 engine.batch.execution._task = lambda *given: seen.append(threads()) or march(*given)
 given = study(beam(modes=3, supports="clamped-clamped"), mass(0.3, cruise(0.0, 1.0, 1.0)), solver={"steps": 40})
 with threadpool_limits(3, user_api="blas"):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES
 from engine.kernels.shapes import Span, beam_shapes, combined_rows
-from engine.kernels.waves import decay, sin_cos
+from engine.kernels.sines import decay, sin_cos
 
 Array = NDArray[np.float64]
 LONG_PI = np.longdouble("3.14159265358979323846264338327950288")

@@ -19,7 +19,7 @@ from results_schema.status import Fidelity, Status
 from results_schema.store.archive import open_archive
 from results_schema.store.pieces import PieceStore
 from studies.at_rest import at_rest
-from studies.at_rest.resting import frequency_errors, reading_errors
+from studies.at_rest.findings import frequency_errors, reading_errors
 from studies.commands import catalogue
 from studies.commands.cli import main
 from studies.protocol.study import kind_of

@@ -10,8 +10,8 @@ from engine.accuracy.groups import MarchGroup
 from engine.batch.execution import run
 from engine.batch.plan import CHUNK_BYTES, make_plan
 from engine.model.variant_values import VariantValues
+from engine.observation.cycle_reduction import Compared
 from engine.observation.histories import counts_reduced
-from engine.observation.reduction import Compared
 from studies.findings.indices import harmonics
 from studies.findings.peaks import PEAKS, peaks
 from studies.kinds.double_peak import KIND, SAME_PEAK, STATIONS, DoublePeakReduction

@@ -14,7 +14,8 @@ from results_schema.errors import ArchiveError, BadInput
 from results_schema.store.archive import open_archive
 from results_schema.validate import validate
 from studies.commands.cli import main
-from studies.pictures.common import choice, envelopes, estimates
+from studies.pictures.common import envelopes, estimates
+from studies.pictures.common import numerics_used as choice
 from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
 from studies.reporting import answers

@@ -11,7 +11,7 @@ from engine.batch.plan import make_plan
 from engine.model.timeline import Rider, build_timeline
 from engine.observation.histories import counts_reduced
 from tests.engine.build import beam, cruise, force, study, swing
-from tests.engine.keeping import Kept
+from tests.engine.kept_cycles import Kept
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ import studies
 from engine.batch.plan import make_plan
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
+from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, riding
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
-from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, riding
 
 STATIC: Table = {"solver": {"fidelity": "static"}}
 

@@ -15,7 +15,7 @@ from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, STATISTICS
-from engine.kernels.stepping.pairs import survey
+from engine.kernels.stepping.richardson_pairs import survey
 from engine.march.richardson import march_pair
 from engine.march.tables import SceneTables
 from engine.model.variant_values import padded
@@ -24,7 +24,7 @@ from engine.scene.study import Study
 from results_schema.status import Status
 from tests.batch.test_determinism import digest, mixed
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
-from tests.engine.keeping import Kept
+from tests.engine.kept_cycles import Kept
 from tests.engine.reading import Reading
 from tests.engine.twin import solve_twin
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
 from engine.model.timeline import MOST_STATIONS, Rider, build_timeline
-from engine.observation.reduction import Compared, Cycle
+from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.motions import Cruise, OutAndBack, Sinusoidal
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
-from tests.engine.keeping import Kept
+from tests.engine.kept_cycles import Kept
 from tests.reference import closed_forms
 
 Array = NDArray[np.float64]

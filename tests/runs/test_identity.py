@@ -319,7 +319,7 @@ def test_fault_43_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.Mo
         "studies/findings/peaks.py",
         "studies/findings/indices.py",
         "studies/at_rest/at_rest.py",
-        "engine/observation/reduction.py",
+        "engine/observation/cycle_reduction.py",
     } <= known
     assert {path.relative_to(PROGRAM).as_posix() for path in KINDS_FOLDER.glob("*.py")} <= known
     copy = tmp_path / "studies" / "peaks.py"

@@ -5,7 +5,7 @@ import pytest
 
 from results_schema import variables
 from results_schema.errors import BadInput
-from results_schema.reference import reference_table
+from results_schema.results_table import reference_table
 from results_schema.status import Fidelity, Status, flag_meanings, flag_values, highest, label
 from results_schema.variables import RESERVED, Variable, axes, declarations, declare, expand, registered, sensor_unit
 

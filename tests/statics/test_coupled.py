@@ -16,8 +16,8 @@ from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
+from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
-from tests.engine.riders import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 
 Array = NDArray[np.float64]
 

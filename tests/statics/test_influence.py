@@ -14,8 +14,8 @@ from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.statics.static_response import StaticReadings, contact_names, static_shapes, static_values
+from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, TWO, UNEVEN, riding
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
-from tests.engine.riders import FLEXIBLE, THREE, TWO, UNEVEN, riding
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from engine.bodies.beam.dimensionless_modes import UnitModes, unit_modes
 from engine.bodies.beam.statics import Restraint, beam_statics, merge, stations
-from engine.bodies.beam.unit_modes import UnitModes, unit_modes
 from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
 

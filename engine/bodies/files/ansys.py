@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from engine.bodies.files.extras import extra, foreign
+from engine.bodies.files.local_directions import turned
 from engine.bodies.files.model import Array, Counts, FileModel, checked, hashes_of
+from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import Line, file_bytes, read_lines, read_paths, real, whole, written
-from engine.bodies.files.turn import turned
 from results_schema.errors import BadInput
 
 _HEAD = re.compile(r"\s*NBLOCK\s*,\s*(\d+)\s*(?:,\s*(\w*)\s*(?:,\s*(\d*)\s*(?:,\s*(\d*)\s*)?)?)?$", re.IGNORECASE)

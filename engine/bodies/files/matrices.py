@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.bodies.files.market import from_market
+from engine.bodies.files.matrix_market import from_market
 from engine.bodies.files.model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
 from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
 from results_schema.errors import BadInput

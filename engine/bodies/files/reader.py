@@ -93,7 +93,7 @@ def _read(request: Request) -> FileModel:
         }
         try:
             done = subprocess.run(
-                [sys.executable, "-P", "-m", "engine.bodies.files.child"],
+                [sys.executable, "-P", "-m", "engine.bodies.files.child_process"],
                 input=json.dumps(order),
                 capture_output=True,
                 text=True,

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine.bodies.frame.elements import Beams, consistent_mass, lumped_mass, stiffness
 from engine.bodies.frame.frame import DIRECTIONS, Frame
-from engine.bodies.frame.rules import member_axes, member_ends
+from engine.bodies.frame.refusals import member_axes, member_ends
 from engine.bodies.modal.modal_body import Array
 
 if TYPE_CHECKING:

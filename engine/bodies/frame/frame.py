@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
 from engine.bodies.frame.geometry import TrackLine
-from engine.bodies.frame.rules import check_frame, track_line
+from engine.bodies.frame.refusals import check_frame, track_line
 from engine.bodies.modal.description import Body
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened

@@ -17,7 +17,7 @@ from engine.bodies.files.reader import Request, read_files, role_of
 from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
 from engine.bodies.frame.frame import DIRECTIONS, Place, Support, Vector
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.rules import Key, refuse
+from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened

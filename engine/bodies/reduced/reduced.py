@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from engine.bodies.frame.rules import refuse
+from engine.bodies.frame.refusals import refuse
 from engine.bodies.modal.description import Body
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from studies.findings.choices import is_marched, known
+from studies.findings.numerics_used import is_marched, known
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
 from studies.results.formatting import counted, number, percent
 from studies.results.results import Results

@@ -15,9 +15,9 @@ from engine.march.march import march
 from engine.march.step_rules import contact_omega
 from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
+from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
+from tests.engine.bodies_on_contacts_dense import Twin
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
-from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
-from tests.engine.riding import Twin
 
 Array = NDArray[np.float64]
 

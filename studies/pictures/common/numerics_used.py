@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from results_schema.status import Fidelity
-from studies.findings.choices import MODEL, MODES, NAMES, STEPS, WORK, is_marched, known, models, of_variants
+from studies.findings.numerics_used import MODEL, MODES, NAMES, STEPS, WORK, is_marched, known, models, of_variants
 from studies.pictures.common.figures import (
     BLUE,
     GREEN,

@@ -13,9 +13,9 @@ from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues, padded
 from engine.statics.static_response import static_values
 from results_schema.status import Fidelity
+from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding
+from tests.engine.bodies_on_contacts_dense import Twin
 from tests.engine.build import Table, beam, cruise, fixed, shuttle
-from tests.engine.riders import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding
-from tests.engine.riding import Twin
 
 
 @pytest.mark.parametrize("name", ["flexible", "frame", "own weight"])

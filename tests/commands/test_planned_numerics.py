@@ -13,8 +13,8 @@ from engine.batch.execution import run_jobs
 from engine.batch.plan import Plan, make_plan
 from results_schema.status import Fidelity
 from studies.commands import forecast as forecasts
-from studies.commands.chosen import HEADINGS, chosen, rows
 from studies.commands.forecast import forecast
+from studies.commands.planned_numerics import HEADINGS, chosen, rows
 from studies.commands.preview import preview
 from studies.results.formatting import scientific
 from tests.engine.build import beam, cruise, mass, study

@@ -14,7 +14,7 @@ from engine.model.variant_values import padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing
-from tests.engine.company import Company
+from tests.engine.carriages_by_scipy import Company
 
 TABLE: Table = {"kind": "rigid", "length": 0.4, "mass": 0.5, "inertia": 0.01}
 UNEVEN: Table = TABLE | {"centre": 0.13, "mass": 0.3}

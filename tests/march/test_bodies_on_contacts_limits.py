@@ -11,8 +11,8 @@ import studies
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
 from engine.model.variant_values import padded
+from tests.engine.bodies_on_contacts import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
-from tests.engine.riders import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import pytest
 from engine.batch.plan import make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from tests.engine.bodies_on_contacts import RIGID, TWO, riding
 from tests.engine.build import beam, cruise, shuttle, study, swing
-from tests.engine.riders import RIGID, TWO, riding
 
 
 def change(case: Study, path: str, value: Any) -> Study:

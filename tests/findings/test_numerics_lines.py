@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.model.variant_values import VariantValues
-from engine.observation.reduction import Compared, Reduction
+from engine.observation.cycle_reduction import Compared, Reduction
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction
 from tests.engine.build import Table, beam, mass, shuttle, study, swing

@@ -17,8 +17,9 @@ from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from results_schema.variables import axes as coordinates
 from results_schema.variables import declarations
 from studies.commands.console import show_outcome
-from studies.findings.choices import NAMES, told_choices
-from studies.pictures.common import choice, estimates, figures
+from studies.findings.numerics_used import NAMES, told_choices
+from studies.pictures.common import estimates, figures
+from studies.pictures.common import numerics_used as choice
 from studies.pictures.common.figures import BLUE, MUTED, Figure
 from studies.reporting.report import write_report
 from studies.results.results import Results

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engine.accuracy.ladder import Measured
 from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, worst_held
-from engine.kernels.choice import nearest
+from engine.kernels.nearest_pilots import nearest
 from engine.march.outcome import Asked
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 so
 
 
 @dataclass(frozen=True, eq=False)
-class Telling:
+class NeighbourErrors:
     """What pilots tell their neighbours. spare: how many of a variant's, the worst, are not believed; error (M, R) told
     by each of their marches; held (2, columns x cuts, P): the errors that are held over their tolerances, of those that
     follow the study's and of those that have their own; wanted: the same by which it is decided."""
@@ -50,7 +50,9 @@ class Telling:
         return all_but(self.spare, np.maximum(follows / tighter[:, None], own), axis=1)
 
 
-def telling_of(asked: Asked, measured: Measured, others: Numbers, span: tuple[float, float], spare: int) -> Telling:
+def neighbour_errors_of(
+    asked: Asked, measured: Measured, others: Numbers, span: tuple[float, float], spare: int
+) -> NeighbourErrors:
     """What pilots tell whose neighbours among each other are others (P, k). span: the least and the largest
     `solver.tolerance` of the study's variants over its own."""
     results = results_of(asked)
@@ -65,7 +67,7 @@ def telling_of(asked: Asked, measured: Measured, others: Numbers, span: tuple[fl
     else:
         held = _by_rung([np.where(_holds(part), held_margin * measured.held, 0.0) for part in parts])
         wanted = held
-    return Telling(spare, error, held, wanted)
+    return NeighbourErrors(spare, error, held, wanted)
 
 
 def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> Array:
@@ -81,7 +83,7 @@ def all_but(spare: int, errors: Array, axis: int) -> Array:
     return np.asarray(np.take(np.partition(errors, place, axis=axis), place, axis=axis))
 
 
-def others_of(pilots: Array, count: int) -> Numbers:
+def nearest_others(pilots: Array, count: int) -> Numbers:
     """(P, count or fewer) the nearest of pilots (D, P) to each, but itself."""
     found = np.empty((pilots.shape[1], min(count + 1, pilots.shape[1])), dtype=np.int32)
     nearest(np.ascontiguousarray(pilots.T), pilots, found)

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.ladder import Measured
+from engine.accuracy.neighbour_errors import all_but, nearest_others, neighbour_errors_of
 from engine.accuracy.results import results_of
-from engine.accuracy.telling import all_but, others_of, telling_of
 from engine.march.outcome import Asked
 from tests.accuracy.chosen import run_of
 
@@ -40,7 +40,7 @@ def measured(error: Array, reference: float = 0.0) -> Measured:
 
 
 def others() -> NDArray[np.int32]:
-    return others_of(np.linspace(0.0, 1.0, COUNT)[None], NEAR)
+    return nearest_others(np.linspace(0.0, 1.0, COUNT)[None], NEAR)
 
 
 @pytest.mark.parametrize("spare", [0, 1])
@@ -65,7 +65,9 @@ def test_one_pilot_at_a_resonance_is_not_believed_by_all_around() -> None:
     error[20] = 50.0 * TOLERANCE
     pilots, rung = np.array([21]), np.zeros(1, dtype=np.int32)
     told = [
-        telling_of(asked(), measured(error), others(), (1.0, 1.0), spare).worst(rung, others()[pilots], np.ones(1))
+        neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0), spare).worst(
+            rung, others()[pilots], np.ones(1)
+        )
         for spare in (0, 1)
     ]
     assert told[0] >= 50.0 and told[1] < 0.2
@@ -75,8 +77,8 @@ def test_margins_are_what_pilots_that_are_left_out_need() -> None:
     """Errors that are twice those of all neighbours, now and then, double what is told."""
     error = np.full(COUNT, 0.1 * TOLERANCE)
     error[[4, 14, 24, 34]] *= 2.0
-    plain = telling_of(asked(), measured(np.full(COUNT, 0.1 * TOLERANCE)), others(), (1.0, 1.0), 1)
-    found = telling_of(asked(), measured(error), others(), (1.0, 1.0), 1)
+    plain = neighbour_errors_of(asked(), measured(np.full(COUNT, 0.1 * TOLERANCE)), others(), (1.0, 1.0), 1)
+    found = neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0), 1)
     np.testing.assert_allclose(plain.held[0], 0.1, rtol=1e-12)
     np.testing.assert_allclose(found.held[0, 0, 20], 0.2, rtol=1e-12)
 
@@ -84,13 +86,13 @@ def test_margins_are_what_pilots_that_are_left_out_need() -> None:
 @pytest.mark.parametrize(("reference", "decides"), [(0.2, 0.3), (0.39, 0.49), (3.0, 0.1)])
 def test_references_that_do_not_settle_are_told_but_do_not_decide(reference: float, decides: float) -> None:
     given = measured(np.full(COUNT, 0.1 * TOLERANCE), reference * TOLERANCE)
-    found = telling_of(asked(), given, others(), (1.0, 1.0), 0)
+    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0), 0)
     np.testing.assert_allclose(found.wanted[0], decides, rtol=1e-12)
     np.testing.assert_allclose(found.held[0], 0.1 + reference, rtol=1e-12)
 
 
 def test_what_the_study_fixes_makes_nothing_dearer() -> None:
     given = replace(measured(np.full(COUNT, 0.1 * TOLERANCE), 0.2 * TOLERANCE), free=False)
-    found = telling_of(asked(), given, others(), (1.0, 1.0), 0)
+    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0), 0)
     np.testing.assert_allclose(found.held[0], 0.1, rtol=1e-12)
     np.testing.assert_array_equal(found.wanted, found.held)

@@ -13,7 +13,7 @@ from engine.accuracy.results import results_of, tolerances
 from engine.batch.plan import Plan
 from engine.march.outcome import Flat, used
 from results_schema.status import Fidelity, SchemeUsed, label
-from studies.findings.choices import NAMES
+from studies.findings.numerics_used import NAMES
 from studies.results.formatting import number, percent, scientific
 from studies.results.results import spread
 

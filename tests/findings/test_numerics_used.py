@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import studies
-from studies.findings.choices import as_json, told_choices
+from studies.findings.numerics_used import as_json, told_choices
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, mass, study
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.observation.reduction import Compared, Cycle
+from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.study import Study
 from results_schema.status import Fidelity
 
