@@ -7,26 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
 
 from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
 from studies.results.formatting import axis_title, counted
 from studies.results.results import PACES, Axis, Results
+from studies.runs.audit import relative_errors
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Array = NDArray[np.float64]
 HEIGHT = 3.0
-LEAST = 1e-12  # an observed error of nothing has no place on a logarithmic axis
+LEAST = 1e-6  # an observed error of nothing has no place on a logarithmic axis
 
 
 def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
-    """One figure of the observed errors along the sweep; none without an audit of two variants or a sweep."""
+    """One figure of the observed errors along the sweep; none without an audit or a sweep, or where nothing is held."""
     axis = results.axis(*PACES) or next((axis for axis in results.axes if len(axis.values) > 1), None)
-    if group is None or axis is None or not np.isfinite(group["observed_error"].values).any():
+    if group is None or axis is None or not np.isfinite(relative_errors(group)).any():
         return []
     caption = (
-        f"{counted(group.sizes['sample'], 'variant')} computed again with all terms, twice the modes and at least four "
-        "times the steps. The largest difference of what they report, of extremes over the largest static value."
+        f"{counted(group.sizes['sample'], 'variant')} computed again with all terms, more modes and more steps, and "
+        "one level beyond. Of every variant the largest error over its tolerance, among the results that have one."
     )
     return [draw("audit", "Errors that the audit observed", caption, HEIGHT, partial(_draw, group, axis))]
 
@@ -34,15 +37,17 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
 def _draw(group: xr.Dataset, axis: Axis, drawing: Drawing) -> None:
     axes = drawing.subplots()
     along = np.asarray(group[axis.name].values, dtype=np.float64)
-    observed, estimated, asked = (
-        np.asarray(group[name].values) for name in ("observed_error", "estimated_error", "tolerance_asked")
-    )
-    order = np.argsort(along)
-    axes.plot(along[order], asked[order], color=MUTED, linewidth=1.0, label="tolerance")
-    axes.plot(along, np.maximum(observed, LEAST), "o", color=BLUE, markersize=4.5, label="observed")
-    if np.isfinite(estimated).any():
-        axes.plot(along, np.maximum(estimated, LEAST), "x", color=VERMILION, markersize=5.0, label="estimated")
+    axes.axhline(1.0, color=MUTED, linewidth=1.0, label="tolerance")
+    for name, mark, colour in (("observed", "o", BLUE), ("estimated", "x", VERMILION)):
+        worst = _worst(relative_errors(group, f"{name}_error"))
+        axes.plot(along, np.maximum(worst, LEAST), mark, color=colour, markersize=4.5, label=name)
     logarithmic(axes.yaxis)
     axes.set_xlabel(axis_title(axis.noun, axis.units))
-    axes.set_ylabel("relative error")
+    axes.set_ylabel("error over tolerance")
     legend_beside(axes)
+
+
+def _worst(errors: Array) -> Array:
+    """(n,) the largest known of errors (n, R); NaN where none is."""
+    found = np.max(np.nan_to_num(errors, nan=-np.inf), axis=1, initial=-np.inf)
+    return np.where(np.isfinite(found), found, np.nan)
