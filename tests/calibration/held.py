@@ -81,9 +81,11 @@ def judged(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
 
 def said(rows: Sequence[Row], words: str) -> str:
     """One line on some variants."""
+    if not rows:
+        return f"{words}: none"
     worst, doubt = (np.array([getattr(row, name) for row in rows]) for name in ("worst", "doubt"))
     missed, doubtful = ~(worst <= 1.0), ~(doubt <= CANNOT_JUDGE)
-    marked = np.array([row.marked for row in rows])
+    marked = np.array([row.marked for row in rows], dtype=np.bool_)
     ratios = np.concatenate([row.ratios for row in rows]) if rows else np.zeros(0)
     return (
         f"{words}: {len(rows)} variants, held {100 * np.mean(~missed):.2f} % ({missed.sum()} missed, of which "
