@@ -35,9 +35,8 @@ CUTS = tuple(sorted({2**k for k in range(16)} | {3 * 2**k for k in range(15)})) 
 #: a period), and by schemes of second order (1e-5). With half of them `double-peak` took 1.7 times the work.
 FINE = {"fox-goodwin": (128.0, 16.0), "": (512.0, 32.0)}
 # What is said of the next six was measured on `asymmetry`, `double-peak` and 10,000 passages: the work that these took.
-HOPELESS = (
-    0.9  # of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 took 0.9 to 1.1 times
-)
+#: Of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 took 0.9 to 1.1 times.
+HOPELESS = 0.9
 FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer has held 1e-2; 1 to 6 chose alike
 FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1.05 to 1.5 chose alike
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing

@@ -1,7 +1,7 @@
 """What the measured errors of pilots tell of the variants around them.
 
-The errors of a variant's nearest pilots bound its own: the largest of them, or the largest but one, times a margin that
-pilots would have needed, had they been left out.
+The largest error of a variant's nearest pilots bounds its own, times a margin that pilots would have needed, had they
+been left out.
 """
 
 from __future__ import annotations
@@ -29,29 +29,28 @@ TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 so
 
 @dataclass(frozen=True, eq=False)
 class NeighbourErrors:
-    """What pilots tell their neighbours. spare: how many of a variant's, the worst, are not believed; error (M, R) told
-    by each of their marches; held (2, columns x cuts, P): the errors that are held over their tolerances, of those that
-    follow the study's and of those that have their own; wanted: the same by which it is decided."""
+    """What pilots tell their neighbours. error (M, R) told by each of their marches; held (2, columns x cuts, P): the
+    errors that are held over their tolerances, of those that follow the study's and of those that have their own;
+    wanted: the same by which it is decided."""
 
-    spare: int
     error: Array
     held: Array
     wanted: Array
 
     def errors(self, marches: Numbers) -> Array:
         """(R, V) errors told by the marches (V, k) of neighbours; NaN where no estimate exists."""
-        error = all_but(self.spare, self.error[marches], axis=1)
+        error = np.max(self.error[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(error), error, np.nan).T
 
     def worst(self, rung: Numbers, neighbours: Numbers, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        follows, own = self.held[:, rung[:, None], neighbours]
-        return all_but(self.spare, np.maximum(follows / tighter[:, None], own), axis=1)
+        follows, own = np.max(self.held[:, rung[:, None], neighbours], axis=2)
+        return np.asarray(np.maximum(follows / tighter, own))
 
 
 def neighbour_errors_of(
-    asked: Asked, measured: Measured, others: Numbers, span: tuple[float, float], spare: int
+    asked: Asked, measured: Measured, others: Numbers, span: tuple[float, float]
 ) -> NeighbourErrors:
     """What pilots tell whose neighbours among each other are others (P, k). span: the least and the largest
     `solver.tolerance` of the study's variants over its own."""
@@ -59,7 +58,7 @@ def neighbour_errors_of(
     decisive = deciding(results, asked.study.solver.tolerance)
     follow = tuple(r if r.follows else r._replace(tolerance=np.nan) for r in decisive)
     parts = follow, tuple(r._replace(tolerance=np.nan) if r.follows else r for r in decisive)
-    margin, held_margin = _margins(measured, others, len(results), (TELLING[0] * span[0], TELLING[1] * span[1]), spare)
+    margin, held_margin = _margins(measured, others, len(results), (TELLING[0] * span[0], TELLING[1] * span[1]))
     error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
     if measured.free:  # what is told is what decides
         wanted = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
@@ -67,7 +66,7 @@ def neighbour_errors_of(
     else:
         held = _by_rung([np.where(_holds(part), held_margin * measured.held, 0.0) for part in parts])
         wanted = held
-    return NeighbourErrors(spare, error, held, wanted)
+    return NeighbourErrors(error, held, wanted)
 
 
 def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> Array:
@@ -75,12 +74,6 @@ def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> A
     dearer marches of their neighbours could hardly be told to hold."""
     most: Array = np.array([DOUBTED * r.tolerance * (least if r.follows else 1.0) for r in results])
     return np.where(most < measured.reference.T, 0.0, measured.reference.T)
-
-
-def all_but(spare: int, errors: Array, axis: int) -> Array:
-    """The largest of what neighbours tell along an axis, or so many places below; NaN counts as the largest."""
-    place = max(0, errors.shape[axis] - 1 - spare)
-    return np.asarray(np.take(np.partition(errors, place, axis=axis), place, axis=axis))
 
 
 def nearest_others(pilots: Array, count: int) -> Numbers:
@@ -101,18 +94,16 @@ def _holds(results: tuple[Result, ...]) -> bool:
     return bool(np.isfinite([result.tolerance for result in results]).any())
 
 
-def _margins(
-    measured: Measured, others: Numbers, results: int, telling: tuple[float, float], spare: int
-) -> tuple[Array, float]:
+def _margins(measured: Measured, others: Numbers, results: int, telling: tuple[float, float]) -> tuple[Array, float]:
     """(R,) what a pilot's neighbours tell of its errors must be multiplied with to be no less than these, for all but a
     few; and the same of what is held, for errors about the tolerance."""
     if not others.shape[1]:
         return np.ones(results), 1.0
     held, march = measured.held[measured.marched], measured.march[measured.marched]
-    most = all_but(spare, held[:, others], axis=2)
+    most = np.max(held[:, others], axis=2)
     near = np.nonzero(np.isfinite(most) & np.isfinite(held) & (most > telling[0]) & (most < telling[1]))
     own = measured.error[march[near]]
-    tell = all_but(spare, measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
+    tell = np.max(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
     return np.array([_quantile(own[:, r], tell[:, r]) for r in range(results)]), _quantile(held[near], most[near])
 
 

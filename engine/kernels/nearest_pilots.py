@@ -28,36 +28,34 @@ def nearest(points, pilots, found):
 
 
 @piece
-def told_of(held, rung, near, limit, spare):
-    """What the pilots ``near`` (k,) tell of a rung: the largest of their errors ``held`` (2, rungs, P), or with 1 to
-    ``spare`` the largest but one; the first of both count over the variant's ``limit``, the second as they are."""
-    worst, second = 0.0, 0.0
+def worst_of(held, rung, near, limit):
+    """The largest of the errors ``held`` (2, rungs, P) on a rung of the pilots ``near`` (k,): of the first over the
+    variant's ``limit``, of the second as they are."""
+    worst = 0.0
     for p in near:
-        error = max(held[0, rung, p] / limit, held[1, rung, p])
-        if error > worst:
-            worst, second = error, worst
-        elif error > second:
-            second = error
-    return second if spare > 0 and near.size > 1 else worst
+        follows, own = held[0, rung, p] / limit, held[1, rung, p]
+        worst = follows if not follows <= worst else worst
+        worst = own if not own <= worst else worst
+    return worst
 
 
 @kernel
-def cheapest(held, order, worth, neighbours, limit, spare, found):
-    """found (V,): the first rung in this order that holds for a variant by what its neighbours (V, k) tell, with its
+def cheapest(held, order, worth, neighbours, limit, found):
+    """found (V,): the first rung in this order on which all neighbours (V, k) of a variant hold, by `worst_of` with its
     ``limit`` (V,); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
     for v in range(neighbours.shape[0]):
         found[v] = -1
         least = np.inf
         for place in range(order.shape[0]):
-            told = told_of(held, order[place], neighbours[v], limit[v], spare)
-            if told <= 1.0:
+            worst = worst_of(held, order[place], neighbours[v], limit[v])
+            if worst <= 1.0:
                 found[v] = order[place]
                 break
             if place < worth:
-                least = told if told < least else least
+                least = worst if worst < least else least
         if found[v] < 0:
             for rung in order[:worth]:
-                if told_of(held, rung, neighbours[v], limit[v], spare) <= ALIKE * least:
+                if worst_of(held, rung, neighbours[v], limit[v]) <= ALIKE * least:
                     found[v] = rung
                     break
             found[v] = order[worth - 1] if found[v] < 0 else found[v]

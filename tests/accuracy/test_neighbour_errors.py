@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.ladder import Measured
-from engine.accuracy.neighbour_errors import all_but, nearest_others, neighbour_errors_of
+from engine.accuracy.neighbour_errors import nearest_others, neighbour_errors_of
 from engine.accuracy.results import results_of
 from engine.march.outcome import Asked
 from tests.accuracy.chosen import run_of
@@ -43,16 +43,6 @@ def others() -> NDArray[np.int32]:
     return nearest_others(np.linspace(0.0, 1.0, COUNT)[None], NEAR)
 
 
-@pytest.mark.parametrize("spare", [0, 1])
-def test_so_many_of_the_largest_are_left_out_and_what_is_unknown_is_large(spare: int) -> None:
-    errors = np.random.default_rng(3).random((5, 7))
-    np.testing.assert_array_equal(all_but(spare, errors, axis=1), np.sort(errors, axis=1)[:, -1 - spare])
-    errors[:, 2] = np.nan
-    known = np.sort(np.delete(errors, 2, axis=1), axis=1)
-    np.testing.assert_array_equal(all_but(spare, errors, axis=1), np.full(5, np.nan) if not spare else known[:, -1])
-    assert all_but(1, errors[:, :1], axis=1).shape == (5,)
-
-
 def test_neighbours_of_a_pilot_are_others() -> None:
     found = others()
     assert found.shape == (COUNT, NEAR)
@@ -60,25 +50,12 @@ def test_neighbours_of_a_pilot_are_others() -> None:
     assert set(found[20, :2].tolist()) == {19, 21}
 
 
-def test_one_pilot_at_a_resonance_is_not_believed_by_all_around() -> None:
-    error = np.full(COUNT, 0.1 * TOLERANCE)
-    error[20] = 50.0 * TOLERANCE
-    pilots, rung = np.array([21]), np.zeros(1, dtype=np.int32)
-    told = [
-        neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0), spare).worst(
-            rung, others()[pilots], np.ones(1)
-        )
-        for spare in (0, 1)
-    ]
-    assert told[0] >= 50.0 and told[1] < 0.2
-
-
 def test_margins_are_what_pilots_that_are_left_out_need() -> None:
     """Errors that are twice those of all neighbours, now and then, double what is told."""
     error = np.full(COUNT, 0.1 * TOLERANCE)
     error[[4, 14, 24, 34]] *= 2.0
-    plain = neighbour_errors_of(asked(), measured(np.full(COUNT, 0.1 * TOLERANCE)), others(), (1.0, 1.0), 1)
-    found = neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0), 1)
+    plain = neighbour_errors_of(asked(), measured(np.full(COUNT, 0.1 * TOLERANCE)), others(), (1.0, 1.0))
+    found = neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0))
     np.testing.assert_allclose(plain.held[0], 0.1, rtol=1e-12)
     np.testing.assert_allclose(found.held[0, 0, 20], 0.2, rtol=1e-12)
 
@@ -86,13 +63,13 @@ def test_margins_are_what_pilots_that_are_left_out_need() -> None:
 @pytest.mark.parametrize(("reference", "decides"), [(0.2, 0.3), (0.39, 0.49), (3.0, 0.1)])
 def test_references_that_do_not_settle_are_told_but_do_not_decide(reference: float, decides: float) -> None:
     given = measured(np.full(COUNT, 0.1 * TOLERANCE), reference * TOLERANCE)
-    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0), 0)
+    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0))
     np.testing.assert_allclose(found.wanted[0], decides, rtol=1e-12)
     np.testing.assert_allclose(found.held[0], 0.1 + reference, rtol=1e-12)
 
 
 def test_what_the_study_fixes_makes_nothing_dearer() -> None:
     given = replace(measured(np.full(COUNT, 0.1 * TOLERANCE), 0.2 * TOLERANCE), free=False)
-    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0), 0)
+    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0))
     np.testing.assert_allclose(found.held[0], 0.1, rtol=1e-12)
     np.testing.assert_array_equal(found.wanted, found.held)
