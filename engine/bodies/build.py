@@ -22,7 +22,6 @@ from engine.bodies.reduced.body import load_body
 from engine.bodies.reduced.reduced import Reduced
 from engine.bodies.rigid.body import rigid_body
 from engine.bodies.rigid.rigid import Rigid
-from results_schema.errors import BadInput
 
 MOST_KEPT = 64  # bodies that are not built again
 _BUILT: OrderedDict[str, Built] = OrderedDict()
@@ -43,19 +42,10 @@ def build_body(body: Body) -> Built:
     BadInput, with the key within the body as its place."""
     key = f"{type(body).__name__} {body.content} {body.model_dump_json()}"
     with _BUILDING:
-        built = _BUILT.pop(key, None) or _built(body)
+        built = _BUILT.pop(key, None) or BUILDERS[type(body)](body)
         _BUILT[key] = built
         if len(_BUILT) > MOST_KEPT:
             _BUILT.popitem(last=False)
-    return built
-
-
-def _built(body: Body) -> Built:
-    built = BUILDERS[type(body)](body)
-    modes = built.modal.omega.size
-    if isinstance(body.damping_ratio, tuple) and len(body.damping_ratio) < modes:
-        what = "fewer damping ratios than modes: modes of equal frequency are kept together"
-        raise BadInput(what, where="damping_ratio", expected=f"{modes} ratios", received=str(len(body.damping_ratio)))
     return built
 
 

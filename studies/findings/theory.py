@@ -57,7 +57,7 @@ def damping_ratio(results: Results) -> Any:
         mass, stiffness = (results.parameter(f"{key}.rayleigh.{i}") for i in (0, 1))
         return 0.5 * (mass / omega + stiffness * omega)
     if isinstance(spec, tuple) and not _is_swept(results, key):
-        return results.parameter(f"{key}.{_rigid_modes(results)}")
+        return results.parameter(f"{key}.{min(_rigid_modes(results), len(spec) - 1)}")
     return results.parameter(key)
 
 

@@ -16,7 +16,6 @@ from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
 from engine.scene.axes import sobol_points
 from engine.scene.study import Study
-from results_schema.errors import BadInput
 from studies.precision import jax_march, precision
 from studies.protocol.measuring import Work
 
@@ -142,10 +141,7 @@ def automatic(study: Study, overrides: Mapping[str, Any], asked: Ladder, toleran
 def leaves_modes_open(study: Study) -> bool:
     """Whether the program may choose the number of modes of the body."""
     name = f"body.{next(iter(study.carriage.values())).on}"
-    try:
-        return study.with_values({f"{name}.modes": "auto"}).body[name.partition(".")[2]].modes_are_open
-    except BadInput:
-        return False
+    return study.with_values({f"{name}.modes": "auto"}).body[name.partition(".")[2]].modes_are_open
 
 
 def around(study: Study, tolerance: float) -> Study:

@@ -11,6 +11,7 @@ import pytest
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
+from engine.bodies.modal.description import MAX_MODES
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from results_schema.status import Status
@@ -66,6 +67,18 @@ def test_levels_converge_to_moving_forces_of_many_modes() -> None:
         assert is_free(grid) and found.settled[0]
         off = abs(found.outcome.numbers["midspan_max"][0] - largest)
         assert off <= told(grid, found, "midspan_max")[0] + 1e-6
+
+
+def test_listed_ratios_leave_the_modes_open() -> None:
+    """The last of a list goes on, whatever number of modes is taken: as if every ratio were written out."""
+    one, short, whole = (
+        only_grid(passages(2, 2, bed=OPEN | {"damping_ratio": ratios}))
+        for ratios in (0.02, [0.02, 0.2], [0.02, *[0.2] * (MAX_MODES - 1)])
+    )
+    assert is_free(short)
+    found = [levels(grid).outcome.numbers["midspan_max"] for grid in (one, short, whole)]
+    np.testing.assert_array_equal(found[1], found[2])
+    assert (found[0] != found[1]).all()
 
 
 SCENES: dict[str, Study] = {

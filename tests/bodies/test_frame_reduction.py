@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.bodies.build import build_body
 from engine.bodies.frame.assembly import Assembly, assemble, rigid_motions
 from engine.bodies.frame.body import interface_freedoms
 from engine.bodies.frame.frame import Frame
@@ -159,8 +158,6 @@ def test_groups_of_equal_frequencies_are_whole() -> None:
     assert np.array_equal(body(tube | {"leave_out": [2]}).omega, frame.omega[2:])
     with pytest.raises(BadInput, match="no mode is left"):
         body(tube | {"leave_out": [1, 3]})
-    with pytest.raises(BadInput, match="damping_ratio"):
-        build_body(Frame.model_validate(tube | {"damping_ratio": [0.1, 0.1, 0.1]}))
 
 
 @pytest.mark.parametrize("matrix", ["consistent", "lumped"])

@@ -115,11 +115,11 @@ def bed_of(study: Study, name: str) -> Bed:
 
 
 def damping_of(spec: Any, omega: Array) -> Array:
-    """Ratios of all modes."""
+    """Ratios of all modes; the last of a list goes on."""
     if hasattr(spec, "rayleigh"):
         a, b = spec.rayleigh
         return a / (2.0 * omega) + 0.5 * b * omega
-    return np.broadcast_to(np.array(spec, dtype=np.float64), omega.shape)
+    return np.pad(np.atleast_1d(np.array(spec, dtype=np.float64)), (0, omega.size), mode="edge")[: omega.size]
 
 
 def cruise_on(start: float, end: float, speed: float, begin: float, length: float) -> tuple[Phase, ...]:

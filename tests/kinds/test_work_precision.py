@@ -30,6 +30,7 @@ from studies.precision import precision as measured
 from studies.precision.variables import AUTOMATIC
 from studies.protocol.measuring import Work
 from studies.reporting import answers
+from tests.bodies.frames import PINNED, straight
 from tests.naive import ode
 from tests.naive.newmark import Newmark
 from tests.naive.newmark import march as naive_march
@@ -194,7 +195,7 @@ def test_the_automatic_choice_is_that_of_a_sweep_around_the_scene() -> None:
 
 
 def test_there_is_no_automatic_choice_where_the_modes_are_given() -> None:
-    study = engine.load(precision.TEXT).with_values({"body.bed.damping_ratio": [0.03, 0.02]})
+    study = engine.load(precision.TEXT).with_values({"body.bed": straight(PINNED, interface=["a"])})
     assert not ladders.leaves_modes_open(study) and ladders.leaves_modes_open(engine.load(precision.TEXT))
     names = [piece.name for piece in studies.kind_named("work-precision").pieces(study)]
     assert names and not any(name.startswith("automatic") for name in names)

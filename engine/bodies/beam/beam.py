@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict, Tag, model_validator
+from pydantic import AfterValidator, Field, Strict, Tag
 
 from engine.bodies.modal.description import MAX_MODES, Body, Rayleigh
 from engine.study_file.checks import Check, on_body
@@ -19,7 +19,6 @@ from engine.study_file.units import (
     RotationalStiffness,
     SecondMoment,
     Stiffness,
-    fault,
 )
 
 __all__ = ["MAX_MODES", "Beam", "Body", "Rayleigh", "Spring"]
@@ -104,16 +103,10 @@ class Beam(Body):
 
     @property
     def modes_are_open(self) -> bool:
-        return self.modes == "auto" and not isinstance(self.damping_ratio, tuple)
+        return self.modes == "auto"
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
-
-    @model_validator(mode="after")
-    def _list_of_ratios(self) -> Beam:
-        if isinstance(self.damping_ratio, tuple) and self.modes == "auto":
-            raise fault("a list of damping ratios needs modes as a number", expected=f"modes = 1 to {MAX_MODES}")
-        return self
 
     def checks(self, here: str) -> list[Check]:
         checks = []
@@ -124,8 +117,4 @@ class Beam(Body):
             checks.append(
                 Check(spring, parts, lambda k, r, c: k + r + c > 0, "a support that holds nothing", "one of them > 0")
             )
-        if isinstance(self.damping_ratio, tuple):
-            count = len(self.damping_ratio)
-            what = f"more modes than the {count} damping ratios"
-            checks.append(Check(f"{here}.modes", (f"{here}.modes",), lambda n: n <= count, what, f"at most {count}"))
         return checks

@@ -267,8 +267,7 @@ class Frame(Body):
 
     @property
     def modes_are_open(self) -> bool:
-        reduced = bool(self.interface or self.leave_out)
-        return self.modes == "auto" and not reduced and not isinstance(self.damping_ratio, tuple)
+        return self.modes == "auto" and not (self.interface or self.leave_out)
 
     def with_more_modes(self, times: int) -> Frame:
         """The same body with so many times its modes; of a reduced one, those within its fixed interface."""

@@ -238,12 +238,6 @@ def track_line(frame: Frame) -> TrackLine:
 
 
 def _check_modes(frame: Frame) -> None:
-    if isinstance(frame.damping_ratio, tuple):
-        count = len(frame.damping_ratio)
-        if frame.modes == "auto":
-            refuse(("modes",), "a list of damping ratios needs modes as a number", expected=f"at most {count}")
-        if frame.modes > count:
-            refuse(("modes",), f"more modes than the {count} damping ratios", expected=f"at most {count}")
     if isinstance(frame.modes, int):
         for index, number in enumerate(frame.leave_out):
             if number > frame.modes:

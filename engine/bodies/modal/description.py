@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, PrivateAttr, Strict, Tag
 
@@ -41,9 +41,9 @@ class Recorded(Beside):
 class Body(Spec):
     """Base of all bodies: a track of some length along which loads ride.
 
-    damping_ratio: of every mode, or one per mode, or Rayleigh's two numbers. modes: how many are kept. own_weight:
-    gravity acts on the body too, and deflections count from the unstressed state. names_files: whether it is made of
-    files.
+    damping_ratio: of every mode, or one per mode, of which the last goes on, or Rayleigh's two numbers. modes: how many
+    are kept. own_weight: gravity acts on the body too, and deflections count from the unstressed state. names_files:
+    whether it is made of files.
     """
 
     names_files: ClassVar[bool] = False
@@ -88,12 +88,8 @@ class Body(Spec):
         return False
 
     def with_modes(self, count: int) -> Self:
-        """The same body with so many modes; those beyond a list of damping ratios have its last one."""
-        changes: dict[str, Any] = {"modes": min(count, MAX_MODES)}
-        if isinstance(self.damping_ratio, tuple):
-            missing = max(0, changes["modes"] - len(self.damping_ratio))
-            changes["damping_ratio"] = self.damping_ratio + self.damping_ratio[-1:] * missing
-        return self.model_copy(update=changes)
+        """The same body with so many modes."""
+        return self.model_copy(update={"modes": min(count, MAX_MODES)})
 
     def with_more_modes(self, times: int) -> Self:
         """The same body with so many times its modes, as far as it has them."""
