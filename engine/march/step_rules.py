@@ -190,7 +190,7 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
     if spring.held is not None:
         own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
         return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
-    contact = mobility / (1.0 + values.wheel_mass(model.carriages[spring.carriage].name) * mobility)
+    contact = mobility / (1.0 + values.touching_mass(model.carriages[spring.carriage].name) * mobility)
     return np.asarray(stiffness * (1.0 / values.sprung_mass(spring) + contact))
 
 

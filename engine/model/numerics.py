@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from engine.bodies.modal.description import Body
 from engine.kernels.schemes import Scheme
-from engine.scene.carriages import BodyCarriage
 from engine.scene.study import Study
 
 
@@ -44,5 +43,5 @@ class Numerics(NamedTuple):
 def open_bodies(study: Study) -> tuple[str, ...]:
     """Bodies whose number of modes is left open: those that carry loads, ride on nothing, and name none."""
     ridden = {carriage.on for carriage in study.carriage.values()}
-    riding = {carriage.body for carriage in study.carriage.values() if isinstance(carriage, BodyCarriage)}
+    riding = {carriage.riding_body for carriage in study.carriage.values()}
     return tuple(name for name, body in study.body.items() if name in ridden - riding and body.modes_are_open)

@@ -20,7 +20,7 @@ from engine.model.numerics import Numerics
 from engine.model.support_reactions import Place, SupportReactions, stand
 from engine.model.ties import Attachment, CarriageTie, DamperTie, Inertia, SpringTie
 from engine.model.timeline import Rider
-from engine.scene.carriages import BodyCarriage, OscillatorCarriage
+from engine.scene.carriages import Suspension
 from engine.scene.settings import SPRUNG
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -137,9 +137,8 @@ class SceneModel:
         tie = self.carriages[carriage]
         if tie.rides is None:
             return {}
-        spec = self.study.carriage[tie.name]
-        assert isinstance(spec, BodyCarriage)
-        return {rider: name for (rider, _), name in zip(tie.loads, spec.contacts, strict=True)}
+        contacts = self.study.carriage[tie.name].riding_contacts
+        return {rider: name for (rider, _), name in zip(tie.loads, contacts, strict=True)}
 
     def reacts(self, carriage: int) -> bool:
         """Whether the contact force of a carriage depends on how its body moves."""
@@ -225,35 +224,35 @@ def check_moves(study: Study) -> None:
 
 def _in_use(study: Study, body: str) -> bool:
     """Whether a body carries a carriage, a sensor or an envelope."""
-    rides = (carriage.body for carriage in study.carriage.values() if isinstance(carriage, BodyCarriage))
-    ridden = (carriage.on for carriage in study.carriage.values())
+    moving = (name for carriage in study.carriage.values() for name in carriage.bodies)
     read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
-    return body in (*rides, *ridden, *read)
+    return body in (*moving, *read)
 
 
 def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]) -> Inertia:
     """The terms that act at a carriage's contact; fidelity "auto" is the carriage's own kind in full."""
     fidelity, carriage = numerics.fidelity, study.carriage[name]
-    if fidelity in ("force", "static") or not carriage.inertial or isinstance(carriage, BodyCarriage):
+    locked = _suspension(study, numerics, name) is None
+    touching = carriage.masses if locked else carriage.touching
+    heavy = carriage.sum_of(touching) > 0.0 or any(f"carriage.{name}.{key}" in swept for key in touching)
+    if fidelity in ("force", "static") or not heavy:
         return "force"
-    if _sprung(study, numerics, name):
-        wheel = f"carriage.{name}.wheel_mass"
-        return "mass" if study.value(wheel) > 0.0 or wheel in swept else "force"
     return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
 
 
-def _sprung(study: Study, numerics: Numerics, name: str) -> bool:
-    """Whether a carriage's spring acts; below the full fidelity it is locked."""
-    return isinstance(study.carriage[name], OscillatorCarriage) and numerics.fidelity in SPRUNG
+def _suspension(study: Study, numerics: Numerics, name: str) -> Suspension | None:
+    """The spring of a carriage that acts; below the full fidelity it is locked."""
+    return study.carriage[name].suspension if numerics.fidelity in SPRUNG else None
 
 
 def _springs(study: Study, numerics: Numerics, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
     """The springs of all sprung masses, whose modes are counted from ``first``."""
     found: list[SpringTie] = []
     for number, name in enumerate(study.carriage):
-        if _sprung(study, numerics, name):
+        suspension = _suspension(study, numerics, name)
+        if suspension is not None:
             key = f"carriage.{name}"
-            damped = study.value(f"{key}.damping") > 0.0 or f"{key}.damping" in swept
+            damped = suspension.damping > 0.0 or f"{key}.damping" in swept
             found.append(SpringTie(number, number, key, None, first + len(found), damped))
     return tuple(found)
 
@@ -266,11 +265,11 @@ def _standing(
     names, first = [part.name for part in parts], len(carriages)
     for number, tie in enumerate(carriages):
         carriage = study.carriage[tie.name]
-        if isinstance(carriage, BodyCarriage):
-            rides = names.index(carriage.body)
+        if carriage.riding_body is not None:
+            rides = names.index(carriage.riding_body)
             place = Place(number, tie, parts[tie.body].modal, rides, first)
             found[number] = stand(study, numerics, place, parts[rides].modal, swept)
-            first += len(carriage.contacts)
+            first += len(carriage.riding_contacts)
     return found
 
 

@@ -13,7 +13,7 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.model.numerics import Numerics
 from engine.model.ties import Attachment, CarriageTie, SpringTie
 from engine.model.timeline import AT_END, Rider
-from engine.scene.carriages import BodyCarriage, Contact
+from engine.scene.carriages import Carriage
 from engine.scene.settings import SPRUNG
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -59,33 +59,21 @@ def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swep
     """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
     name = place.tie.name
     carriage = study.carriage[name]
-    assert isinstance(carriage, BodyCarriage)
     _check_fidelity(study, name)
     _check_points(study, name, carriage, modal)
-    reference = 0.5 * modal.length if carriage.reference is None else carriage.reference
-    riders = tuple(replace(place.tie.rider, offset=_offset(c, reference)) for c in carriage.contacts.values())
+    riders = tuple(replace(place.tie.rider, offset=offset) for offset in carriage.contact_offsets(modal.length))
     _check_ways(study, name, carriage, riders)
     _check_joints(study, name, _joints(carriage, riders, place.below, modal))
     shares = _shares(study, numerics, name, modal)
     springs = []
-    for number, (word, contact) in enumerate(carriage.contacts.items()):
+    for number, (word, contact) in enumerate(carriage.riding_contacts.items()):
         key = f"carriage.{name}.contacts.{word}"
-        held = Attachment(-1.0, place.rides, None, _held_at(contact))
+        held = Attachment(-1.0, place.rides, None, contact.place)
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
-        rigid = contact.stiffness == "rigid"
-        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, rigid))
+        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, contact.is_rigid))
     acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
+    reference = carriage.reference_on(modal.length)
     return SupportReactions(place.rides, modal.mass, reference, place.first, riders, acting, shares)
-
-
-def _held_at(contact: Contact) -> float | str:
-    """Where it holds the body that rides: m along its track, or a point's name."""
-    return contact.at if contact.at is not None else f"point.{contact.point}"
-
-
-def _offset(contact: Contact, reference: float) -> float:
-    """m ahead of the carriage's reference."""
-    return contact.at - reference if contact.at is not None else float(contact.offset or 0.0)
 
 
 def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tuple[float, ...]:
@@ -94,9 +82,8 @@ def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tu
     N/k + C N = rigid-body motion at the contacts, and N balances the weight; C is the body's flexibility between its
     contacts. Its own weight bends it only through the contacts: a uniform acceleration moves rigid-body modes alone.
     """
-    carriage = study.carriage[name]
-    assert isinstance(carriage, BodyCarriage)
-    attachments = [Attachment(1.0, 0, None, _held_at(contact)) for contact in carriage.contacts.values()]
+    contacts = study.carriage[name].riding_contacts.values()
+    attachments = [Attachment(1.0, 0, None, contact.place) for contact in contacts]
     places = [
         attachment.at if isinstance(attachment.at, str) else np.array([attachment.at]) for attachment in attachments
     ]
@@ -113,8 +100,7 @@ def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tu
     soft = (shapes * modal.modal_flexibility) @ shapes.T
     if numerics.static_correction:
         soft = _flexibility(modal, places)
-    own = [0.0 if c.stiffness == "rigid" else 1.0 / float(c.stiffness) for c in carriage.contacts.values()]
-    soft = soft + np.diag(own)
+    soft = soft + np.diag([1.0 / contact.spring for contact in contacts])
     unit = max(float(np.trace(soft)), 1e-30)
     free = shapes[:, rigid] / np.abs(shapes[:, rigid]).max()
     count = len(places)
@@ -151,12 +137,10 @@ def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares:
 
 def _places_in_words(study: Study, name: str) -> str:
     """Where the contacts of a carriage stand on the body that rides."""
-    carriage = study.carriage[name]
-    assert isinstance(carriage, BodyCarriage)
-    places = [
-        f"{word} at {c.at:g} m" if c.at is not None else f"{word} at {c.point}" for word, c in carriage.contacts.items()
-    ]
-    return ", ".join(places)
+    contacts = study.carriage[name].riding_contacts
+    return ", ".join(
+        f"{word} at {c.at:g} m" if c.at is not None else f"{word} at {c.point}" for word, c in contacts.items()
+    )
 
 
 def _check_fidelity(study: Study, name: str) -> None:
@@ -168,24 +152,24 @@ def _check_fidelity(study: Study, name: str) -> None:
         )
 
 
-def _check_points(study: Study, name: str, carriage: BodyCarriage, modal: ModalBody) -> None:
+def _check_points(study: Study, name: str, carriage: Carriage, modal: ModalBody) -> None:
     known = (
         [] if modal.points is None else [p.partition(".")[2] for p in modal.points.numbers if p.startswith("point.")]
     )
-    for word, contact in carriage.contacts.items():
+    for word, contact in carriage.riding_contacts.items():
         if contact.point is not None and contact.point not in known:
             raise BadInput(
-                f"body {carriage.body} has no such point",
+                f"body {carriage.riding_body} has no such point",
                 where=study.source.where(f"carriage.{name}.contacts.{word}.point"),
                 expected=f"one of {', '.join(known)}" if known else "at = metres along its track: it has no points",
                 received=contact.point,
             )
 
 
-def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[Rider, ...]) -> None:
+def _check_ways(study: Study, name: str, carriage: Carriage, riders: tuple[Rider, ...]) -> None:
     """Contacts stay on what they ride unless the carriage only passes; rigid ones never meet a shock."""
     low, high = carriage.motion.range()
-    for rider, (word, contact) in zip(riders, carriage.contacts.items(), strict=True):
+    for rider, (word, contact) in zip(riders, carriage.riding_contacts.items(), strict=True):
         where = study.source.where(f"carriage.{name}.contacts.{word}")
         slack = AT_END * rider.length
         stays = low + rider.offset >= -slack and high + rider.offset <= rider.length + slack
@@ -199,7 +183,7 @@ def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[R
         alone = len(study.carriage) == 1  # then the scene ends where its motion does
         jumps = [t for t in rider.speed_jumps[0] if 0.0 < t < rider.end or not (alone or t == 0.0)]
         shocks = bool(jumps) or rider.delay > 0.0 or getattr(rider.motion, "after", 0.0) > 0.0
-        if contact.stiffness == "rigid" and (not stays or shocks):
+        if contact.is_rigid and (not stays or shocks):
             raise BadInput(
                 "a rigid contact would meet a shock",
                 where=f"{where}.stiffness",
@@ -208,13 +192,13 @@ def _check_ways(study: Study, name: str, carriage: BodyCarriage, riders: tuple[R
             )
 
 
-def _joints(carriage: BodyCarriage, riders: tuple[Rider, ...], below: ModalBody, above: ModalBody) -> Array:
+def _joints(carriage: Carriage, riders: tuple[Rider, ...], below: ModalBody, above: ModalBody) -> Array:
     """(J, N) rows of the rigid contacts over the modes of both bodies, in the middle of the way."""
-    joints = [(r, c) for r, c in zip(riders, carriage.contacts.values(), strict=True) if c.stiffness == "rigid"]
+    joints = [(r, c) for r, c in zip(riders, carriage.riding_contacts.values(), strict=True) if c.is_rigid]
     middle, rows = 0.5 * sum(carriage.motion.range()), []
     for rider, contact in joints:
         under = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0]
-        held = Attachment(1.0, 0, None, _held_at(contact)).fixed_row(above)
+        held = Attachment(1.0, 0, None, contact.place).fixed_row(above)
         rows.append(np.concatenate([under * np.sqrt(below.mass), held * np.sqrt(above.mass)]))
     return np.array(rows)
 

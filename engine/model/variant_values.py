@@ -67,12 +67,12 @@ class VariantValues:
         return self._of(f"carriage.{carriage}.motion.speed")
 
     def force(self, carriage: str) -> Array:
-        """(V,) N of a carriage without inertia."""
-        return self._of(f"carriage.{carriage}.force")
+        """(V,) N of a carriage besides its weight."""
+        return self._sum(carriage, self.study.carriage[carriage].forces)
 
-    def wheel_mass(self, carriage: str) -> Array:
-        """(V,) kg of a sprung carriage that touch the body."""
-        return self._of(f"carriage.{carriage}.wheel_mass")
+    def touching_mass(self, carriage: str) -> Array:
+        """(V,) kg of a carriage that touch the body."""
+        return self._sum(carriage, self.study.carriage[carriage].touching)
 
     def sprung_mass(self, spring: SpringTie) -> Array:
         """(V,) kg that stand on a spring."""
@@ -122,7 +122,9 @@ class VariantValues:
 
     def own_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage by its own keys."""
-        keys = self.study.carriage[carriage].masses
+        return self._sum(carriage, self.study.carriage[carriage].masses)
+
+    def _sum(self, carriage: str, keys: tuple[str, ...]) -> Array:
         return sum((self._of(f"carriage.{carriage}.{key}") for key in keys), np.zeros(self.size))
 
     def damping_rates(self, body: str, omega: Array) -> Array:
@@ -146,9 +148,8 @@ def moving_mass(model: SceneModel, values: VariantValues, carriage: int) -> Arra
 def weight(model: SceneModel, values: VariantValues, carriage: int) -> Array:
     """(V,) N of a carriage along the deflections of the track that it rides."""
     tie = model.carriages[carriage]
-    if not model.study.carriage[tie.name].inertial:
-        return values.force(tie.name)
-    return moving_mass(model, values, carriage) * values.gravity * model.bodies[tie.body].modal.gravity_share
+    share = model.bodies[tie.body].modal.gravity_share
+    return values.force(tie.name) + moving_mass(model, values, carriage) * values.gravity * share
 
 
 def weights(model: SceneModel, values: VariantValues) -> Array:
@@ -248,4 +249,4 @@ def _contact_mass(model: SceneModel, values: VariantValues, number: int) -> Arra
         return np.zeros(values.size)
     if not model.springs_of(number):
         return moving_mass(model, values, number)
-    return values.wheel_mass(carriage.name)
+    return values.touching_mass(carriage.name)

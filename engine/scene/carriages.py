@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -15,15 +16,25 @@ from engine.study_file.units import Damping, Force, Length, Mass, Stiffness, Tim
 MAX_CONTACTS = 12
 
 
+class Suspension(NamedTuple):
+    """A mass (kg) on a spring (N/m) and a damper (N s/m) over the point that a carriage touches."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+
 class Carriage(Spec):
     """Base of all carriages.
 
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
     headway: instead of a delay, the metres of its own way by which it trails a carriage that sets off at time 0.
-    masses: keys that hold parts of its mass in kg.
+    masses: keys that hold parts of its mass in kg; touching: of these, what touches the track; forces: keys in N.
     """
 
     masses: ClassVar[tuple[str, ...]] = ()
+    touching: ClassVar[tuple[str, ...]] = ()
+    forces: ClassVar[tuple[str, ...]] = ()
 
     on: str
     motion: AnyMotion
@@ -32,17 +43,58 @@ class Carriage(Spec):
 
     @property
     def moving_mass(self) -> float:
-        """kg of the whole carriage."""
-        return float(sum(getattr(self, key) for key in self.masses))
+        """kg of the whole carriage by its own keys."""
+        return self.sum_of(self.masses)
+
+    def sum_of(self, keys: tuple[str, ...]) -> float:
+        """Sum of some of its own numbers."""
+        return float(sum(getattr(self, key) for key in keys))
 
     def weight(self, gravity: float) -> float:
         """Force along gravity on a body at rest, N, by the masses or the force of its own keys; gravity in m/s2."""
-        return self.moving_mass * gravity
+        return self.sum_of(self.forces) + self.moving_mass * gravity
 
     @property
     def inertial(self) -> bool:
         """Whether the contact force depends on the body's acceleration."""
         return self.moving_mass > 0.0
+
+    @property
+    def suspension(self) -> Suspension | None:
+        """Its sprung mass."""
+        return None
+
+    @property
+    def riding_body(self) -> str | None:
+        """Name of the body that rides."""
+        return None
+
+    @property
+    def riding_contacts(self) -> Mapping[str, Contact]:
+        """The contacts of that body by name."""
+        return {}
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all bodies that it stands on or brings."""
+        return (self.on,)
+
+    def reference_on(self, track: float) -> float:
+        """m, the place of the riding body's own track, of a length (m), that the motion moves."""
+        return 0.0
+
+    def contact_offsets(self, track: float) -> tuple[float, ...]:
+        """m by which its contacts, or itself where it has none, are ahead of its position; track: as above."""
+        reference = self.reference_on(track)
+        return tuple(contact.ahead(reference) for contact in self.riding_contacts.values()) or (0.0,)
+
+    def checks(self, here: str) -> Iterator[Check]:
+        """Conditions between its numbers and those of bodies; ``here`` is its dotted key."""
+        yield from self.motion.checks(f"{here}.motion", f"body.{self.on}.length")
+
+    def instead_of_own_motion(self, name: str) -> str:
+        """What to read where it has no sprung mass."""
+        return f'under = "{name}" reads the body where the carriage touches it'
 
     @property
     def start_time(self) -> float:
@@ -65,17 +117,17 @@ class Carriage(Spec):
 class ForceCarriage(Carriage):
     """A constant force in N along gravity; negative lifts."""
 
+    forces: ClassVar[tuple[str, ...]] = ("force",)
+
     kind: Literal["force"]
     force: Force
-
-    def weight(self, gravity: float) -> float:
-        return self.force
 
 
 class MassCarriage(Carriage):
     """A rigid mass in kg that stays in contact; its weight acts."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass",)
+    touching: ClassVar[tuple[str, ...]] = ("mass",)
 
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
@@ -86,12 +138,17 @@ class OscillatorCarriage(Carriage):
     both masses act."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
+    touching: ClassVar[tuple[str, ...]] = ("wheel_mass",)
 
     kind: Literal["oscillator"]
     mass: Mass = Field(gt=0)
     wheel_mass: Mass = Field(default=0.0, ge=0)
     stiffness: Stiffness = Field(gt=0)
     damping: Damping = Field(default=0.0, ge=0)
+
+    @property
+    def suspension(self) -> Suspension:
+        return Suspension(self.mass, self.stiffness, self.damping)
 
 
 by_rigid_or_amount = Discriminator(lambda value: WORD if value == "rigid" else form_of_amount(value))
@@ -124,6 +181,25 @@ class Contact(Spec):
             raise fault("a rigid contact has no damper", expected="damping = 0, or a stiffness in N/m")
         return self
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it has no spring."""
+        return self.stiffness == "rigid"
+
+    @property
+    def spring(self) -> float:
+        """N/m of its spring, infinite where it is rigid."""
+        return math.inf if self.stiffness == "rigid" else self.stiffness
+
+    @property
+    def place(self) -> float | str:
+        """Where it holds the body that rides: m along its track, or a point's name."""
+        return f"point.{self.point}" if self.at is None else self.at
+
+    def ahead(self, reference: float) -> float:
+        """m by which it is ahead of the carriage's position, which moves the place ``reference`` of the own track."""
+        return float(self.offset or 0.0) if self.at is None else self.at - reference
+
 
 class BodyCarriage(Carriage):
     """Another body of the study, which nothing else holds, on shoes or wheels; its weight acts.
@@ -137,15 +213,34 @@ class BodyCarriage(Carriage):
     reference: Length | None = None
     contacts: dict[str, Contact] = Field(min_length=1, max_length=MAX_CONTACTS)
 
-    def places(self, here: str, length: str) -> Iterator[Check]:
-        """Conditions on places along its own track, whose length stands at the dotted key `length`."""
-        keys = [f"contacts.{name}.at" for name, contact in self.contacts.items() if contact.at is not None]
-        for key in keys if self.reference is None else ["reference", *keys]:
-            yield on_body(f"{here}.{key}", (f"{here}.{key}", length), "a place off the track of the body that rides")
-
     @property
     def inertial(self) -> bool:
         return True
+
+    @property
+    def riding_body(self) -> str:
+        return self.body
+
+    @property
+    def riding_contacts(self) -> Mapping[str, Contact]:
+        return self.contacts
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.on, self.body)
+
+    def reference_on(self, track: float) -> float:
+        return 0.5 * track if self.reference is None else self.reference
+
+    def checks(self, here: str) -> Iterator[Check]:
+        yield from super().checks(here)
+        keys = [f"contacts.{name}.at" for name, contact in self.contacts.items() if contact.at is not None]
+        for key in keys if self.reference is None else ["reference", *keys]:
+            needs = (f"{here}.{key}", f"body.{self.body}.length")
+            yield on_body(f"{here}.{key}", needs, "a place off the track of the body that rides")
+
+    def instead_of_own_motion(self, name: str) -> str:
+        return f'body = "{self.body}" and at = metres along its track read the body that rides'
 
 
 CARRIAGES: Mapping[str, type[Spec]] = {

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded
-from engine.scene.carriages import AnyCarriage, BodyCarriage
+from engine.scene.carriages import AnyCarriage
 from engine.scene.motions import Cruise
 from engine.scene.sensors import OF_A_BODY, Envelope, Sensor
 from engine.scene.settings import Output, Solver, Sweep
@@ -210,9 +210,7 @@ def checks(study: Study) -> Iterator[Check]:
     for name, body in study.body.items():
         yield from body.checks(f"body.{name}")
     for name, carriage in study.carriage.items():
-        yield from carriage.motion.checks(f"carriage.{name}.motion", f"body.{carriage.on}.length")
-        if isinstance(carriage, BodyCarriage):
-            yield from carriage.places(f"carriage.{name}", f"body.{carriage.body}.length")
+        yield from carriage.checks(f"carriage.{name}")
     for name, sensor in study.sensor.items():
         if sensor.at is not None:
             here = f"sensor.{name}.at"
@@ -288,8 +286,8 @@ def _check_references(study: Study) -> None:
     """Every name that is mentioned exists, and sensors suit their bodies."""
     for name, carriage in study.carriage.items():
         _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
-        if isinstance(carriage, BodyCarriage):
-            _check_rider(study, name, carriage)
+        if carriage.riding_body is not None:
+            _check_rider(study, name, carriage.riding_body)
     for name, sensor in study.sensor.items():
         here = f"sensor.{name}"
         if sensor.rides is not None:
@@ -325,31 +323,28 @@ def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
     """A carriage has what a sensor of its own reads."""
     carriage = study.carriage[str(sensor.carriage)]
     if sensor.quantity == "contact_force":
-        contacts = carriage.contacts if isinstance(carriage, BodyCarriage) else {}
+        contacts = carriage.riding_contacts
         if sensor.contact is not None and sensor.contact not in contacts:
             where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"
             missing = "none: leave this key out" if not contacts else expected
             raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
-    elif not hasattr(carriage, "stiffness"):
-        remedy = f'under = "{sensor.carriage}" reads the body where the carriage touches it'
-        if isinstance(carriage, BodyCarriage):
-            remedy = f'body = "{carriage.body}" and at = metres along its track read the body that rides'
-        where = study.source.where(f"{here}.carriage")
+    elif carriage.suspension is None:
+        where, remedy = study.source.where(f"{here}.carriage"), carriage.instead_of_own_motion(str(sensor.carriage))
         raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
 
 
-def _check_rider(study: Study, name: str, carriage: BodyCarriage) -> None:
-    """A body that rides is another one, rides once, and has the points that its contacts name."""
+def _check_rider(study: Study, name: str, body: str) -> None:
+    """A body that rides is another one, and rides once."""
     here = f"carriage.{name}.body"
-    _must_exist(study, here, carriage.body, "body")
-    riding = [(c.body, c.on) for c in study.carriage.values() if isinstance(c, BodyCarriage)]
-    below, on = [carriage.body], dict(riding)
+    _must_exist(study, here, body, "body")
+    riding = [(c.riding_body, c.on) for c in study.carriage.values() if c.riding_body is not None]
+    below, on = [body], dict(riding)
     while below[-1] in on and below.count(below[-1]) == 1:
         below.append(on[below[-1]])
-    alone = [body for body, _ in riding].count(carriage.body) == 1
-    if carriage.body in below[1:] or not alone:
+    alone = [rider for rider, _ in riding].count(body) == 1
+    if body in below[1:] or not alone:
         what = "a body cannot ride on itself" if alone else "this body rides twice"
-        raise BadInput(what, where=study.source.where(here), received=shortened(carriage.body), remedy="another body")
+        raise BadInput(what, where=study.source.where(here), received=shortened(body), remedy="another body")
 
 
 def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carriage"]) -> None:

@@ -257,7 +257,7 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
 
 def _weighs(study: Study, body: str) -> bool:
     """Whether own weight on the body's elements counts; it cancels where a body that rides counts from its rest."""
-    return study.body[body].own_weight and not any(getattr(c, "body", None) == body for c in study.carriage.values())
+    return study.body[body].own_weight and all(carriage.riding_body != body for carriage in study.carriage.values())
 
 
 def _wide(rows: Rows) -> Rows:

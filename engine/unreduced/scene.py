@@ -9,7 +9,7 @@ carriages, or with own weight from the unstressed state.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.timeline import Rider
-from engine.scene.carriages import BodyCarriage, Carriage, Contact, ForceCarriage, OscillatorCarriage
+from engine.scene.carriages import Carriage, Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
 from results_schema.errors import BadInput
@@ -81,7 +81,7 @@ class Unreduced:
     @property
     def loose(self) -> tuple[str, ...]:
         """The bodies that ride."""
-        return tuple(c.body for c in self.study.carriage.values() if isinstance(c, BodyCarriage))
+        return tuple(c.riding_body for c in self.study.carriage.values() if c.riding_body is not None)
 
     @cached_property
     def stiffness(self) -> csc_array:
@@ -122,7 +122,7 @@ class Unreduced:
 
     @property
     def _sprung_masses(self) -> Array:
-        return np.array([self.study.value(f"carriage.{name}.mass") for name in self.sprung])
+        return np.array([suspension.mass for suspension in suspensions_of(self.study).values()])
 
     def part(self, body: str) -> slice:
         """A body's degrees of freedom."""
@@ -158,14 +158,13 @@ def unreduced_model(
         raise BadInput("the unreduced model is a full one", where=where, expected='"auto"', received=received)
     used = {study.body_of(sensor) for sensor in study.sensor}
     for carriage in study.carriage.values():
-        used |= {carriage.on, carriage.body} if isinstance(carriage, BodyCarriage) else {carriage.on}
+        used |= set(carriage.bodies)
     bodies = {name: full_body(study, name) for name in study.body if name in used}
     _check_weights(study, bodies)
     firsts, first = {}, 0
     for name, body in bodies.items():
         firsts[name], first = first, first + body.size
-    springy = [name for name, carriage in study.carriage.items() if isinstance(carriage, OscillatorCarriage)]
-    sprung = {name: first + index for index, name in enumerate(springy)}
+    sprung = {name: first + index for index, name in enumerate(suspensions_of(study))}
     scene = _Scene(study, bodies, firsts, sprung, first + len(sprung))
     return Unreduced(
         study=study,
@@ -202,26 +201,23 @@ def _riders(
         delay = delays.get(name, carriage.start_time / first.motion.time_scale)
         alone[name] = Rider(carriage.motion, bodies[carriage.on].length, pace, delay)
         yield alone[name]
-    for name, _, contact in contacts_of(study):
-        carriage = study.carriage[name]
-        assert isinstance(carriage, BodyCarriage)
-        middle = 0.5 * bodies[carriage.body].length
-        offset = _ahead(contact, middle if carriage.reference is None else carriage.reference)
-        before = alone[name]
-        yield Rider(before.motion, before.length, before.pace, before.delay, offset)
+    for name, carriage in study.carriage.items():
+        if carriage.riding_body is not None:
+            for offset in carriage.contact_offsets(bodies[carriage.riding_body].length):
+                yield replace(alone[name], offset=offset)
 
 
 def contacts_of(study: Study) -> Iterator[tuple[str, str, Contact]]:
     """Carriage, name and contact of every contact of the bodies that ride."""
     for name, carriage in study.carriage.items():
-        if isinstance(carriage, BodyCarriage):
-            for word, contact in carriage.contacts.items():
-                yield name, word, contact
+        for word, contact in carriage.riding_contacts.items():
+            yield name, word, contact
 
 
-def _ahead(contact: Contact, reference: float) -> float:
-    """m from the carriage's reference to a contact."""
-    return float(contact.offset or 0.0) if contact.at is None else contact.at - reference
+def suspensions_of(study: Study) -> dict[str, Suspension]:
+    """The springs under sprung masses, by the names of their carriages."""
+    found = {name: carriage.suspension for name, carriage in study.carriage.items()}
+    return {name: suspension for name, suspension in found.items() if suspension is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,34 +239,33 @@ class _Scene:
 
     def _own(self, number: int, name: str, carriage: Carriage) -> Iterator[Tie]:
         none = np.zeros(self.size)
-        if isinstance(carriage, ForceCarriage):
-            yield Tie(name, name, "force", number, carriage.on, none, force=carriage.force)
-        elif isinstance(carriage, OscillatorCarriage):
-            if carriage.wheel_mass > 0.0:
-                yield Tie(name, name, "mass", number, carriage.on, none, mass=carriage.wheel_mass)
+        if carriage.forces:
+            yield Tie(name, name, "force", number, carriage.on, none, force=carriage.sum_of(carriage.forces))
+        touching, suspension = carriage.sum_of(carriage.touching), carriage.suspension
+        if touching > 0.0:
+            yield Tie(name, name, "mass", number, carriage.on, none, mass=touching)
+        if suspension is not None:
             mass = none.copy()
             mass[self.sprung[name]] = -1.0
-            k, c = carriage.stiffness, carriage.damping
+            k, c = suspension.stiffness, suspension.damping
             yield Tie(name, name, "spring", number, carriage.on, mass, stiffness=k, damping=c)
-        elif not isinstance(carriage, BodyCarriage):
-            yield Tie(name, name, "mass", number, carriage.on, none, mass=carriage.moving_mass)
 
     def _contact(self, rider: int, name: str, word: str, contact: Contact) -> Tie:
         carriage = self.study.carriage[name]
-        assert isinstance(carriage, BodyCarriage)
-        body, first = self.bodies[carriage.body], self.firsts[carriage.body]
+        rides = str(carriage.riding_body)
+        body, first = self.bodies[rides], self.firsts[rides]
         row = np.zeros(self.size)
         row[first : first + body.size] = -self._row(name, word, contact, body)
         return Tie(
             name=f"{name}_{word}",
             carriage=name,
-            link="rigid" if contact.stiffness == "rigid" else "spring",
+            link="rigid" if contact.is_rigid else "spring",
             rider=rider,
             body=carriage.on,
             other=row,
-            stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
+            stiffness=contact.spring,
             damping=contact.damping,
-            rides=carriage.body,
+            rides=rides,
             at=contact.at,
         )
 
@@ -278,7 +273,7 @@ class _Scene:
         """(n of the body,) what moves the contact."""
         if contact.at is not None:
             return body.track.rows(np.array([contact.at])).columns(body.size)[:, 0]
-        found = body.points.get(f"point.{contact.point}")
+        found = body.points.get(str(contact.place))
         if found is None:
             names = [point.removeprefix("point.") for point in body.points if point.startswith("point.")]
             raise BadInput(
@@ -292,10 +287,10 @@ class _Scene:
     def weight(self) -> Array:
         """(n,) N: of sprung masses, of bodies that ride, and of those whose own weight acts."""
         found = np.zeros(self.size)
-        riding = [c.body for c in self.study.carriage.values() if isinstance(c, BodyCarriage)]
+        riding = [carriage.riding_body for carriage in self.study.carriage.values()]
         for name, body in self.bodies.items():
             if name in riding or self.study.body[name].own_weight:
                 found[self.firsts[name] : self.firsts[name] + body.size] = body.pull * self.study.gravity
-        for name, place in self.sprung.items():
-            found[place] = self.study.value(f"carriage.{name}.mass") * self.study.gravity
+        for name, suspension in suspensions_of(self.study).items():
+            found[self.sprung[name]] = suspension.mass * self.study.gravity
         return found

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, Strict, Tag
 
-from engine.scene.carriages import BodyCarriage
 from engine.study_file.spec import LIST, NUMBER, Spec, by_form
 from engine.study_file.units import Length, fault
 from results_schema.errors import BadInput
@@ -85,11 +84,8 @@ def way_of(study: Study) -> tuple[float, float]:
     positions that is all that its body allows. Raises BadInput where there is no such part."""
     name, carriage = first_carriage(study)
     length = float(study.value(f"body.{carriage.on}.length"))
-    ahead = [0.0]
-    if isinstance(carriage, BodyCarriage):
-        middle = 0.5 * float(study.value(f"body.{carriage.body}.length"))
-        reference = middle if carriage.reference is None else carriage.reference
-        ahead = [(c.offset or 0.0) if c.at is None else c.at - reference for c in carriage.contacts.values()]
+    rides = carriage.riding_body
+    ahead = carriage.contact_offsets(0.0 if rides is None else float(study.value(f"body.{rides}.length")))
     low, high = -min(ahead), length - max(ahead)
     if not isinstance(study.question.get("positions"), list | tuple):
         first, last = carriage.motion.range()

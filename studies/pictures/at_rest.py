@@ -13,7 +13,6 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator
 from numpy.typing import NDArray
 
-from engine.scene.carriages import BodyCarriage
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, printed
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
 from studies.results.formatting import quantity
@@ -44,9 +43,9 @@ def places(results: Results) -> list[Places]:
     part, found = results.dataset["body_place"].values, []
     for name in map(str, results.dataset["on_body"].values):
         along = part * float(results.study.value(f"body.{name}.length"))
-        rider = next((c for c in results.study.carriage.values() if getattr(c, "body", None) == name), None)
-        if isinstance(rider, BodyCarriage):
-            along = along - (0.5 * along[-1] if rider.reference is None else rider.reference)
+        rider = next((c for c in results.study.carriage.values() if c.riding_body == name), None)
+        if rider is not None:
+            along = along - rider.reference_on(along[-1])
             first = rider is results.carriage
             found.append(Places(name, along if first else along + float(rider.motion.path(0.0).S), first))
         else:
@@ -87,7 +86,7 @@ def position_title(results: Results) -> str:
 
 def carriage_marks(axes: Axes, results: Results, position: float, level: float) -> None:
     """The first carriage as a mark where it stands, unless it is a body with a line of its own."""
-    if not isinstance(results.carriage, BodyCarriage):
+    if results.carriage.riding_body is None:
         axes.plot([position], [level], marker="s", markersize=4.0, color=INK, linestyle="none")
 
 

@@ -117,7 +117,7 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
     columns = sorted({0, size // 2, size - 1})
     grid = drawing.subplots(count, len(columns), squeeze=False, sharex=True, sharey=True)
     bodies = places(results)
-    riding = {c.body for c in results.study.carriage.values() if hasattr(c, "body")}
+    riding = {carriage.riding_body for carriage in results.study.carriage.values()}
     for mode in range(count):
         for column, place in enumerate(columns):
             axes, position = grid[mode, column], float(base["position"][place])

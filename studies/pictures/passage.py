@@ -10,7 +10,6 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from engine.scene.carriages import BodyCarriage
 from studies.findings.theory import body_mass
 from studies.pictures.common.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.common.sweep_view import (
@@ -140,8 +139,8 @@ def _relative_force(seen: View, carriage: str) -> Any:
     """Smallest contact force over the weight; of a body that rides, over its weight without sweep."""
     spec = seen.results.study.carriage[carriage]
     mass = sum(seen.results.parameter(f"carriage.{carriage}.{key}") for key in spec.masses)
-    if isinstance(spec, BodyCarriage):
-        mass = body_mass(seen.results, spec.body)
+    if spec.riding_body is not None:
+        mass = body_mass(seen.results, spec.riding_body)
     return seen.results.dataset[f"{carriage}_contact_force_min"] / (mass * seen.results.parameter("gravity"))
 
 

@@ -93,7 +93,7 @@ def _findings(archive: Archive, study: Study) -> Iterator[str]:
         yield f"study_kind: expected {study.kind!r}, received {root.attrs.get('study_kind')!r}"
         return
     kind = kind_named(study.kind)
-    used = {name for carriage in study.carriage.values() for name in (carriage.on, getattr(carriage, "body", ""))}
+    used = {name for carriage in study.carriage.values() for name in carriage.bodies}
     bodies = {name: body.recorded for name, body in study.body.items() if name in used and body.recorded is not None}
     missing = [name for name, recorded in bodies.items() if np.isnan(recorded.length)]
     if missing:

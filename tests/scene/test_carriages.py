@@ -1,0 +1,46 @@
+"""A kind of carriage is one class: the march, the statics and the unreduced model ask nothing but it."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+import pytest
+
+import engine
+from engine.scene.carriages import CARRIAGES, Carriage
+from engine.study_file.units import Force, Mass
+from engine.unreduced.scene import unreduced_model
+from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
+from tests.engine.build import beam, cruise, fixed, force, mass, study
+
+WAY = cruise(0.0, 1.0, 0.5)
+
+
+class PushedMass(Carriage):
+    """A rigid mass that a force pushes down besides its weight."""
+
+    masses: ClassVar[tuple[str, ...]] = ("mass",)
+    touching: ClassVar[tuple[str, ...]] = ("mass",)
+    forces: ClassVar[tuple[str, ...]] = ("push",)
+
+    kind: Literal["pushed-mass"]
+    mass: Mass
+    push: Force
+
+
+def test_a_kind_from_elsewhere_is_a_mass_and_a_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CARRIAGES, "pushed-mass", PushedMass)  # type: ignore[arg-type]
+    pushed = {"on": "bed", "kind": "pushed-mass", "mass": 0.3, "push": 2.0, "motion": WAY}
+    sensors = {"place": fixed(0.61), "moment": fixed(0.37, "bending_moment")}
+    options = {"body": {"bed": beam(modes=6)}, "sensor": sensors, "solver": {"steps": 200}}
+    one = study(beam(), {"car": pushed}, **options)
+    two = study(beam(), {"car": mass(0.3, WAY), "push": force(2.0, WAY)}, **options)
+    found, right = engine.run(one), engine.run(two)
+    for name in ("place_max", "moment_max"):
+        assert float(found[name]) == pytest.approx(float(right[name]), rel=1e-12)
+    whole = unreduced_model(one)
+    together = unreduced_statics(unreduced_model(two), [[0.4, 0.4]])[0]
+    np.testing.assert_allclose(unreduced_statics(whole, [0.4])[0], together, rtol=1e-12)
+    alone = unreduced_frequencies(unreduced_model(study(beam(), {"car": mass(0.3, WAY)}, **options)), [0.4], 3)
+    np.testing.assert_allclose(unreduced_frequencies(whole, [0.4], 3), alone, rtol=1e-12)
