@@ -12,6 +12,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from results_schema.errors import BadInput
+from results_schema.quantities import QUANTITIES
 from results_schema.shared import MARCH
 from results_schema.variable import AXES, EVERY_KIND, REGISTRY, Variable, declare
 
@@ -19,7 +20,6 @@ __all__ = [
     "AXES",
     "EVERY_KIND",
     "MARCH",
-    "QUANTITY_UNITS",
     "RESERVED",
     "Variable",
     "axes",
@@ -29,18 +29,6 @@ __all__ = [
     "registered",
     "sensor_unit",
 ]
-
-QUANTITY_UNITS: Mapping[str, str] = {
-    "displacement": "m",
-    "velocity": "m s-1",
-    "acceleration": "m s-2",
-    "bending_moment": "N m",
-    "shear_force": "N",
-    "axial_force": "N",
-    "stress": "Pa",
-    "strain": "1",
-    "contact_force": "N",
-}
 
 _RESERVED_WORDS = """
     direction position phase peak sensor variant speed_ratio mass_ratio station elapsed history mode
@@ -132,8 +120,6 @@ def sensor_unit(quantity: str) -> str:
     >>> sensor_unit("bending_moment")
     'N m'
     """
-    if quantity not in QUANTITY_UNITS:
-        raise BadInput(
-            "unknown quantity", where="quantity", expected=" | ".join(QUANTITY_UNITS), received=repr(quantity)
-        )
-    return QUANTITY_UNITS[quantity]
+    if quantity not in QUANTITIES:
+        raise BadInput("unknown quantity", where="quantity", expected=" | ".join(QUANTITIES), received=repr(quantity))
+    return QUANTITIES[quantity].unit

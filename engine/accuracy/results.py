@@ -19,11 +19,11 @@ from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from engine.scene.study import Study
+from results_schema.quantities import QUANTITIES
 from results_schema.status import Status
 
 Array = NDArray[np.float64]
 
-TOLD = ("velocity", "acceleration", "contact_force")  # need not converge: forces that enter excite every mode
 EXTREMES = ("max", "min", "rms")
 ENDS = ("max", "min")
 
@@ -175,7 +175,7 @@ def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Out
 def _held(study: Study, quantity: str, own: float | str | None) -> tuple[float, bool]:
     """The tolerance of what a sensor reads, and whether it is the study's."""
     if own is None:
-        return (np.nan, False) if quantity in TOLD else (study.solver.tolerance, True)
+        return (np.nan, False) if QUANTITIES[quantity].told else (study.solver.tolerance, True)
     return (np.nan if own == "told" else float(own), False)
 
 

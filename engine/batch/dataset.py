@@ -14,7 +14,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases
 from results_schema.store.parts import Rows, joined
-from results_schema.variables import QUANTITY_UNITS, Variable, axes, declarations, expand
+from results_schema.variables import Variable, axes, declarations, expand, sensor_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,8 +55,8 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     import xarray as xr
 
     study = plan.study
-    sensors = {name: QUANTITY_UNITS[sensor.quantity] for name, sensor in study.sensor.items()}
-    envelopes = {name: QUANTITY_UNITS[envelope.quantity] for name, envelope in study.envelope.items()}
+    sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
+    envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
     declared = expand(plan.results, sensors, list(study.carriage), envelopes)
     dataset = xr.Dataset(coords=coordinates(plan.cases))
     dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
@@ -142,7 +142,7 @@ def _with_ratios(plan: Plan, dataset: xr.Dataset) -> xr.Dataset:
 
 def _speed_ratio(plan: Plan) -> Array | None:
     """Top speed over omega_1 L/pi, for motions with a speed of their own."""
-    if not hasattr(next(iter(plan.study.carriage.values())).motion, "speed"):
+    if next(iter(plan.study.carriage.values())).motion.pace != "speed":
         return None
     found = np.empty(plan.size)
     for grid, members in zip(plan.grids, plan.members, strict=True):

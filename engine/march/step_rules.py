@@ -209,7 +209,7 @@ def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None
 
 def vibrates_freely(carriage: CarriageTie) -> bool:
     """Whether a carriage leaves free vibration behind."""
-    return bool(getattr(carriage.rider.motion, "after", 0.0) > 0.0)
+    return carriage.rider.motion.free_vibration > 0.0
 
 
 def check_free_vibration(model: SceneModel) -> None:

@@ -36,14 +36,12 @@ UNFELT = 1e-6  # of the largest: a mode that moves its track less is none of the
 class BodyPart:
     """A body's place in the scene's modal coordinates.
 
-    modes: its slice of all modes. fibre_distance: m, NaN where it is not known. own_weight: gravity acts on it too.
+    modes: its slice of all modes. own_weight: gravity acts on it too.
     """
 
     name: str
     modal: ModalBody
     modes: slice
-    second_moment: float
-    fibre_distance: float
     own_weight: bool
 
 
@@ -276,14 +274,13 @@ def _standing(
 def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
     """A body of the study in modal coordinates, its modes counted from ``first``."""
     try:
-        built = build_body(body)
+        modal = build_body(body)
     except BadInput as error:
         where = study.source.where(f"body.{name}.{error.where}")
         raise BadInput(
             error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
         ) from None
-    modes = slice(first, first + built.modal.omega.size)
-    return BodyPart(name, built.modal, modes, built.second_moment, built.fibre_distance, body.own_weight)
+    return BodyPart(name, modal, slice(first, first + modal.omega.size), body.own_weight)
 
 
 def _check_rigid_modes(model: SceneModel) -> None:

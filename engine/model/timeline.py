@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.scene.motion_base import Motion, Path
-from engine.scene.motions import Cruise
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -54,7 +53,7 @@ class Rider:
     @property
     def stays(self) -> bool:
         """Whether the carriage stands on its place before and after its motion; a cruise only passes."""
-        return not isinstance(self.motion, Cruise)
+        return not self.motion.passes
 
     @property
     def top_speed(self) -> float:
@@ -247,6 +246,7 @@ def build_timeline(
     steps: wanted per unit of scene time. window: what is recorded. free_steps: per first period of free vibration.
     stops: further scene times that must be step boundaries, at which nothing happens.
 
+    >>> from engine.scene.motions import Cruise
     >>> bed = Cruise(kind="cruise", start=-1.0, end=3.0, speed=1.0)
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
     [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
@@ -303,13 +303,14 @@ def build_grid(
     """Cut the scene at its events; otherwise as `build_timeline`."""
     parts = _parts(riders, window, tuple(stops))
     counts = tuple(max(1, math.ceil(steps * (part.end - part.start) - 1e-9 * steps)) for part in parts)
-    free = max(r.motion.after if isinstance(r.motion, Cruise) else 0.0 for r in riders)
+    free = max(r.motion.free_vibration for r in riders)
     return Grid(riders, parts, counts, math.ceil(free * free_steps) if free > 0.0 else 0, free)
 
 
 def refined(timeline: Timeline, by: int) -> Timeline:
     """The same timeline with every step cut into ``by`` equal ones: its station n is the new station n times ``by``.
 
+    >>> from engine.scene.motions import Cruise
     >>> whole = build_timeline((Rider(Cruise(kind="cruise", start=0.0, end=1.0, speed=1.0), 1.0),), 5, "whole")
     >>> refined(whole, 2).window
     (0, 10)

@@ -99,11 +99,10 @@ class VariantValues:
     def time_scale(self, carriage: str) -> Array:
         """(V,) seconds per unit of a carriage's own tau."""
         motion = self.study.carriage[carriage].motion
-        pace = next((key for key in ("speed", "frequency") if hasattr(motion, key)), None)
-        if pace is None:
+        if motion.pace is None:
             return np.full(self.size, motion.time_scale)
-        way = float(motion.time_scale * getattr(motion, pace))
-        return way / self._of(f"carriage.{carriage}.motion.{pace}")
+        key = f"carriage.{carriage}.motion.{motion.pace}"
+        return float(motion.time_scale * self.study.value(key)) / self._of(key)
 
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Timeline
-from engine.observation.readings import OF_SECTIONS, Sensor
+from engine.observation.readings import Sensor
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -36,7 +36,7 @@ class Side(NamedTuple):
 
 def passes(model: SceneModel, sensor: Sensor) -> Iterator[float]:
     """Scene times at which a load passes a sensor whose influence line has a kink there, in no order."""
-    if sensor.under is None and sensor.quantity in OF_SECTIONS:
+    if sensor.under is None and sensor.reads.has_kinks:
         for carriage in model.carriages:
             for rider, _ in carriage.loads if carriage.body == sensor.body else ():
                 yield from model.riders[rider].passes(sensor.at)

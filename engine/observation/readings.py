@@ -20,14 +20,10 @@ from engine.model.attachment import rows as shape_rows
 from engine.model.scene_model import BodyPart, SceneModel
 from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
+from results_schema.quantities import QUANTITIES, Quantity
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-# of w along the track, for what statics make; axial forces are those of `ModalBody.sections` alone
-DERIVATIVE = {"displacement": 0, "axial_force": 1, "bending_moment": 2, "stress": 2, "strain": 2, "shear_force": 3}
-OF_SECTIONS = ("bending_moment", "shear_force", "axial_force", "stress", "strain")
-RATE_ORDER = {"velocity": 1, "acceleration": 2}
 
 
 class Channel(NamedTuple):
@@ -48,6 +44,11 @@ class Sensor:
     at: float
     under: int | None
 
+    @property
+    def reads(self) -> Quantity:
+        """What it reads, as the table of quantities has it."""
+        return QUANTITIES[self.quantity]
+
     def places(self, along: tuple[StationPath, ...]) -> Array:
         """Where it reads, m: one place, or one per station."""
         return np.array([self.at]) if self.under is None else along[self.under].s
@@ -60,15 +61,16 @@ class Sensor:
     def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         """Its sums over the modes."""
         part = model.bodies[self.body]
-        if self.quantity in DERIVATIVE:
+        order = self.offset_order
+        if not order:
             return [Channel("q", 0, _spread(model, part, self._rows(model, along)))]
-        order, shape = RATE_ORDER[self.quantity], self.shape(model, along, 0)
+        shape = self.shape(model, along, 0)
         if self.under is None:
             return [Channel("qva"[order], order, _spread(model, part, shape))]
         way = along[self.under]
         ds, dds = way.ds[:, None], way.dds[:, None]
         slope = self.shape(model, along, 1)
-        if order == RATE_ORDER["velocity"]:
+        if order == 1:
             material = {"q": ds * slope, "v": shape}
         else:
             material = {"q": ds**2 * self.shape(model, along, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
@@ -77,7 +79,7 @@ class Sensor:
     def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(stations, ties): static response per unit force of each tie that the kept modes miss."""
         found = np.zeros((along[0].s.size, model.ties))
-        if self.quantity not in DERIVATIVE or not model.numerics.static_correction:
+        if self.offset_order or not model.numerics.static_correction:
             return found
         known = dict[Attachment, Array]()
         for r, attachment in self._felt(model, along):
@@ -116,7 +118,7 @@ class Sensor:
         if sections is not None:
             rows = sections.rows(self.quantity, places)
         else:
-            rows = self._modal(model).shape(places, DERIVATIVE.get(self.quantity, 0))
+            rows = self._modal(model).shape(places, self.reads.derivative)
         return np.asarray(np.abs(rows).max(axis=1))
 
     def rides(self, model: SceneModel) -> int | None:
@@ -135,35 +137,36 @@ class Sensor:
 
     def _sections(self, model: SceneModel) -> Sections | None:
         """What reads section forces where the body is not one uniform beam."""
-        return self._modal(model).sections if self.quantity in OF_SECTIONS else None
+        return self._modal(model).sections if self.reads.of_section else None
 
     def _rows(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         """(1 or stations, modes of its body) what it reads of every mode."""
         sections = self._sections(model)
         if sections is not None:
             return sections.rows(self.quantity, self.places(along))
-        shape = self.shape(model, along, DERIVATIVE[self.quantity])
-        return np.asarray(_factor(model.bodies[self.body], self.quantity) * shape)
+        return np.asarray(self._factor(model) * self.shape(model, along, self.reads.derivative))
+
+    def _factor(self, model: SceneModel) -> float:
+        """What a derivative of w is multiplied by."""
+        return self.reads.factor(self._modal(model))
 
     def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
         """Static reading per unit force at places of the track (m), or at a point (its name)."""
-        part, sections = model.bodies[self.body], self._sections(model)
+        sections = self._sections(model)
         if isinstance(loaded, str):
             return self._under_point(model, along, loaded)
         if sections is not None:
             return sections.influence_at(self.quantity, self.places(along), loaded)
-        line = part.modal.influence_at(self.places(along), loaded, DERIVATIVE[self.quantity])
-        return np.asarray(_factor(part, self.quantity) * line)
+        line = self._modal(model).influence_at(self.places(along), loaded, self.reads.derivative)
+        return np.asarray(self._factor(model) * line)
 
     def _under_point(self, model: SceneModel, along: tuple[StationPath, ...], point: str) -> Array:
         """Static reading per unit force at a point."""
-        part, x = model.bodies[self.body], self.places(along)
-        assert part.modal.points is not None
+        points, x = self._modal(model).points, self.places(along)
+        assert points is not None
         if self._sections(model) is not None:
-            return part.modal.points.section_influence(self.quantity, point, x)
-        return np.asarray(
-            _factor(part, self.quantity) * part.modal.points.influence(point, x, DERIVATIVE[self.quantity])
-        )
+            return points.section_influence(self.quantity, point, x)
+        return np.asarray(self._factor(model) * points.influence(point, x, self.reads.derivative))
 
     def _kept(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
@@ -178,14 +181,13 @@ class Sensor:
         sections = self._sections(model)
         if sections is not None:
             return np.broadcast_to(sections.own_weight(self.quantity, x), stations)
-        if self.quantity in DERIVATIVE:
-            factor = _factor(model.bodies[self.body], self.quantity)
-            return np.broadcast_to(factor * model.sag(self.body, x, DERIVATIVE[self.quantity]), stations)
+        if self.offset_order == 0:
+            return np.broadcast_to(self._factor(model) * model.sag(self.body, x, self.reads.derivative), stations)
         if self.under is None:
             return np.zeros(stations)
         way = along[self.under]
         slope = model.sag(self.body, x, 1)
-        if self.quantity == "velocity":
+        if self.offset_order == 1:
             return way.ds * slope
         return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
 
@@ -196,7 +198,7 @@ class Sensor:
     @property
     def offset_order(self) -> int:
         """The power of 1/h that makes the offset SI."""
-        return RATE_ORDER.get(self.quantity, 0)
+        return self.reads.rate
 
     def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         """(stations,) bool: whether it reads anything there."""
@@ -231,17 +233,6 @@ class SprungSensor(Sensor):
 
     def sagging(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
         return np.zeros(along[0].s.size)
-
-
-def _factor(part: BodyPart, quantity: str) -> float:
-    """What a derivative of w is multiplied by: M = -E I w'', V = dM/ds; of the extreme fibre strain -c w'', stress
-    M c / I."""
-    if quantity == "displacement":
-        return 1.0
-    if quantity == "strain":
-        return -part.fibre_distance
-    factor = -part.modal.bending_stiffness
-    return factor * part.fibre_distance / part.second_moment if quantity == "stress" else factor
 
 
 def _spread(model: SceneModel, part: BodyPart, rows: Array) -> Array:

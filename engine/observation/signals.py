@@ -43,7 +43,7 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     if spec.carriage is None or under is None:
         return Sensor(name, spec.quantity, body, at, under)
     springs = model.springs_of(under)
-    if spec.quantity == "contact_force":
+    if spec.reads.of_contact:
         chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]
         return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)
     mode = next((spring.mode for spring in springs.values()), None)

@@ -109,7 +109,7 @@ class Carriage(Spec):
             return self
         if self.delay is not None:
             raise fault("a carriage has a delay or a headway, not both", expected="delay (s) or headway (m)")
-        if not hasattr(self.motion, "speed"):
+        if self.motion.pace != "speed":
             raise fault("a headway needs a motion with a constant speed", expected="delay (s)")
         return self
 

@@ -7,7 +7,7 @@ section 3). It lasts from tau = 0 to `duration`; before, the carriage waits at t
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,11 +37,28 @@ class Reversal(NamedTuple):
     after: float
 
 
+class Legs(NamedTuple):
+    """The stroke of a motion that comes back: from start to end, m; the parts of it at either end in which the speed
+    changes; tau at the beginning and end of the constant speed on the way there (back: 1 minus these)."""
+
+    start: float
+    end: float
+    turn: float
+    cruise: tuple[float, float]
+
+
 class Motion(Spec):
     """Base of all motions. Positions in m along the body's track, tau without unit."""
 
-    family: ClassVar[float] = 0.0  # first number of the shape's key
     period: ClassVar[float | None] = None  # tau after which the path repeats
+    pace: ClassVar[Literal["speed", "frequency"] | None] = None  # the key of a number that all its speeds grow with
+    passes: ClassVar[bool] = False  # whether the carriage is on the body while it moves only
+    is_harmonic: ClassVar[bool] = False  # whether it swings as a sine about the middle of its range
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
 
     @property
     @abstractmethod
@@ -59,10 +76,6 @@ class Motion(Spec):
         """Largest |dS/dtau| in m."""
 
     @abstractmethod
-    def shape_key(self) -> tuple[float, ...]:
-        """Numbers that decide the whole path as a function of tau; equal keys mean equal paths."""
-
-    @abstractmethod
     def range(self) -> tuple[float, float]:
         """Smallest and largest position in m."""
 
@@ -71,8 +84,18 @@ class Motion(Spec):
         """Conditions on this motion at the dotted key `here` on a body whose length has the key `length`."""
 
     @abstractmethod
-    def _inside(self, tau: Array, side: Side) -> Path:
+    def law(self, tau: Array, side: Side) -> Path:
         """The law for 0 <= tau <= duration."""
+
+    @property
+    def free_vibration(self) -> float:
+        """First periods of the body for which free vibration is marched afterwards."""
+        return 0.0
+
+    @property
+    def legs(self) -> Legs | None:
+        """Its ways there and back at constant speed but for their ends; it has the keys of an out-and-back then."""
+        return None
 
     def breaks(self) -> Array:
         """tau inside (0, duration), ascending, where dS or ddS jumps."""
@@ -90,7 +113,7 @@ class Motion(Spec):
         array([ 1.,  1.,  2.,  3., nan])
         """
         times = np.asarray(tau, dtype=np.float64)
-        inside = self._inside(np.clip(times, 0.0, self.duration), side)
+        inside = self.law(np.clip(times, 0.0, self.duration), side)
         waiting, gone = times < 0.0, times > self.duration * (1.0 + ROUNDING)
         if not (waiting.any() or gone.any()):
             return inside

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import reduce
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -11,9 +10,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from engine.scene.motion_base import Array, Motion, Path, Reversal, Side
+from engine.scene.motion_base import Array, Legs, Motion, Path, Reversal, Side
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import Hint, KindOf, Spec
+from engine.study_file.spec import Hint, KindOf, kinds
 from engine.study_file.splines import spline_at_rest, spline_range, spline_touches
 from engine.study_file.units import Dimensionless, Frequency, Length, Speed, Time, fault
 
@@ -24,7 +23,8 @@ class Cruise(Motion):
     after: free vibration afterwards, in first periods of the body.
     """
 
-    family = 1.0
+    pace = "speed"
+    passes = True
     kind: Literal["cruise"]
     start: Length
     end: Length
@@ -43,8 +43,9 @@ class Cruise(Motion):
     def max_speed(self) -> float:
         return abs(self.end - self.start)
 
-    def shape_key(self) -> tuple[float, ...]:
-        return (self.family, self.start, self.end)
+    @property
+    def free_vibration(self) -> float:
+        return self.after
 
     def range(self) -> tuple[float, float]:
         return min(self.start, self.end), max(self.start, self.end)
@@ -53,7 +54,7 @@ class Cruise(Motion):
         start, end = f"{here}.start", f"{here}.end"
         return [_stroke_check(start, end), _touch_check(here, (length, start, end), np.minimum, np.maximum)]
 
-    def _inside(self, tau: Array, side: Side) -> Path:
+    def law(self, tau: Array, side: Side) -> Path:
         velocity = np.full_like(tau, self.end - self.start)
         return Path((1.0 - tau) * self.start + tau * self.end, velocity, np.zeros_like(tau))
 
@@ -67,7 +68,7 @@ class OutAndBack(Motion):
     middle. turn = 0 reverses at an instant.
     """
 
-    family = 2.0
+    pace = "speed"
     period = 1.0
     kind: Literal["out-and-back"]
     start: Length
@@ -98,12 +99,9 @@ class OutAndBack(Motion):
         """tau from the middle of a turn to the cruise."""
         return 0.5 * math.pi * self.turn * self.stroke / self.max_speed
 
-    def cruise_part(self) -> tuple[float, float]:
-        """tau at the beginning and end of the forward cruise in a cycle; backward it is 1 minus these."""
-        return self.half_turn, 0.5 - self.half_turn
-
-    def shape_key(self) -> tuple[float, ...]:
-        return (self.family, self.start, self.end, self.turn, float(self.cycles))
+    @property
+    def legs(self) -> Legs:
+        return Legs(self.start, self.end, self.turn, (self.half_turn, 0.5 - self.half_turn))
 
     def range(self) -> tuple[float, float]:
         return min(self.start, self.end), max(self.start, self.end)
@@ -123,7 +121,7 @@ class OutAndBack(Motion):
             on_body(end, (end, length), "an out-and-back path must stay on its body"),
         ]
 
-    def _inside(self, tau: Array, side: Side) -> Path:
+    def law(self, tau: Array, side: Side) -> Path:
         phase = np.mod(tau, 1.0)
         if side == "left":
             phase = np.where((phase == 0.0) & (tau > 0.0), 1.0, phase)
@@ -156,7 +154,8 @@ class OutAndBack(Motion):
 class Sinusoidal(Motion):
     """s = centre + amplitude sin(2 pi f t). tau = 1 is one cycle."""
 
-    family = 3.0
+    pace = "frequency"
+    is_harmonic = True
     period = 1.0
     kind: Literal["sinusoidal"]
     centre: Length
@@ -176,9 +175,6 @@ class Sinusoidal(Motion):
     def max_speed(self) -> float:
         return 2.0 * math.pi * self.amplitude
 
-    def shape_key(self) -> tuple[float, ...]:
-        return (self.family, self.centre, self.amplitude, float(self.cycles))
-
     def range(self) -> tuple[float, float]:
         return self.centre - self.amplitude, self.centre + self.amplitude
 
@@ -187,7 +183,7 @@ class Sinusoidal(Motion):
         what = "a sinusoidal path must stay on its body"
         return [Check(here, needs, lambda c, a, el: (c - a >= 0) & (c + a <= el), what, "0 to the body's length")]
 
-    def _inside(self, tau: Array, side: Side) -> Path:
+    def law(self, tau: Array, side: Side) -> Path:
         angle, rate = 2.0 * np.pi * np.mod(tau, 1.0), 2.0 * np.pi
         sine = self.amplitude * np.sin(angle)
         return Path(self.centre + sine, rate * self.amplitude * np.cos(angle), -(rate**2) * sine)
@@ -200,7 +196,6 @@ Times = Annotated[tuple[Time, ...], Strict(False)]
 class Waypoints(Motion):
     """The C2 cubic spline through positions at times, at rest at both ends. tau = 1 is the whole way."""
 
-    family = 4.0
     kind: Literal["waypoints"]
     times: Times = Field(min_length=2, max_length=1000)
     positions: Places = Field(min_length=2, max_length=1000)
@@ -228,9 +223,6 @@ class Waypoints(Motion):
         inner = knots[:-1] + np.where((part > 0.0) & (part < 1.0), part, 0.0) * np.diff(knots)
         return float(max(np.abs(slopes).max(), np.abs(self.path(inner).dS).max()))
 
-    def shape_key(self) -> tuple[float, ...]:
-        return (self.family, *(time / self.times[-1] for time in self.times), *self.positions)
-
     def range(self) -> tuple[float, float]:
         low, high = spline_range(np.array(self.times), np.array(self.positions)[:, None])
         return float(low[0]), float(high[0])
@@ -245,7 +237,7 @@ class Waypoints(Motion):
             Check(f"{here}.positions", (length, *places, *times), spline_touches, _NO_TOUCH, _TOUCHING),
         ]
 
-    def _inside(self, tau: Array, side: Side) -> Path:
+    def law(self, tau: Array, side: Side) -> Path:
         spline = spline_at_rest(np.array(self.times) / self.times[-1], np.array(self.positions))
         return Path(*(np.asarray(spline(tau, order), dtype=np.float64) for order in range(3)))
 
@@ -254,12 +246,7 @@ class Waypoints(Motion):
         return knots, *self.path(knots)[1:]
 
 
-MOTIONS: Mapping[str, type[Spec]] = {
-    "cruise": Cruise,
-    "out-and-back": OutAndBack,
-    "sinusoidal": Sinusoidal,
-    "waypoints": Waypoints,
-}
+MOTIONS = kinds("motion", "wanderlast.motions", Motion, Cruise, OutAndBack, Sinusoidal, Waypoints)
 AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS, planned=("free",))]
 
 _NO_TOUCH = "the path never touches its body"

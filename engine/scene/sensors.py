@@ -10,17 +10,24 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from engine.study_file.spec import NUMBER, WORD, Spec, form_of_amount, one_of
 from engine.study_file.units import Dimensionless, Length, fault
+from results_schema.quantities import MEANT, QUANTITIES, Quantity
 
-OF_A_MASS = ("displacement", "velocity", "acceleration")
-OF_A_BODY = (*OF_A_MASS, "bending_moment", "shear_force", "axial_force", "stress", "strain")
-OF_A_CARRIAGE = (*OF_A_MASS, "contact_force")
-_MEANT = {
-    "deflection": "displacement",
-    "moment": "bending_moment",
-    "shear": "shear_force",
-    "normal_force": "axial_force",
-}
 MOST_PLACES = 201
+
+
+def _of_a_body(word: str) -> str:
+    if word in QUANTITIES and not QUANTITIES[word].of_contact:
+        return word
+    return one_of(*quantities_of_a_body(), meant=MEANT)(word)
+
+
+def _of_anything(word: str) -> str:
+    return word if word in QUANTITIES else one_of(*QUANTITIES, meant=MEANT)(word)
+
+
+def quantities_of_a_body() -> list[str]:
+    """The quantities that can be read of bodies."""
+    return [name for name, quantity in QUANTITIES.items() if not quantity.of_contact]
 
 
 OwnTolerance = Annotated[
@@ -44,7 +51,7 @@ class Sensor(Spec):
     under: str | None = None
     carriage: str | None = None
     contact: str | None = None
-    quantity: Annotated[str, AfterValidator(one_of(*OF_A_BODY, "contact_force", meant=_MEANT))] = "displacement"
+    quantity: Annotated[str, AfterValidator(_of_anything)] = "displacement"
     tolerance: OwnTolerance | None = None
 
     @model_validator(mode="after")
@@ -54,13 +61,19 @@ class Sensor(Spec):
             raise fault("a sensor has exactly one place", expected=expected)
         if self.at is not None and self.body is None:
             raise fault("a sensor at a fixed place needs its body", expected='body = "a body"')
-        if self.carriage is not None and self.quantity not in OF_A_CARRIAGE:
-            raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {', '.join(OF_A_CARRIAGE)}")
-        if self.quantity == "contact_force" and self.carriage is None:
+        if self.carriage is not None and not (self.reads.of_mass or self.reads.of_contact):
+            known = ", ".join(name for name, q in QUANTITIES.items() if q.of_mass or q.of_contact)
+            raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {known}")
+        if self.reads.of_contact and self.carriage is None:
             raise fault("a contact force is that of a carriage", expected='carriage = "a carriage"')
-        if self.contact is not None and self.quantity != "contact_force":
+        if self.contact is not None and not self.reads.of_contact:
             raise fault("only contact forces are read at a contact", expected='quantity = "contact_force"')
         return self
+
+    @property
+    def reads(self) -> Quantity:
+        """What it reads, as the table of quantities has it."""
+        return QUANTITIES[self.quantity]
 
     @property
     def rides(self) -> str | None:
@@ -77,7 +90,7 @@ class Envelope(Spec):
     """
 
     body: str
-    quantity: Annotated[str, AfterValidator(one_of(*OF_A_BODY, meant=_MEANT))] = "displacement"
+    quantity: Annotated[str, AfterValidator(_of_a_body)] = "displacement"
     places: int = Field(default=51, ge=2, le=MOST_PLACES)
     from_: Length | None = Field(default=None, alias="from", ge=0)
     to: Length | None = Field(default=None, gt=0)

@@ -13,14 +13,14 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded
 from engine.scene.carriages import AnyCarriage
-from engine.scene.motions import Cruise
-from engine.scene.sensors import OF_A_BODY, Envelope, Sensor
+from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document, shortened
 from engine.study_file.spec import Keys, Spec, field_at, nearest, refuse
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput
+from results_schema.quantities import QUANTITIES
 from results_schema.variables import RESERVED, expand, sensor_unit
 
 SCHEMA_VERSION = 1
@@ -101,7 +101,7 @@ class Study(Scene):
         """How the march starts: as given, else from rest if every carriage cruises, else from equilibrium."""
         if self.initial is not None:
             return self.initial
-        return "rest" if all(isinstance(c.motion, Cruise) for c in self.carriage.values()) else "equilibrium"
+        return "rest" if all(c.motion.passes for c in self.carriage.values()) else "equilibrium"
 
     def body_of(self, sensor: str) -> str:
         """Name of the body that a sensor reads."""
@@ -166,7 +166,7 @@ def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:
 def _beside(table: Any, recorded: Recorded) -> Any:
     """The table of a body with what is recorded of it, if it is one that is made of files."""
     kind = table.get("kind") if isinstance(table, dict) else None
-    made_of_files = isinstance(kind, str) and getattr(BODIES.get(kind), "names_files", False)
+    made_of_files = isinstance(kind, str) and kind in BODIES and BODIES[kind].names_files
     return table | {"recorded": recorded} if made_of_files else table
 
 
@@ -310,11 +310,11 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
     """A body has the quantity that is read of it, and the keys that this needs."""
     body = study.body[name]
     if quantity in body.untold:
-        expected = f"one of {', '.join(told for told in OF_A_BODY if told not in body.untold)}"
+        expected = f"one of {', '.join(told for told in quantities_of_a_body() if told not in body.untold)}"
         raise BadInput(
             f"the body {name} tells no {quantity}", where=study.source.where(f"{here}.quantity"), expected=expected
         )
-    if quantity in ("stress", "strain") and (missing := body.lacks_for_stress):
+    if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
         where = study.source.where(f"body.{name}.{missing}")
         raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
 
@@ -322,7 +322,7 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
 def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
     """A carriage has what a sensor of its own reads."""
     carriage = study.carriage[str(sensor.carriage)]
-    if sensor.quantity == "contact_force":
+    if sensor.reads.of_contact:
         contacts = carriage.riding_contacts
         if sensor.contact is not None and sensor.contact not in contacts:
             where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import UnionType
-from typing import Annotated, Any, ClassVar, Literal, NoReturn, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NoReturn, TypeVar, Union, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, Discriminator, GetCoreSchemaHandler, Tag, ValidationError
@@ -15,6 +15,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 from engine.study_file.document import Beside, Source, shortened
 from engine.study_file.units import Unit, fault
 from results_schema.errors import BadInput
+from results_schema.pieces import Pieces, unfinished
 
 Keys = Sequence[str | int]
 
@@ -29,6 +30,9 @@ class Spec(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
     derived: ClassVar[tuple[str, ...]] = ()  # numbers that follow from others and can be asked for by their key
     entry_class: ClassVar[Any] = None  # class of the tables under names of the user's choice, if there are such
+
+
+SpecT = TypeVar("SpecT", bound=Spec)
 
 
 def form_of(value: Any) -> str:
@@ -87,6 +91,24 @@ class KindOf:
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
         raise ValidationError.from_exception_data(self.noun, [detail])
+
+
+def kinds(noun: str, group: str, base: Any, *own: type[SpecT]) -> Pieces[type[SpecT]]:
+    """The table of the classes that `KindOf` chooses from: the program's own, then those of other packages' entry
+    points."""
+    return Pieces(
+        group=group,
+        noun=noun,
+        own={_kind_of(cls): cls for cls in own},
+        wanted=f'a class made of {base.__module__}.{base.__name__} with kind: Literal["..."]',
+        missing=unfinished(base),
+        name=_kind_of,
+    )
+
+
+def _kind_of(cls: type[Spec]) -> str:
+    field = cls.model_fields.get("kind")
+    return "" if field is None else str(next(iter(get_args(field.annotation)), ""))
 
 
 def one_of(*words: str, planned: Sequence[str] = (), meant: Mapping[str, str] | None = None) -> Callable[[str], str]:

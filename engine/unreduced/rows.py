@@ -18,8 +18,6 @@ from results_schema.errors import BadInput
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-RATES = ("velocity", "acceleration")
-
 
 class Along(NamedTuple):
     """Riders at stations, all (S, R): places m, their first and second derivative by time, and whether they are on
@@ -175,9 +173,9 @@ def readings(model: Unreduced, along: Along) -> Readings:
     for name, sensor in model.study.sensor.items():
         parts = _parts(model, name, sensor, along)
         forces, added = np.zeros((count, ties)), np.zeros(count)
-        if sensor.quantity == "contact_force":
+        if sensor.reads.of_contact:
             forces[:] = [_counts(tie, sensor) for tie in model.ties]
-        elif sensor.carriage is None and sensor.quantity not in RATES:
+        elif sensor.carriage is None and not sensor.reads.rate:
             forces, added = _between_ends(model, name, sensor, along)
         found.append((parts.u.freedoms, parts.u.values, parts.v, parts.a, forces, added))
     columns = zip(*found, strict=True) if found else [[]] * 6
@@ -201,31 +199,31 @@ def _place(model: Unreduced, sensor: Sensor, along: Along) -> tuple[Array, int |
 def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     count = len(along.s)
     none = np.zeros((count, WIDTH))
-    if sensor.quantity == "contact_force":
+    if sensor.reads.of_contact:
         return _Parts(no_rows(count), none, none)
     if sensor.carriage is not None:
         rows = no_rows(count)
         rows.freedoms[:] = model.sprung[sensor.carriage]
         rows.values[:, 0] = 1.0
-        order = ("displacement", *RATES).index(sensor.quantity)
-        on = [rows.values if order == k else none for k in range(3)]
+        on = [rows.values if sensor.reads.rate == k else none for k in range(3)]
         return _Parts(Rows(rows.freedoms, on[0]), on[1], on[2])
     body = model.study.body_of(name)
     track, first = model.bodies[body].track, model.firsts[body]
     place, rider = _place(model, sensor, along)
-    if sensor.quantity not in ("displacement", *RATES):
+    rate = sensor.reads.rate
+    if sensor.reads.of_section:
         moved, inertia = track.sections(sensor.quantity, place)
         return _Parts(moved.moved(first), none, inertia.values)
     shape = _wide(track.rows(place).moved(first))
-    if sensor.quantity == "displacement":
+    if rate == 0:
         return _Parts(shape, none, none)
     on_u, on_v, on_a = none, none, shape.values
-    if sensor.quantity == "velocity":
+    if rate == 1:
         on_v, on_a = shape.values, none
     if rider is not None:
         slope, bend = (_wide(track.rows(place, order)).values for order in (1, 2))
         ds, dds = along.ds[:, rider, None], along.dds[:, rider, None]
-        if sensor.quantity == "velocity":
+        if rate == 1:
             on_u = ds * slope
         else:
             on_u, on_v = ds**2 * bend + dds * slope, 2.0 * ds * slope
@@ -237,7 +235,7 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
     body = model.study.body_of(name)
     track = model.bodies[body].track
     place, _ = _place(model, sensor, along)
-    section = sensor.quantity != "displacement"
+    section = sensor.reads.of_section
     forces = np.zeros((len(along.s), len(model.ties)))
 
     def adds(s: Array) -> Array:

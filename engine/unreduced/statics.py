@@ -72,7 +72,7 @@ def level_readings(model: Unreduced) -> Array:
     state, forces = level_state(model)
     found = readings(model, nowhere(model)).at_rest(state[None], forces[None])[0]
     rides = [
-        sensor.quantity != "contact_force" and (sensor.carriage is not None or model.study.body_of(name) in model.loose)
+        not sensor.reads.of_contact and (sensor.carriage is not None or model.study.body_of(name) in model.loose)
         for name, sensor in model.study.sensor.items()
     ]
     return np.where(np.array(rides, dtype=np.bool_), found, 0.0)

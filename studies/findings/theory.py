@@ -89,7 +89,7 @@ def frequency_ratio(results: Results) -> Any:
 def cycle_frequency(results: Results) -> Any:
     """Cycles per second of the first carriage's motion."""
     motion, key = results.carriage.motion, f"carriage.{results.carriage_name}.motion"
-    if hasattr(motion, "frequency"):
+    if motion.pace == "frequency":
         return results.parameter(f"{key}.frequency")
     return results.parameter(f"{key}.speed") / motion.max_speed
 
@@ -128,7 +128,7 @@ def body_mass(results: Results, name: str) -> float:
     from engine.bodies.build import build_body
 
     recorded = results.recorded(name)
-    return float(build_body(results.study.body[name]).modal.mass if recorded is None else recorded["mass"])
+    return float(build_body(results.study.body[name]).mass if recorded is None else recorded["mass"])
 
 
 def _rigid_modes(results: Results) -> int:
@@ -157,23 +157,20 @@ def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
 def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
     beam from one end to the other and the sensor is at midspan."""
-    from engine.bodies import Beam
-    from engine.scene.motions import Sinusoidal
-
     body, motion = results.study.body[results.carriage.on], results.carriage.motion
     mass = _coordinate(results, "mass_ratio")
     swept = {path for axis in results.axes for path in axis.paths}
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
-    if mass is None or swept & fixed or not isinstance(motion, Sinusoidal):
+    if mass is None or swept & fixed or not motion.is_harmonic:
         return None
     if results.carriage.masses != ("mass",):  # a spring keeps part of the mass from following
         return None
-    if not isinstance(body, Beam) or body.supports != "pinned-pinned":
+    if not body.is_simply_supported:
         return None
-    at = results.study.sensor[sensor].at
-    if at is None or motion.amplitude < LONG_SWING * body.length:
+    at, (low, high) = results.study.sensor[sensor].at, motion.range()
+    if at is None or 0.5 * (high - low) < LONG_SWING * body.length:
         return None
-    if max(abs(place / body.length - 0.5) for place in (at, motion.centre)) > NEARLY:
+    if max(abs(place / body.length - 0.5) for place in (at, 0.5 * (low + high))) > NEARLY:
         return None
     return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
 
@@ -181,18 +178,16 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
 def end_spring_difference(results: Results, sensor: str) -> Array | None:
     """(E I/L^3)|1/k_a - 1/k_b| for every variant; None unless a beam stands on two springs at its ends and the sensor
     is at midspan. One peak per slow cycle instead of two where it is above 1/8."""
-    from engine.bodies import Beam
-
     name = results.carriage.on
     body, at = results.study.body[name], results.study.sensor[sensor].at
     key = f"body.{name}"
     varied = any(path == f"{key}.length" or path.endswith(".at") for axis in results.axes for path in axis.paths)
-    if not isinstance(body, Beam) or isinstance(body.supports, str) or len(body.supports) != 2 or varied or at is None:
+    if len(body.springs) != 2 or varied or at is None:
         return None
-    ends = sorted(spring.at for spring in body.supports)
+    ends = sorted(spring.at for spring in body.springs)
     if ends != [0.0, body.length] or abs(at / body.length - 0.5) > NEARLY:
         return None
-    if any(spring.rotational for spring in body.supports):
+    if any(spring.rotational for spring in body.springs):
         return None
     first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
     bending: Any = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
+from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
 from studies.findings import indices, theory
@@ -32,10 +33,6 @@ THRESHOLDS = (0.01, 0.05)
 CLOSE = 0.05
 LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
 MOST_SENSORS = 3
-STATIC_QUANTITIES = (
-    *("displacement", "bending_moment", "shear_force", "axial_force", "stress", "strain"),
-    "contact_force",
-)
 REMAINDER = "exp(−ζ ω₁ T (cycles − 1)) with the time T of a cycle"
 
 RESULTS = (
@@ -89,22 +86,18 @@ class AsymmetryReduction:
 
     def __call__(self, cycle: Cycle) -> dict[str, indices.Array]:
         """The indices, each (V, J)."""
-        from engine.scene.motions import OutAndBack
-
-        motion = cycle.motion
-        assert isinstance(motion, OutAndBack)
+        way = cycle.motion.legs
+        assert way is not None
         fields = (indices.evenly(cycle.phase, field) for field in (cycle.history, cycle.static, cycle.static_slope))
-        legs = indices.folded(motion.cruise_part(), *fields)
-        found = indices.asymmetry(legs, 1.0 if motion.end > motion.start else -1.0)
+        legs = indices.folded(way.cruise, *fields)
+        found = indices.asymmetry(legs, 1.0 if way.end > way.start else -1.0)
         return {name: value.T for name, value in found._asdict().items()}
 
     def differences(self, compared: Compared) -> dict[str, Array]:
         """Lag over the length of the cruise; odd and even parts, which are parts of the static range."""
-        from engine.scene.motions import OutAndBack
-
-        motion = next(iter(compared.values.study.carriage.values())).motion
-        assert isinstance(motion, OutAndBack)
-        lag = compared.gap("lag") / (abs(motion.end - motion.start) * (1.0 - 2.0 * motion.turn))
+        way = next(iter(compared.values.study.carriage.values())).motion.legs
+        assert way is not None
+        lag = compared.gap("lag") / (abs(way.end - way.start) * (1.0 - 2.0 * way.turn))
         least = compared.of_readings(np.zeros_like(compared.scale))
         rms = {name: np.maximum(compared.gap(name), least) for name in ("odd_rms", "even_excess")}
         return {"lag": lag, "loop_area": compared.gap("loop_area")} | rms
@@ -119,10 +112,8 @@ class Asymmetry:
 
     def check(self, study: Study) -> None:
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
-        from engine.scene.motions import OutAndBack
-
         name, carriage = first_carriage(study)
-        if not isinstance(carriage.motion, OutAndBack):
+        if carriage.motion.legs is None:
             raise BadInput(
                 "forward and backward need a motion that comes back",
                 where=study.source.where(f"carriage.{name}.motion.kind"),
@@ -133,11 +124,11 @@ class Asymmetry:
         if not study.sensor:
             raise BadInput("nothing is measured", where=study.source.where("sensor"), expected="at least one sensor")
         for sensor, place in study.sensor.items():
-            if place.quantity not in STATIC_QUANTITIES:
+            if QUANTITIES[place.quantity].rate:
                 raise BadInput(
                     "an asymmetry compares with the static response, which this quantity does not have",
                     where=study.source.where(f"sensor.{sensor}.quantity"),
-                    expected=" | ".join(STATIC_QUANTITIES),
+                    expected=" | ".join(name for name, quantity in QUANTITIES.items() if not quantity.rate),
                     received=f'"{place.quantity}"',
                 )
 

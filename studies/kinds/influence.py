@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
+from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import check_held, pieces_of
@@ -34,7 +35,6 @@ Array = NDArray[np.float64]
 
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
-MOVING = ("velocity", "acceleration")
 
 _AT_REST = "at rest under gravity and the carriages' weights and forces"
 RESULTS = (
@@ -133,7 +133,7 @@ class Influence:
         first_carriage(study)
         check_sensors(study)
         for name, sensor in study.sensor.items():
-            if sensor.quantity in MOVING:
+            if QUANTITIES[sensor.quantity].rate:
                 raise BadInput(
                     "this quantity has no static reading",
                     where=study.source.where(f"sensor.{name}.quantity"),

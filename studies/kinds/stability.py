@@ -88,7 +88,7 @@ def _check_scene(study: Study) -> None:
     ((name, carriage),) = study.carriage.items()
     _check_carriage(study, name, carriage)
     body, here = study.body[carriage.on], f"body.{carriage.on}"
-    if getattr(body, "own_weight", False):
+    if body.own_weight:
         where = study.source.where(f"{here}.own_weight")
         raise BadInput("the maps leave the body's own weight out", where=where, expected="own_weight = false")
     if any(coefficient > 0.0 for _, _, coefficient in body.dampers()):
@@ -113,7 +113,7 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     if carriage.masses != ("mass",):
         where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
         raise BadInput("the maps know rigid masses only", where=where, expected=expected)
-    if getattr(carriage.motion, "kind", "") != "cruise":
+    if not carriage.motion.passes:
         where, expected = study.source.where(f"carriage.{name}.motion.kind"), '"cruise"'
         raise BadInput("the maps start from a passage", where=where, expected=expected)
 

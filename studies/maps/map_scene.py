@@ -47,12 +47,12 @@ class Ground:
     @property
     def is_pinned(self) -> bool:
         """Whether the closed forms for a beam pinned at both ends hold."""
-        return getattr(self.study.body[self.body], "supports", None) == "pinned-pinned"
+        return self.study.body[self.body].is_simply_supported
 
     @property
     def length(self) -> float:
         """Length of the track, m."""
-        return float(getattr(self.study.body[self.body], "length"))  # noqa: B009
+        return self.study.body[self.body].length
 
     @property
     def is_loose(self) -> bool:
@@ -67,7 +67,8 @@ class Ground:
     @property
     def speed_ratio(self) -> float:
         """The carriage's speed over omega_1 L/pi."""
-        return float(getattr(self._carriage.motion, "speed", 0.0)) * math.pi / (self._own.first_omega * self.length)
+        speed = float(self.study.value(f"carriage.{next(iter(self.study.carriage))}.motion.speed"))
+        return speed * math.pi / (self._own.first_omega * self.length)
 
     @property
     def weight(self) -> float:
@@ -127,7 +128,7 @@ class MapScene:
 
         key = f"carriage.{CARRIAGE}"
         columns = {f"{key}.mass": mass * self.model.leading_body.modal.mass}
-        if pace is not None and hasattr(self.study.carriage[CARRIAGE].motion, "speed"):
+        if pace is not None and self.study.carriage[CARRIAGE].motion.pace == "speed":
             columns[f"{key}.motion.speed"] = pace * self.speed_unit
         elif pace is not None:
             columns[f"{key}.motion.frequency"] = pace * self.model.first_omega / (2.0 * math.pi)

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from engine.scene.motions import OutAndBack
 from studies.findings import theory
 from studies.pictures.common.figures import (
     BESIDE,
@@ -99,19 +98,19 @@ def _draw_ways(results: Results, sensor: str, index: Index, axes: Sequence[Axes]
     units = results.sensors[sensor]
     out, back = there_and_back(over_position(results, sensor, index))
     odd = odd_part(out, back)
-    motion = results.carriage_at(index).motion
-    assert isinstance(motion, OutAndBack)
+    way = results.carriage_at(index).motion.legs
+    assert way is not None
     scale = scale_for(float(np.abs(out.values).max()), units)
     small = scale_for(float(np.abs(odd.values).max()), units)
     axes[0].plot(out.position, out.values * scale.factor, color=BLUE, label="forward")
     axes[0].plot(back.position, back.values * scale.factor, color=VERMILION, linestyle=(0, (4, 1.5)), label="backward")
     axes[1].plot(odd.position, odd.values * small.factor, color=INK, linewidth=1.2)
     zero_line(axes[1])
-    depth = motion.turn * (motion.end - motion.start)
+    depth = way.turn * (way.end - way.start)
     for ax in axes:
-        for edge, inner in ((motion.start, motion.start + depth), (motion.end, motion.end - depth)):
+        for edge, inner in ((way.start, way.start + depth), (way.end, way.end - depth)):
             ax.axvspan(edge, inner, color=HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
-        ax.set_xlim(min(motion.start, motion.end), max(motion.start, motion.end))
+        ax.set_xlim(min(way.start, way.end), max(way.start, way.end))
     if units == "m":
         axes[0].invert_yaxis()
     axes[0].set_ylabel(f"{sensor} ({scale.unit})" if scale.unit else sensor)

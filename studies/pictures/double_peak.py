@@ -11,7 +11,6 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
-from engine.scene.motions import Sinusoidal
 from studies.findings import theory
 from studies.pictures.common.figures import (
     BLUE,
@@ -84,7 +83,7 @@ def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
         "The last cycle of kept histories, from slow to fast; dots: the peaks that count (prominence above 2 % of the "
         "cycle's range)."
     )
-    if isinstance(results.carriage.motion, Sinusoidal):
+    if results.carriage.motion.is_harmonic:
         caption += " The carriage is at the centre at phase 0 and 0.5, at its ends at the grey lines."
     height = 0.7 + 1.9 * len(sensors)
     return draw("cycle", "Response over a cycle", caption, height, partial(_draw_cycle, results, sensors, shown))
@@ -113,7 +112,7 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
     place = dict(zip(results.dims, index, strict=True))
     phase, peak = (results.of_sensor(name, sensor).isel(place).values for name in ("peak_phase", "peak_value"))
     axes.plot(phase, peak * scale.factor, "o", color=VERMILION, zorder=3)
-    if isinstance(results.carriage.motion, Sinusoidal):
+    if results.carriage.motion.is_harmonic:
         for end in (0.25, 0.75):
             axes.axvline(end, color=MUTED, linewidth=0.7, zorder=1)
     axes.set_xlim(0.0, 1.0)

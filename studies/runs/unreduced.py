@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from results_schema.variables import QUANTITY_UNITS, axes, declarations, sensor_unit
+from results_schema.variables import axes, declarations, sensor_unit
 from studies.protocol.measuring import described
 from studies.results.formatting import counted, listed, percent
 from studies.results.results import Results, spread
@@ -123,7 +123,7 @@ def _gaps(one: Compared) -> dict[str, Array]:
 
 def _scales(one: Compared) -> Array:
     """(J,) largest values; of forces the largest of all, beside which one may be rounding as a whole."""
-    found, forces = _largest(one.unreduced), [QUANTITY_UNITS[q] == "N" for q in one.quantities.values()]
+    found, forces = _largest(one.unreduced), [sensor_unit(q) == "N" for q in one.quantities.values()]
     return np.where(forces, found.max(initial=0.0, where=forces), found)
 
 

@@ -49,7 +49,7 @@ def only_body(table: dict[str, Any]) -> Body:
 
 def modes_of(found: Body) -> int:
     """Modes of a body as it is built."""
-    return int(build_body(found).modal.omega.size)
+    return int(build_body(found).omega.size)
 
 
 def test_modes_of_a_beam() -> None:

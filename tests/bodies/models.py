@@ -16,7 +16,8 @@ from engine.bodies.files.child_process import READERS
 from engine.bodies.files.model import FileModel
 from engine.bodies.files.reader import Request
 from engine.bodies.frame.assembly import Assembly, assemble
-from engine.bodies.frame.frame import DIRECTIONS, Frame
+from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.geometry import DIRECTIONS
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH

@@ -43,7 +43,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequ
 
 @pytest.fixture(scope="module")
 def beam() -> ModalBody:
-    return build_body(Ansys.model_validate(TABLE)).modal
+    return build_body(Ansys.model_validate(TABLE))
 
 
 def test_frequencies(beam: ModalBody) -> None:

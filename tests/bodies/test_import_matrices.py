@@ -48,7 +48,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequ
 
 
 def modal(table: Any) -> ModalBody:
-    return build_body(Matrices.model_validate(table)).modal
+    return build_body(Matrices.model_validate(table))
 
 
 def test_the_frames_own_modes_and_influence_lines(files: Files) -> None:

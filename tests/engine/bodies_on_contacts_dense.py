@@ -42,7 +42,7 @@ class Twin:
         (self.name, carriage), *_ = study.carriage.items()
         spec: Any = carriage
         self.study, self.motion = study, spec.motion
-        self.bed, self.table = (build_body(study.body[name]).modal for name in (spec.on, spec.body))
+        self.bed, self.table = (build_body(study.body[name]) for name in (spec.on, spec.body))
         self.own_weight = study.body[spec.on].own_weight
         reference = 0.5 * self.table.length if spec.reference is None else spec.reference
         self.contacts = []

@@ -28,7 +28,7 @@ class Company:
 
     def __init__(self, study: Study) -> None:
         self.study, self.carriages = study, dict[str, Any](study.carriage)
-        self.modal = {name: build_body(body).modal for name, body in study.body.items()}
+        self.modal = {name: build_body(body) for name, body in study.body.items()}
         sizes = [modal.omega.size for modal in self.modal.values()]
         ends = np.cumsum([0, *sizes])
         self.slices = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(self.modal)}

@@ -124,7 +124,7 @@ def strut(**more: Any) -> dict[str, Any]:
 
 def test_lines_of_many_places_are_those_of_each() -> None:
     """All places with all loads at once, against pairs; loads at joints, at the places, and at both ends."""
-    modal = build_body(Frame.model_validate(strut())).modal
+    modal = build_body(Frame.model_validate(strut()))
     x = np.array([0.0, 0.7, 2.5, 3.1, 5.0])
     s = np.sort(np.concatenate([np.linspace(0.0, 5.0, 37), x]))
     pairs = np.repeat(x, s.size), np.tile(s, x.size)

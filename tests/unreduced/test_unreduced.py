@@ -174,7 +174,7 @@ def test_static_deflection_is_the_influence_line() -> None:
     quantities = ("displacement", "bending_moment", "shear_force", "stress")
     sensors = {f"{q}{i}": fixed(x, q) for q in quantities for i, x in enumerate(at)}
     given = scene(frame(7), {"car": force(3.0, cruise(0.0, 1.0, 0.5))}, sensor=sensors)
-    body = build_body(given.body["bed"]).modal
+    body = build_body(given.body["bed"])
     assert body.sections is not None
     lines = [body.influence(at, places), *(body.sections.influence_at(q, at[:, None], places) for q in quantities[1:])]
     found = unreduced_statics(unreduced_model(given), places)[0]
@@ -188,7 +188,7 @@ def test_a_rigid_table_stands_by_the_lever_rule() -> None:
     weight = RIGID["mass"] * GRAVITY
     front, rear = weight * (0.23 - 0.05) / 0.3, weight * (0.35 - 0.23) / 0.3
     np.testing.assert_allclose(forces, [[front, rear]] * 2, rtol=1e-12)
-    body = build_body(model.study.body["bed"]).modal
+    body = build_body(model.study.body["bed"])
     line = body.influence([0.61, 0.3 + 0.15, 0.3 - 0.15], [0.3 + 0.15, 0.3 - 0.15]) @ [front, rear]
     np.testing.assert_allclose(sensors[0, 0], line[0], rtol=1e-10)
     aboard = line[2] + (line[1] - line[2]) * (0.23 - 0.05) / 0.3  # a straight line through both shoes
@@ -203,7 +203,7 @@ def test_three_shoes_share_by_stiffness() -> None:
     model = unreduced_model(with_table(RIGID, swing(0.5, 0.2, 0.5, 1), READ, contacts=shoes))
     _, forces = unreduced_statics(model, [0.4])
     at = 0.4 + np.array([-0.15, 0.0, 0.15])
-    soft = build_body(model.study.body["bed"]).modal.influence(at, at) + np.diag(1.0 / np.array([200.0, 150.0, 250.0]))
+    soft = build_body(model.study.body["bed"]).influence(at, at) + np.diag(1.0 / np.array([200.0, 150.0, 250.0]))
     motion = np.array([[1.0, x - 0.23] for x in (0.05, 0.2, 0.35)])
     matrix = np.block([[soft, -motion], [motion.T, np.zeros((2, 2))]])
     expected = np.linalg.solve(matrix, [0.0, 0.0, 0.0, RIGID["mass"] * GRAVITY, 0.0])[:3]
@@ -214,7 +214,7 @@ def test_frequencies_of_a_rigid_table_on_a_beam() -> None:
     """Against all exact modes of the beam, coupled with heave and pitch."""
     given = scene(beam(), {"car": riding(swing(0.5, 0.2, 0.5, 1))}, body={"bed": beam(), "table": RIGID}, sensor=READ)
     found = unreduced_frequencies(unreduced_model(given), [0.37], 6)[0]
-    body = build_body(given.body["bed"].model_copy(update={"modes": 60})).modal
+    body = build_body(given.body["bed"].model_copy(update={"modes": 60}))
     shapes = body.shape([0.37 + 0.15, 0.37 - 0.15])
     rows = np.hstack([shapes, -np.array([[1.0, 0.12], [1.0, -0.18]]) / np.sqrt([RIGID["mass"], RIGID["inertia"]])])
     whole = np.diag(np.concatenate([body.omega**2, [0.0, 0.0]])) + 200.0 * rows.T @ rows
@@ -228,7 +228,7 @@ def test_frequencies_with_masses(elements: int) -> None:
     carriages = {"car": mass(0.3, cruise(0.0, 1.0, 0.5)), "next": oscillator(0.6, 40.0, cruise(0.0, 1.0, 0.5))}
     given = scene(frame(elements), carriages)
     found = unreduced_frequencies(unreduced_model(given), [[0.37, 0.6]], 5)[0]
-    body = build_body(given.body["bed"]).modal
+    body = build_body(given.body["bed"])
     row, spring = np.append(body.shape([0.37])[0], 0.0), np.append(body.shape([0.6])[0], -1.0)
     inertia = np.diag(np.append(np.ones(body.omega.size), 0.6)) + 0.3 * np.outer(row, row)
     whole = np.diag(np.append(body.omega**2, 0.0)) + 40.0 * np.outer(spring, spring)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, Tag
 
-from engine.bodies.modal.description import MAX_MODES, Body, Rayleigh
+from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
@@ -94,6 +96,10 @@ class Beam(Body):
         return () if isinstance(self.supports, str) else self.supports
 
     @property
+    def is_simply_supported(self) -> bool:
+        return self.supports == "pinned-pinned"
+
+    @property
     def untold(self) -> tuple[str, ...]:
         return ("axial_force",)  # loads act across it
 
@@ -104,6 +110,21 @@ class Beam(Body):
     @property
     def modes_are_open(self) -> bool:
         return self.modes == "auto"
+
+    def build(self) -> ModalBody:
+        from engine.bodies.beam import modes
+
+        properties = modes.BeamProperties(
+            length=self.length,
+            area=self.area,
+            second_moment=self.second_moment,
+            youngs_modulus=self.youngs_modulus,
+            density=self.density,
+            ends=self.ends,
+            supports=tuple(modes.Spring(s.at, s.stiffness, s.rotational, s.damping) for s in self.springs),
+            fibre_distance=math.nan if self.fibre_distance is None else self.fibre_distance,
+        )
+        return modes.uniform_beam(properties, AUTO_MODES if self.modes == "auto" else int(self.modes))
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]

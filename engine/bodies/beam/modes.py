@@ -43,6 +43,7 @@ class BeamProperties:
     density: float
     ends: tuple[str, str] | None = None
     supports: tuple[Spring, ...] = ()
+    fibre_distance: float = math.nan
 
     def __post_init__(self) -> None:
         for name in ("length", "area", "second_moment", "youngs_modulus", "density"):
@@ -117,6 +118,8 @@ def uniform_beam(properties: BeamProperties, modes: int) -> ModalBody:
         participation=_frozen(unit.integral * math.sqrt(mass)),
         wave_number=wave_number,
         bending_stiffness=stiffness,
+        second_moment=properties.second_moment,
+        fibre_distance=properties.fibre_distance,
         dampers=tuple((spring.at, spring.damping) for spring in properties.supports if spring.damping > 0.0),
         shapes=BeamShapes(length, mass, unit),
         statics=beam_statics(length, stiffness, line_mass, restraints),

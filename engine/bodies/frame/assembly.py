@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine.bodies.frame.elements import Beams, consistent_mass, lumped_mass, stiffness
-from engine.bodies.frame.frame import DIRECTIONS, Frame
+from engine.bodies.frame.geometry import DIRECTIONS
 from engine.bodies.frame.refusals import member_axes, member_ends
 from engine.bodies.modal.modal_body import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
+
+    from engine.bodies.frame.frame import Frame
 
 Counts = NDArray[np.int64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
-from engine.bodies.frame.frame import Frame
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.points import frame_points, point_loads
 from engine.bodies.frame.sections import TrackSections
@@ -23,6 +23,9 @@ from engine.bodies.modal.modal_body import Array, ModalBody, Shapes
 from engine.linear_algebra import one_thread
 from engine.study_file.document import shortened
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
 
 _UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
 

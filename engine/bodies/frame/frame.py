@@ -13,9 +13,10 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
-from engine.bodies.frame.geometry import TrackLine
+from engine.bodies.frame.geometry import DIRECTIONS, TrackLine
 from engine.bodies.frame.refusals import check_frame, track_line
 from engine.bodies.modal.description import Body
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
@@ -35,7 +36,6 @@ from engine.study_file.units import (
     fault,
 )
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 MAX_ELEMENTS = 1000
 MAX_COORDINATE = 1e9
 MAX_POINTS = 50
@@ -277,6 +277,11 @@ class Frame(Body):
             update={"fixed_interface_modes": min(times * self.fixed_interface_modes, MAX_FIXED_INTERFACE_MODES)}
         )
         return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
+
+    def build(self) -> ModalBody:
+        from engine.bodies.frame.body import frame_body
+
+        return frame_body(self)
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         found: list[tuple[str, float | str, float]] = []

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 PARALLEL = 1e-6  # sine of the angle below which two directions are one
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  # of a node's degrees of freedom
 SAME_PLACE = 1e-9  # distance over length below which two points are one
 
 

@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from engine.bodies.frame.assembly import Assembly, spring_rows
-from engine.bodies.frame.frame import DIRECTIONS, Frame
-from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.track import TrackPoints
 from engine.bodies.modal.flexibility import Flexibility
 from engine.bodies.modal.modal_body import Array
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from engine.bodies.beam.statics import stations
 from engine.bodies.frame.assembly import Mesh, cross_matrix
 from engine.bodies.frame.elements import SIGN_Y, SIGN_Z, Beams, deflection_shapes
-from engine.bodies.frame.frame import Frame
 from engine.bodies.modal.modal_body import Array
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
 
 Counts = NDArray[np.int64]
 _END = 1e-12  # lengths before the end of a track that are its end

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.checks import findings
-from engine.bodies.imported.imported import Imported, Recovering
 from engine.bodies.imported.line import LinePoints, LineShapes, LineStatics, LineStress, NoSections
 from engine.bodies.imported.model import HeldModel, held_model
 from engine.bodies.imported.rows import node_rows, track_rows
@@ -21,6 +20,9 @@ from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.linear_algebra import one_thread
 from engine.study_file.document import shortened
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.bodies.imported.imported import Imported
 
 MOST_SAMPLES = 4001  # places where the wave numbers of shapes are read
 _COLUMNS = 64
@@ -184,10 +186,10 @@ def _points(
 
 def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> NoSections:
     """Stress along the track where the body has a recovery matrix: means of rows at the track's nodes."""
-    if not isinstance(body, Recovering) or body.stress_rows is None:
+    if body.rows_of_stress is None:
         return NoSections()
     shapes, rows, slopes, pull, loads = parts
-    told = np.array([held.recovery[np.array(one) - 1].mean(axis=0) for one in body.stress_rows])
+    told = np.array([held.recovery[np.array(one) - 1].mean(axis=0) for one in body.rows_of_stress])
     moved = held.flexibility.solve(np.ascontiguousarray(told.T))
     return LineStress(
         statics=statics,

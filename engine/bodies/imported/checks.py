@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.imported import Imported
 from engine.bodies.imported.line import LineShapes
 from engine.bodies.imported.model import HeldModel
 from engine.bodies.imported.rows import SPLINE_NODES, by_rotations, node_rows, spline_slopes
 from engine.bodies.modal.modal_body import Array
+
+if TYPE_CHECKING:
+    from engine.bodies.imported.imported import Imported
 
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought

@@ -15,15 +15,17 @@ from pydantic import AfterValidator, ConfigDict, Field, Strict, ValidationInfo, 
 from engine.bodies.files.model import Counts, FileModel
 from engine.bodies.files.reader import Request, read_files, role_of
 from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
-from engine.bodies.frame.frame import DIRECTIONS, Place, Support, Vector
-from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.frame import Place, Support, Vector
+from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
 from results_schema.errors import BadInput
+from results_schema.quantities import OF_SECTION
 
 MAX_POINTS = 50
 MAX_TRACK = 1000
@@ -125,7 +127,12 @@ class Imported(Body):
 
     @property
     def untold(self) -> tuple[str, ...]:
-        return ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+        return OF_SECTION if self.rows_of_stress is None else tuple(word for word in OF_SECTION if word != "stress")
+
+    @property
+    def rows_of_stress(self) -> tuple[tuple[int, ...], ...] | None:
+        """For each node of the track the rows of the recovery matrix whose mean is its stress; None without one."""
+        return None
 
     @cached_property
     def content(self) -> str:
@@ -204,6 +211,11 @@ class Imported(Body):
         support = self.supports[text]
         return _HOLDS[support] if isinstance(support, str) else support
 
+    def build(self) -> ModalBody:
+        from engine.bodies.imported.body import imported_body
+
+        return imported_body(self)
+
     def checks(self, here: str) -> list[Check]:
         return []
 
@@ -221,8 +233,8 @@ class Recovering(Imported):
     )
 
     @property
-    def untold(self) -> tuple[str, ...]:
-        return tuple(word for word in super().untold if word != "stress" or self.stress_rows is None)
+    def rows_of_stress(self) -> tuple[tuple[int, ...], ...] | None:
+        return self.stress_rows
 
     @model_validator(mode="after")
     def _rows(self) -> Recovering:

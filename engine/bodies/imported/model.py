@@ -13,13 +13,14 @@ import numpy as np
 
 from engine.bodies.files.model import FileModel
 from engine.bodies.frame.assembly import cross_matrix
-from engine.bodies.imported.imported import Imported
 from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from engine.bodies.imported.imported import Imported
 
     Counts = NDArray[np.int64]
 

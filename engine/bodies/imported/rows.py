@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.imported import Imported
 from engine.bodies.imported.model import HeldModel
 from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.bodies.imported.imported import Imported
 
 SPLINE_NODES = 4  # a spline with a third derivative
 _SQUARE = 1e-6  # cosine of the angle between track and load above which stretching along the track counts

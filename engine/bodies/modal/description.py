@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr, Strict, Tag
 
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside
 from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form
@@ -48,6 +49,15 @@ class Body(Spec):
 
     names_files: ClassVar[bool] = False
     _recorded: Recorded | None = PrivateAttr(default=None)
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
+
+        @property
+        def length(self) -> float:
+            """Of its track, m."""
 
     damping_ratio: DampingRatio = 0.0
     modes: Modes = "auto"
@@ -64,8 +74,22 @@ class Body(Spec):
         return self._recorded is not None
 
     @abstractmethod
+    def build(self) -> ModalBody:
+        """The body in modal coordinates. Raises BadInput, with the key within the body as its place."""
+
+    @abstractmethod
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""
+
+    @property
+    def is_simply_supported(self) -> bool:
+        """Whether it is a uniform beam pinned at both ends."""
+        return False
+
+    @property
+    def springs(self) -> tuple[Any, ...]:
+        """The springs on which a uniform beam stands instead, each with `at`, `stiffness` and `rotational`."""
+        return ()
 
     @property
     def lacks_for_stress(self) -> str:

@@ -84,6 +84,7 @@ class ModalBody:
     wave_number         (N,) 1/m, of each mode (N pi/L for a pinned beam), for the alias rule of moving loads
     bending_stiffness   E I, N m^2: moment = -E I w'' (positive when it sags), shear = dM/ds = -E I w'''; NaN where
                         it varies along the track
+    second_moment       m4, fibre_distance m: of a uniform beam; NaN where there is none
     dampers             (at, coefficient) pairs, m and N s/m: discrete dampers, which become ties to ground
     shapes, statics     where the functions of place come from
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
@@ -102,6 +103,8 @@ class ModalBody:
     shapes: Shapes
     statics: Statics
     gravity_share: float = 1.0
+    second_moment: float = np.nan
+    fibre_distance: float = np.nan
     sections: Sections | None = None
     points: Points | None = None
     checks: tuple[tuple[str, str], ...] = ()

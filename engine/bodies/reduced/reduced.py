@@ -12,6 +12,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from engine.bodies.frame.refusals import refuse
 from engine.bodies.modal.description import Body
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
 from results_schema.errors import WanderlastError
@@ -78,6 +79,11 @@ class Reduced(Body):
         return self.model_copy(
             update={"modes": min(times * int(self.modes), read_body(self.file).arrays["omega"].size)}
         )
+
+    def build(self) -> ModalBody:
+        from engine.bodies.reduced.body import load_body
+
+        return load_body(self.file, self.modes)
 
     def checks(self, here: str) -> list[Check]:
         return []

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from engine.bodies.modal.modal_body import Array, ModalBody
-from engine.bodies.rigid.rigid import Rigid
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.bodies.rigid.rigid import Rigid
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class RigidStatics:
 def rigid_body(body: Rigid) -> ModalBody:
     """The two modes of a rigid body.
 
+    >>> from engine.bodies.rigid.rigid import Rigid
     >>> table = rigid_body(Rigid(kind="rigid", length=2.0, mass=4.0, inertia=9.0))
     >>> table.shape([0.0, 1.0]).tolist()
     [[0.5, -0.3333333333333333], [0.5, 0.0]]

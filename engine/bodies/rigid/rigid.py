@@ -7,8 +7,10 @@ from typing import Literal
 from pydantic import Field
 
 from engine.bodies.modal.description import Body
+from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Inertia, Length, Mass
+from results_schema.quantities import OF_SECTION
 
 
 class Rigid(Body):
@@ -26,7 +28,7 @@ class Rigid(Body):
 
     @property
     def untold(self) -> tuple[str, ...]:
-        return ("bending_moment", "shear_force", "axial_force", "stress", "strain")
+        return OF_SECTION
 
     @property
     def centre_of_mass(self) -> float:
@@ -36,6 +38,11 @@ class Rigid(Body):
     def with_modes(self, count: int) -> Rigid:
         """Itself: it has no modes that bend."""
         return self
+
+    def build(self) -> ModalBody:
+        from engine.bodies.rigid.body import rigid_body
+
+        return rigid_body(self)
 
     def checks(self, here: str) -> list[Check]:
         if self.centre is None:

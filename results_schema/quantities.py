@@ -1,0 +1,92 @@
+"""What a sensor can read: one row for every quantity, from which everything else follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from results_schema.pieces import Pieces, no_row_of
+
+
+class UniformSection(Protocol):
+    """The section of a uniform beam; NaN where there is none."""
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E I, N m2."""
+
+    @property
+    def second_moment(self) -> float:
+        """m4."""
+
+    @property
+    def fibre_distance(self) -> float:
+        """m."""
+
+
+def _one(section: UniformSection) -> float:
+    return 1.0
+
+
+def _bending(section: UniformSection) -> float:
+    return -section.bending_stiffness  # M = -E I w'', V = dM/ds
+
+
+def _strain(section: UniformSection) -> float:
+    return -section.fibre_distance
+
+
+def _stress(section: UniformSection) -> float:
+    return -section.bending_stiffness * section.fibre_distance / section.second_moment
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that sensors read: a derivative of the deflection w by the place along the track, or by time.
+
+    unit: CF. derivative: its order by the place; rate: by time, of the point that a sensor reads, wherever that moves.
+    factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
+    a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
+    of_contact: no motion, but the force between a carriage and its body. told: its error makes no status, as forces
+    that enter excite every mode. meant: other words for it.
+    """
+
+    name: str
+    unit: str
+    derivative: int = 0
+    rate: int = 0
+    factor: Callable[[UniformSection], float] = _one
+    of_section: bool = False
+    needs_fibre: bool = False
+    of_mass: bool = False
+    of_contact: bool = False
+    told: bool = False
+    meant: tuple[str, ...] = ()
+
+    @property
+    def has_kinks(self) -> bool:
+        """Whether its influence line has a kink or a jump where it is read."""
+        return self.of_section or self.derivative > 1
+
+
+_ROWS = (
+    Quantity("displacement", "m", of_mass=True, meant=("deflection",)),
+    Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
+    Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
+    Quantity("bending_moment", "N m", 2, factor=_bending, of_section=True, meant=("moment",)),
+    Quantity("shear_force", "N", 3, factor=_bending, of_section=True, meant=("shear",)),
+    Quantity("axial_force", "N", 1, of_section=True, meant=("normal_force",)),
+    Quantity("stress", "Pa", 2, factor=_stress, of_section=True, needs_fibre=True),
+    Quantity("strain", "1", 2, factor=_strain, of_section=True, needs_fibre=True),
+    Quantity("contact_force", "N", of_contact=True, told=True),
+)
+QUANTITIES = Pieces(
+    group="wanderlast.quantities",
+    noun="quantity",
+    own={row.name: row for row in _ROWS},
+    wanted="a Quantity of results_schema.quantities",
+    missing=no_row_of(Quantity),
+)
+OF_SECTION = tuple(row.name for row in _ROWS if row.of_section)
+MEANT = {word: row.name for row in _ROWS for word in row.meant}
