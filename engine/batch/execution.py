@@ -111,7 +111,7 @@ def warm_up(plan: Plan) -> None:
 
 def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
     """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
-    from engine.march.march import Halted
+    from engine.march.stepper import Halted
 
     try:
         plan.choose(lambda jobs: run_jobs(jobs, threads or os.cpu_count() or 1), partial(_any_set, (stop,)))
@@ -165,8 +165,8 @@ def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
 
 def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
-    from engine.march.march import Halted
     from engine.march.richardson import march_scheme
+    from engine.march.stepper import Halted
     from engine.march.tables import SceneTables
 
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)

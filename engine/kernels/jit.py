@@ -81,13 +81,13 @@ class Index(IndexDataCacheFile):
             super().save(key, data)
 
 
-def kernel(function: Callable[..., None]) -> Callable[..., None]:
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function by the project's policy, cached on disk; where the cache is damaged, anew."""
     compiled = numba.njit(cache=True, **_POLICY)(function)
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         compiled._cache._cache_file.__class__ = Index
         compiled._cache.load_overload = _mended(compiled._cache.load_overload)
-    return cast(Callable[..., None], compiled)
+    return cast(Callable[..., Any], compiled)
 
 
 def _mended(load: Callable[..., Any]) -> Callable[..., Any]:

@@ -128,6 +128,10 @@ class Record(NamedTuple):
 LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, BELOW_AT, SQUARES, SECONDS, BOUND, DIVERGED_AT, VALUE = range(10)
 STATISTICS = 10
 
+# what a kernel returns of every lane (blocks, LANES), the worst last: the values may be used; the iteration of a step
+# did not converge; a signal is beyond its bound or the state is not finite
+SOUND, NOT_CONVERGED, DIVERGED = range(3)
+
 
 class Impulse(NamedTuple):
     """An impulse on the body: ties that arrive or reverse at one instant, and all that are in contact then.

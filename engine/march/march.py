@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from engine.kernels.layout import (
     SMALLEST,
     SMALLEST_AT,
     STATISTICS,
-    Lanes,
     Observation,
     Record,
     State,
@@ -27,38 +27,44 @@ from engine.kernels.layout import (
 from engine.kernels.stepping.march import march_many, march_one
 from engine.kernels.stepping.start import solve_initial_acceleration, strike, watch_start
 from engine.march.initial_state import initial_state
+from engine.march.stepper import Codes, go
 from engine.march.tables import SceneTables, SegmentTable
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_blow
 from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import rows_sampled
+from results_schema.status import Status
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-DIVERGED = 1e6  # times its static value a signal has left every meaning
+MEANINGLESS = 1e6  # times its static value a signal counts as diverged
+#: Status of a variant by the code that the kernels return of its lane.
+STATUS = np.array([Status.OK, Status.NOT_CONVERGED, Status.DIVERGED], dtype=np.int8)
 
 
 @dataclass(frozen=True, eq=False)
 class Marched:
     """What a march of V variants leaves: statistics (J, STATISTICS, V) of all signals over the recorded part, of the
-    contact forces before it (C, STATISTICS, V), the samples of the first signals (H, S, V), and whether the final state
-    is finite (V,)."""
+    contact forces before it (C, STATISTICS, V), the samples of the first signals (H, S, V), and how it went (V,)."""
 
     statistics: Array
     unrecorded: Array
     history: Array
-    finite: NDArray[np.bool_]
+    status: NDArray[np.int8]
 
 
-class Halted(Exception):
-    """The march was asked to stop between two segments."""
+class Observed(NamedTuple):
+    """What is observed along a segment, and where it is kept."""
+
+    watch: Observation
+    record: Record
 
 
 @dataclass(frozen=True, eq=False)
 class March:
-    """A march that is ready to go: variants of one scene in blocks, their state and what is kept of them."""
+    """The stepper of bodies in modal coordinates: variants of one scene in blocks, and what is kept of them."""
 
     tables: SceneTables
     lanes: LaneTable
@@ -68,21 +74,24 @@ class March:
     unrecorded: Array
     history: Array
 
-    def go(self, halted: Callable[[], bool] = lambda: False) -> None:
-        """All segments, once. ``halted`` is asked after each; raises Halted when it says so."""
-        before = False
-        for segment in self.tables.timeline.segments:
-            table = self.tables.table(segment)  # built again each time where there are many
-            self._segment(segment, table, segment.fresh or (segment.recorded and not before))
-            before = segment.recorded
-            if halted():
-                raise Halted
+    def go(self, halted: Callable[[], bool] = lambda: False) -> Codes:
+        """All segments, once. Raises Halted."""
+        return go(self, self.tables.timeline.segments, halted)
 
-    def _segment(self, segment: Segment, table: SegmentTable, unseen: bool) -> None:
-        """The impulse and the new accelerations of a segment's event, its first station, its steps."""
-        model = self.tables.model
-        watch, record = self._observed(segment, table)
-        stepped = self.lanes.steps_of(self.step(segment))
+    def tabulate(self, segment: Segment) -> SegmentTable:
+        """The table of a segment, built again each time where there are many."""
+        return self.tables.table(segment)
+
+    def observe(self, segment: Segment, table: SegmentTable) -> Observed:
+        """What is observed along a segment, and where it is kept."""
+        if not segment.recorded:
+            record = Record(self.unrecorded, rows_sampled(segment, self.counts[:0]), self.history)
+            return Observed(table.unrecorded, record)
+        return Observed(table.watch, Record(self.statistics, rows_sampled(segment, self.counts), self.history))
+
+    def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
+        """The impulse and the new accelerations of a segment's event, and its first station."""
+        model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment))
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
             active[: len(model.carriages)] = segment.active[: len(model.carriages)]
@@ -91,11 +100,16 @@ class March:
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
         if segment.fresh:
             solve_initial_acceleration(table.ties, stepped, self.state)
-        if unseen:
-            watch_start(table.ties, stepped, self.state, watch, record, segment.first)
-        self._steps(segment, table.ties, stepped, watch, record)
+        if _unseen(segment, before):
+            watch_start(table.ties, stepped, self.state, *observed, segment.first)
 
-    def step(self, segment: Segment) -> Array:
+    def step(self, segment: Segment, table: SegmentTable, observed: Observed) -> Codes:
+        """The steps of a segment, from its station 0, which is settled and seen."""
+        stepped = self.lanes.steps_of(self.step_size(segment))
+        scheme = self.tables.scheme
+        return step_kernel(table.ties)(table.ties, stepped, self.state, *observed, scheme, segment.first)
+
+    def step_size(self, segment: Segment) -> Array:
         """(blocks, LANES) step of a segment in s; free vibration lasts some first periods of the body."""
         if not segment.free:
             return self.lanes.time_scale * segment.step
@@ -109,24 +123,22 @@ class March:
             if spring.carriage in arriving:
                 self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0
 
-    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Observation, Record]:
-        """What is observed along a segment, and where it is kept."""
-        if not segment.recorded:
-            return table.unrecorded, Record(self.unrecorded, rows_sampled(segment, self.counts[:0]), self.history)
-        return table.watch, Record(self.statistics, rows_sampled(segment, self.counts), self.history)
-
-    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Observation, record: Record) -> None:
-        """The steps of a segment, from its station 0, which is settled and seen."""
-        kernel = march_one if self.tables.model.ties == 1 else march_many
-        kernel(ties, stepped, self.state, watch, record, self.tables.scheme, segment.first)
-
-    def result(self, size: int) -> Marched:
-        """What the march of the first ``size`` variants left."""
-        finite = np.isfinite(self.state.q).all(axis=1) & np.isfinite(self.state.v).all(axis=1)
+    def result(self, codes: Codes, size: int) -> Marched:
+        """What the march of the first ``size`` variants left, whose lanes went by these codes."""
         statistics, unrecorded, history = (
             from_blocks(part, size) for part in (self.statistics, self.unrecorded, self.history)
         )
-        return Marched(statistics, unrecorded, history, finite.reshape(-1)[:size])
+        return Marched(statistics, unrecorded, history, STATUS[codes].reshape(-1)[:size])
+
+
+def step_kernel(ties: Ties) -> Callable[..., Codes]:
+    """The kernel that marches a segment with so many ties."""
+    return march_one if ties.rows.shape[2] == 1 else march_many
+
+
+def _unseen(segment: Segment, before: Segment | None) -> bool:
+    """Whether the first station of a segment was not observed as the last one of the segment before."""
+    return segment.fresh or (segment.recorded and not (before is not None and before.recorded))
 
 
 def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None = None) -> March:
@@ -153,8 +165,7 @@ def march(
 ) -> Marched:
     """Prepare, go, and return the result of the first ``size`` variants. Raises Halted."""
     prepared = prepare(tables, values, counts, sampled)
-    prepared.go(halted)
-    return prepared.result(size)
+    return prepared.result(prepared.go(halted), size)
 
 
 def _blank_statistics(blocks: int, signals: int) -> Array:
@@ -169,8 +180,8 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     model = tables.model
     own = sum(part.modal.mass for part in model.bodies if part.own_weight)
     weight = np.abs(lanes.weight[:, : len(model.carriages)]).sum(axis=1) + own * lanes.gravity
-    scale = tables.static_scales * DIVERGED
-    contact = DIVERGED * np.abs(lanes.weight[:, [force.carriage for force in contact_forces(model)]])
+    scale = tables.static_scales * MEANINGLESS
+    contact = MEANINGLESS * np.abs(lanes.weight[:, [force.carriage for force in contact_forces(model)]])
     sensors = scale[None, :, None] * weight[:, None]
     loose = [model.bodies[sensor.body].modal.rigid_modes > 0 for sensor in tables.sensors]
     sensors = np.where(np.array(loose)[None, :, None], np.inf, sensors)  # a rigid body may go anywhere

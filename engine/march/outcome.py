@@ -238,7 +238,6 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     """Status of every variant, and the first step at which it had diverged, or -1."""
     bad = np.concatenate([marched.statistics[:, DIVERGED_AT], marched.unrecorded[:, DIVERGED_AT]])
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
-    diverged = np.isfinite(first) | ~marched.finite
     sensors = len(marched.statistics) - len(marched.unrecorded)
     reactive = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
     below = np.concatenate(
@@ -246,7 +245,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     )
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))
-    status = np.where(diverged, np.int8(Status.DIVERGED), status).astype(np.int8)
+    status = np.where(marched.status != Status.OK, marched.status, status).astype(np.int8)
     return status, np.where(np.isfinite(first), first, -1.0).astype(np.int64)
 
 

@@ -27,6 +27,7 @@ from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal
 from engine.statics.static_response import static_readings
+from results_schema.status import Status
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -61,7 +62,7 @@ def quasistatic_extremes(
         here = _counted(tables, signals[:shown], tables.ways_at(counts))[:, :, None]
         found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
-    return Marched(statistics, unrecorded, history, np.ones(size, dtype=np.bool_))
+    return Marched(statistics, unrecorded, history, np.full(size, Status.OK, dtype=np.int8))
 
 
 def _unit(tables: SceneTables, counts: Array | Counts) -> Array:

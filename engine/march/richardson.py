@@ -7,15 +7,17 @@ coarser one are every second station of the finer one (`SceneTables.coarser`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import LANES, LARGEST, SMALLEST, Observation, Record
+from engine.kernels.layout import DIVERGED, DIVERGED_AT, LANES, LARGEST, SMALLEST, SOUND, STATISTICS, Record
 from engine.kernels.stepping.richardson_pairs import extrapolate, integrate, survey
-from engine.march.march import Halted, March, Marched, march, prepare
+from engine.march.march import March, Marched, Observed, march, prepare
 from engine.march.quasistatic import quasistatic_extremes
+from engine.march.stepper import Codes, go
 from engine.march.tables import SceneTables, SegmentTable
 from engine.model.timeline import Segment
 from engine.model.variant_values import VariantValues, from_blocks
@@ -55,88 +57,94 @@ def march_pair(
     Returns what `march` does of the extrapolated histories, extremes also from between stations, and (sensors, V) the
     largest estimated error of the finer march over its whole recorded history. Raises Halted.
     """
-    fine, coarse = (_whole_histories(part, values, counts, sampled) for part in (tables, tables.coarser))
-    pair = _Pair(fine, coarse, *_blank(fine))
-    for short, long in zip(fine.tables.timeline.segments, coarse.tables.timeline.segments, strict=True):
-        pair.along(short, long)
-        if halted():
-            raise Halted
-    return fine.result(size), from_blocks(pair.gap, size)[: len(tables.sensors)]
+    pair = _Pair(*(_whole_histories(part, values, counts, sampled) for part in (tables, tables.coarser)))
+    codes = go(pair, zip(tables.timeline.segments, tables.coarser.timeline.segments, strict=True), halted)
+    return pair.fine.result(codes, size), from_blocks(pair.gap, size)[: len(tables.sensors)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Histories(March):
-    """A march that hands over the histories of all its signals, segment by segment."""
+    """A march whose signals are all kept, of one segment at a time."""
 
-    def along(self, segment: Segment) -> tuple[Array, Observation]:
-        """March a segment: its signals (blocks, S, signals, LANES) at all stations, and what was observed."""
-        table = self.tables.table(segment)
-        watch = _watched(segment, table)
-        history = np.empty((self.statistics.shape[0], segment.steps + 1, watch.offset.shape[1], LANES))
-        replace(self, history=history)._segment(segment, table, True)
-        return history, watch
-
-    def _observed(self, segment: Segment, table: SegmentTable) -> tuple[Observation, Record]:
-        watch = _watched(segment, table)
-        statistics = np.zeros_like(self.statistics[:, : watch.offset.shape[1]])
-        statistics[:, :, LARGEST], statistics[:, :, SMALLEST] = (
-            np.inf,
-            -np.inf,
-        )  # nothing is news: `survey` looks for extremes
-        record = Record(statistics, np.arange(segment.steps + 1), self.history)
-        everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)  # `survey` sums squares
-        return watch._replace(counted=everywhere, summed=nowhere), record
-
-
-def _watched(segment: Segment, table: SegmentTable) -> Observation:
-    """What is observed along a segment."""
-    return table.watch if segment.recorded else table.unrecorded
+    def observe(self, segment: Segment, table: SegmentTable) -> Observed:
+        """The histories of all signals; no extremes and no sums, which `survey` and `integrate` find."""
+        watch = table.watch if segment.recorded else table.unrecorded
+        blocks, signals = self.statistics.shape[0], watch.offset.shape[1]
+        statistics = np.zeros((blocks, signals, STATISTICS, LANES))
+        statistics[:, :, LARGEST], statistics[:, :, SMALLEST], statistics[:, :, DIVERGED_AT] = np.inf, -np.inf, -1.0
+        history = np.empty((blocks, segment.steps + 1, signals, LANES))
+        everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)
+        record = Record(statistics, np.arange(segment.steps + 1), history)
+        return Observed(watch._replace(counted=everywhere, summed=nowhere), record)
 
 
 def _whole_histories(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None) -> _Histories:
     """A march that is ready to go."""
-    ready = prepare(tables, values, counts, sampled)
-    return _Histories(ready.tables, ready.lanes, counts, ready.state, ready.statistics, ready.unrecorded, ready.history)
+    return _Histories(**vars(prepare(tables, values, counts, sampled)))
 
 
-def _blank(fine: March) -> tuple[Array, Array]:
-    """What a pair carries over from segment to segment before the first."""
-    blocks, signals = fine.statistics.shape[:2]
-    return np.zeros((blocks, signals, 3, LANES)), np.zeros((blocks, signals, LANES))
+class _Both(NamedTuple):
+    """Segments, tables or what is observed of the finer and of the coarser march."""
+
+    fine: Any
+    coarse: Any
 
 
-@dataclass(eq=False)
 class _Pair:
-    """A pair under way. carry: the values before a segment (blocks, signals, 3, LANES); gap (blocks, signals, LANES):
-    the largest estimated errors so far; before: the segment before."""
+    """The stepper of a pair. carry: the values before a segment (blocks, signals, 3, LANES); gap (blocks, signals,
+    LANES): the largest estimated errors so far."""
 
-    fine: _Histories
-    coarse: _Histories
-    carry: Array
-    gap: Array
-    before: Segment | None = None
+    def __init__(self, fine: _Histories, coarse: _Histories) -> None:
+        blocks, signals = fine.statistics.shape[:2]
+        self.fine, self.coarse = fine, coarse
+        self.carry, self.gap = np.zeros((blocks, signals, 3, LANES)), np.zeros((blocks, signals, LANES))
+        self.joined = False
 
-    def along(self, segment: Segment, coarse_segment: Segment) -> None:
+    def tabulate(self, segments: tuple[Segment, Segment]) -> _Both:
+        """The tables of both."""
+        return _Both(*map(SceneTables.table, (self.fine.tables, self.coarse.tables), segments))
+
+    def observe(self, segments: tuple[Segment, Segment], tables: _Both) -> _Both:
+        """The histories of both."""
+        return _Both(*map(_Histories.observe, (self.fine, self.coarse), segments, tables))
+
+    def start(
+        self,
+        segments: tuple[Segment, Segment],
+        tables: _Both,
+        observed: _Both,
+        before: tuple[Segment, Segment] | None,
+    ) -> None:
+        """The event in both; the first station is always observed."""
+        self.joined = before is not None and _joined(before[0], segments[0])
+        self.fine.start(segments[0], tables.fine, observed.fine, None)
+        self.coarse.start(segments[1], tables.coarse, observed.coarse, None)
+
+    def step(self, segments: tuple[Segment, Segment], tables: _Both, observed: _Both) -> Codes:
         """One segment of both, extrapolated and observed."""
-        (fine, watch), (coarse, _) = self.fine.along(segment), self.coarse.along(coarse_segment)
-        counted, signals = watch.counted, fine.shape[2]
+        codes = self.fine.step(segments[0], tables.fine, observed.fine)
+        codes = np.maximum(codes, self.coarse.step(segments[1], tables.coarse, observed.coarse))
+        segment, fine = segments[0], observed.fine.record.history
+        own = tables.fine.watch if segment.recorded else tables.fine.unrecorded
+        signals = fine.shape[2]
         gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
-        extrapolate(fine, coarse, counted, gap)
+        extrapolate(fine, observed.coarse.record.history, own.counted, gap)
         statistics = self.fine.statistics if segment.recorded else self.fine.unrecorded
         carry = np.ascontiguousarray(self.carry[:, :signals])
-        survey(fine, counted, statistics, carry, _joined(self.before, segment), segment.first)
-        integrate(fine, watch.summed, statistics, self.fine.step(segment))
+        survey(fine, own.counted, statistics, carry, self.joined, segment.first)
+        integrate(fine, own.summed, statistics, self.fine.step_size(segment))
         self.carry[:, :signals] = carry
-        self.before = segment
         if segment.recorded:
             rows = rows_sampled(segment, self.fine.counts)
             here, sensors = np.flatnonzero(rows >= 0), self.fine.history.shape[2]
-            found = np.where(counted[here, :sensors, None], fine[:, here, :sensors], np.nan)
+            found = np.where(own.counted[here, :sensors, None], fine[:, here, :sensors], np.nan)
             self.fine.history[:, rows[here]] = found
+        beyond = (statistics[:, :, DIVERGED_AT] >= 0.0).any(axis=1)
+        return np.maximum(codes, np.where(beyond, np.int8(DIVERGED), np.int8(SOUND)))
 
 
-def _joined(before: Segment | None, segment: Segment) -> bool:
+def _joined(before: Segment, segment: Segment) -> bool:
     """Whether a segment goes on at an equal step where another ends, without an event between them."""
-    if before is None or segment.fresh or before.recorded != segment.recorded:
+    if segment.fresh or before.recorded != segment.recorded:
         return False
     return abs(before.step - segment.step) <= 1e-9 * segment.step

@@ -27,7 +27,6 @@ from engine.kernels.layout import (
     Observation,
     Record,
     State,
-    Ties,
 )
 from engine.kernels.schemes import NewmarkScheme
 from engine.kernels.stepping.comparison import (
@@ -40,8 +39,9 @@ from engine.kernels.stepping.comparison import (
     march_by_rule,
 )
 from engine.kernels.stepping.comparison_steps import ITERATIONS, KEPT, OWN_A, OWN_Q, OWN_V, UNCONVERGED
-from engine.march.march import March, Marched, prepare
-from engine.march.tables import SceneTables
+from engine.march.march import March, Marched, Observed, prepare
+from engine.march.stepper import Codes
+from engine.march.tables import SceneTables, SegmentTable
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.ties import CarriageTie
@@ -183,9 +183,9 @@ def march_comparison(
     Raises BadInput where the scene has not exactly one carriage or has dampers, and Halted.
     """
     going = prepare_comparison(scheme, tables, values, counts, sampled)
-    going.go(halted)
+    codes = going.go(halted)
     steps = sum(segment.steps for segment in tables.timeline.segments if segment.active[0])
-    return Compared(**vars(going.result(size)), effort=_effort(going.kept, steps, size))
+    return Compared(**vars(going.result(codes, size)), effort=_effort(going.kept, steps, size))
 
 
 def prepare_comparison(
@@ -270,13 +270,15 @@ class ComparisonMarch(March):
     scheme: ComparisonScheme
     kept: Array
 
-    def _steps(self, segment: Segment, ties: Ties, stepped: Lanes, watch: Observation, record: Record) -> None:
+    def step(self, segment: Segment, table: SegmentTable, observed: Observed) -> Codes:
         """The steps of a segment by the rule; only those in contact count for its effort."""
         track = moving_track(self.scheme, self.tables.model, self._unit(segment))
+        stepped = self.lanes.steps_of(self.step_size(segment))
         if segment.fresh:
             start_own(self.kept, track, stepped, self.state)
         kept = self.kept if segment.active[0] else self.kept.copy()
-        march_by_rule(self.scheme.rule, track, stepped, Carried(*self.state, kept), watch, record, segment.first)
+        carried = Carried(*self.state, kept)
+        return np.asarray(march_by_rule(self.scheme.rule, track, stepped, carried, *observed, segment.first))
 
     def _unit(self, segment: Segment) -> Segment:
         """The segment in the first unit of scene time, where the path repeats itself."""

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES, STATISTICS, Alpha, Lanes, Record, State, Ties
-from engine.kernels.stepping.march import march_many, march_one
 from engine.kernels.stepping.start import solve_initial_acceleration
-from engine.march.march import prepare
+from engine.march.march import prepare, step_kernel
 from engine.march.tables import SceneTables
 from engine.methods.comparison import ComparisonScheme, frozen_track, propagate_comparison
 from engine.model.scene_model import SceneModel
@@ -51,8 +50,8 @@ class Frozen:
         blocks = lanes.step.shape[0]
         statistics, history = np.zeros((blocks, 1, STATISTICS, LANES)), np.zeros((blocks, 0, 0, LANES))
         record = Record(statistics, np.full(steps + 1, -1, dtype=np.int64), history)
-        kernel = march_one if self.model.ties == 1 else march_many
-        kernel(self.ties(steps), lanes, state, watch, record, self.model.scheme.coefficients, 0)
+        ties = self.ties(steps)
+        step_kernel(ties)(ties, lanes, state, watch, record, self.model.scheme.coefficients, 0)
         return state
 
     def ties(self, steps: int) -> Ties:

@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.kernels.layout import DIVERGED, SOUND
+from engine.march.stepper import Codes, go
 from engine.model.timeline import Impact, Segment, Timeline, build_timeline
 from engine.observation.histories import rows_sampled
 from engine.unreduced.rows import Along, Readings, readings, rider_of, softness, softness_slopes, tie_rows
@@ -78,10 +80,13 @@ def march_unreduced(
     check: called after every segment, to stop by what it raises. Raises BadInput as `statics_at`.
     """
     march = _March(model, course, counts, level_readings(model), *_start(model, course))
+
+    def halted() -> bool:
+        check()
+        return False
+
     with np.errstate(all="ignore"):  # what is not finite shows in the histories
-        for segment in course.timeline.segments:
-            march.along(segment)
-            check()
+        go(march, course.timeline.segments, halted)
     return Unfolded(march.sensors, march.forces)
 
 
@@ -191,9 +196,26 @@ class _Factor:
 _SYMMETRIC = {"SymmetricMode": True}
 
 
+class _Table(NamedTuple):
+    """Places of the riders at the stations of a segment, and what the ties say there."""
+
+    along: Along
+    says: _Relations
+
+
+class _Observed(NamedTuple):
+    """The row of the histories of every station or -1, and what is read, and where the riders are, at the sampled
+    stations in their order."""
+
+    rows: Counts
+    reads: Readings
+    along: Along
+
+
 @dataclass(eq=False)
 class _March:
-    """A march under way: displacements u, velocities v, accelerations a (n,) and the ties' forces (T,)."""
+    """The stepper of an unreduced scene: displacements u, velocities v, accelerations a (n,) and the ties' forces
+    (T,)."""
 
     model: Unreduced
     course: Course
@@ -212,27 +234,36 @@ class _March:
         self.others = np.array([tie.other for tie in model.ties]).reshape(len(model.ties), model.size).T.copy()
         self._factors: dict[float, _Factor] = {}
 
-    def along(self, segment: Segment) -> None:
-        """One segment from its event to its end."""
-        step = self.course.step(segment)
+    def tabulate(self, segment: Segment) -> _Table:
+        """Places of the riders and what the ties say along a segment."""
         along = along_segment(self.model, self.course, segment)
-        says = _relations(self.model, along, step)
-        if segment.strikes:
-            self._strike(segment.strikes, along, says)
-        if segment.fresh:
-            self.a, self.force = self._solve(says, 0, self._factor(0.0), self.u, self.v)
+        return _Table(along, _relations(self.model, along, self.course.step(segment)))
+
+    def observe(self, segment: Segment, table: _Table) -> _Observed:
+        """What is read at the sampled stations of a segment."""
         rows = rows_sampled(segment, self.counts)
-        seen = self._seen(along, rows)
-        self._observe(0, rows, seen)
-        factor = self._factor(float(f"{step:.12g}"))
+        part = table.along.some(rows >= 0)
+        return _Observed(rows, readings(self.model, part).less(self.level), part)
+
+    def start(self, segment: Segment, table: _Table, observed: _Observed, before: Segment | None) -> None:
+        """The impulses and the new accelerations of a segment's event, and its first station."""
+        if segment.strikes:
+            self._strike(segment.strikes, *table)
+        if segment.fresh:
+            self.a, self.force = self._solve(table.says, 0, self._factor(0.0), self.u, self.v)
+        self._keep(0, observed)
+
+    def step(self, segment: Segment, table: _Table, observed: _Observed) -> Codes:
+        """The steps of a segment; (1,) code."""
+        factor = self._factor(float(f"{self.course.step(segment):.12g}"))
         h = factor.h
         for n in range(1, segment.steps + 1):
             u = self.u + h * self.v + (0.5 - BETA) * h**2 * self.a
             v = self.v + (1.0 - GAMMA) * h * self.a
-            self.a, self.force = self._solve(says, n, factor, u, v)
+            self.a, self.force = self._solve(table.says, n, factor, u, v)
             self.u, self.v = u + BETA * h**2 * self.a, v + GAMMA * h * self.a
-            if rows[n] >= 0:
-                self._observe(n, rows, seen)
+            self._keep(n, observed)
+        return np.array([SOUND if np.isfinite(self.u).all() and np.isfinite(self.v).all() else DIVERGED], dtype=np.int8)
 
     def _factor(self, h: float) -> _Factor:
         if h not in self._factors:
@@ -287,16 +318,12 @@ class _March:
         matrix += np.diag([0.0 if model.ties[j].link == "rigid" else 1.0 for j in felt])
         self.v = self.v + reach @ np.linalg.solve(matrix, -heavy[felt] * jump[felt])
 
-    def _seen(self, along: Along, rows: Counts) -> tuple[Readings, Along]:
-        """What is read at the sampled stations of a segment, in their order."""
-        part = along.some(rows >= 0)
-        return readings(self.model, part).less(self.level), part
-
-    def _observe(self, n: int, rows: Counts, seen: tuple[Readings, Along]) -> None:
+    def _keep(self, n: int, observed: _Observed) -> None:
+        """Histories at station n of a segment, where it is sampled."""
+        rows, reads, along = observed
         row = int(rows[n])
         if row < 0:
             return
-        reads, along = seen
         h = row - int(rows[rows >= 0][0])
         model = self.model
         rides = [rider_of(model, sensor) for sensor in model.study.sensor.values()]

@@ -15,7 +15,7 @@ from engine.batch.execution import run_jobs, warm_up
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
-from engine.march.march import Halted
+from engine.march.stepper import Halted
 from studies.commands import planned_numerics as chosen
 from studies.results.formatting import counted
 from studies.results.results import spread

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.batch.execution import seconds_of, seconds_of_jobs
-from engine.kernels.layout import DIVERGED_AT, LANES, LARGEST, SMALLEST
+from engine.kernels.layout import LANES, LARGEST, SMALLEST
 from engine.kernels.schemes import SCHEMES
 from engine.march.march import Marched, march, prepare
 from engine.march.richardson import march_pair
@@ -29,6 +29,7 @@ from engine.model.timeline import Segment
 from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
+from results_schema.status import Status
 from studies.protocol.measuring import Work
 
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ def _pair(tables: SceneTables, values: VariantValues, work: Work) -> Run:
 def _run(tables: SceneTables, counts: Counts, found: Marched, readings: Array) -> Run:
     marks = found.statistics[:, :, 0]
     largest = np.maximum(marks[:, LARGEST], -marks[:, SMALLEST])[: len(tables.sensors)]
-    gone = not bool(found.finite[0]) or bool((marks[:, DIVERGED_AT] >= 0).any()) or not np.isfinite(largest).all()
+    gone = bool(found.status[0] != Status.OK) or not np.isfinite(largest).all()
     return Run(tables, counts, readings, largest, gone)
 
 

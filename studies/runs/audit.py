@@ -63,7 +63,7 @@ def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
     """The audit, shared out among threads."""
     from engine.batch.audit import audit
     from engine.batch.execution import run_jobs
-    from engine.march.march import Halted
+    from engine.march.stepper import Halted
 
     try:
         return audit(plan, variants, work.halted, partial(run_jobs, threads=work.threads))

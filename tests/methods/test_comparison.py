@@ -27,6 +27,7 @@ from engine.model.scene_model import build_model
 from engine.model.variant_values import VariantValues, lane_table, padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from results_schema.status import Status
 from tests.engine.build import beam, cruise, force, mass, shuttle, study, swing
 from tests.engine.twin import bed_of, damping_of, load_of
 from tests.naive import comparison as naive
@@ -174,7 +175,7 @@ def test_picard_is_the_implicit_march_where_it_converges() -> None:
                 history = found.history[read, signal, 0]
                 np.testing.assert_allclose(history / size, values[read] / size, rtol=0, atol=1e-9, equal_nan=False)
             assert found.effort.unconverged[0] == 0
-            assert found.finite[0]
+            assert found.status[0] == Status.OK
 
 
 def test_picard_contracts_where_r_is_below_one() -> None:
@@ -190,9 +191,10 @@ def test_picard_contracts_where_r_is_below_one() -> None:
     assert (plain.effort.unconverged[:2] == 0).all()
     assert (plain.effort.unconverged[2:] > 0).all()
     assert np.isnan(plain.history[-1, :, 2:]).all()
-    np.testing.assert_array_equal(plain.finite, plain.effort.unconverged == 0)
+    expected = np.where(plain.effort.unconverged == 0, Status.OK, Status.NOT_CONVERGED)
+    np.testing.assert_array_equal(plain.status, expected)
     assert (relaxed.effort.unconverged == 0).all()
-    assert relaxed.finite.all()
+    assert (relaxed.status == Status.OK).all()
     assert ((relaxed.effort.iterations > 3.0) & (relaxed.effort.iterations < 7.0)).all()
     assert (plain.effort.iterations[:2] > relaxed.effort.iterations[:2]).all()
 

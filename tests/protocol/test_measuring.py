@@ -14,7 +14,7 @@ import xarray as xr
 
 import engine
 import studies
-from engine.march.march import Halted
+from engine.march.stepper import Halted
 from engine.study_file.spec import Spec
 from results_schema.errors import ArchiveBusy, BadInput, Interrupted, OutputFailed
 from results_schema.store import files

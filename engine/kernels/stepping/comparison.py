@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.kernels.jit import chosen_for, kernel, piece
-from engine.kernels.layout import LANES, STATISTICS, Alpha, FloatArray, Newmark
+from engine.kernels.layout import LANES, NOT_CONVERGED, STATISTICS, Alpha, FloatArray, Newmark
 from engine.kernels.stepping.comparison_steps import (
     FIELDS,
     MEMORY,
     SUMS,
+    UNCONVERGED,
     Scratch,
     step_coupled,
     step_rigid,
@@ -31,6 +32,7 @@ from engine.kernels.stepping.record import (
     TIE,
     V_NOW,
     close_statistics,
+    judge_lanes,
     keep,
     observe,
     open_statistics,
@@ -145,9 +147,10 @@ def note(statistics, scratch, watch, record, block, n, count):
 def march_by_rule(rule, track, lanes, carried, watch, record, count):
     """March one segment with a single tie by a rule; what is carried and the record are updated in place.
 
-    ``count`` is the number of the scene's stations before this segment's station 0.
+    ``count`` is the number of the scene's stations before this segment's station 0. Returns the code of every lane.
     """
     modes = carried.q.shape[1]
+    status = np.zeros((lanes.step.shape[0], LANES), np.int8)
     work = np.zeros((modes, FIELDS, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), MEMORY + 1, LANES))
     sums = np.zeros((SUMS, LANES))
@@ -162,3 +165,8 @@ def march_by_rule(rule, track, lanes, carried, watch, record, count):
             note(statistics, scratch, watch, record, block, n + 1, count)
         store_modes(now, b, carried, block)
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], track.rows.shape[1])
+        judge_lanes(status, statistics, carried.q, carried.v, block)
+        for j in range(LANES):
+            if carried.kept[block, UNCONVERGED, j] > 0.0:  # and so nothing is finite
+                status[block, j] = NOT_CONVERGED
+    return status

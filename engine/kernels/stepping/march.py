@@ -39,6 +39,7 @@ from engine.kernels.stepping.record import (
     U,
     V,
     close_statistics,
+    judge_lanes,
     keep,
     leading,
     observe,
@@ -141,12 +142,13 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
     """March one segment with a single tie.
 
     Shapes as in ``layout``; ``count`` is the number of the scene's stations before this segment's station 0. The
-    state and the record are updated in place.
+    state and the record are updated in place. Returns the code of every lane.
     """
     rows = ties.rows
     stations, modes = rows.shape[0], rows.shape[1]
     leads, lead_moves = leading(watch), 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
+    status = np.zeros((lanes.step.shape[0], LANES), np.int8)
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + 1, LANES))
@@ -187,6 +189,8 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
             observe(statistics, now, b, watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
+        judge_lanes(status, statistics, state.q, state.v, block)
+    return status
 
 
 @kernel
@@ -197,6 +201,7 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
     half = (reactive.shape[0] + 1) // 2
     leads, lead_moves = leading(watch), 0 if watch.on_q.shape[0] == 1 else 1
     # allocated here and not in a piece: only so does the compiler know their strides
+    status = np.zeros((lanes.step.shape[0], LANES), np.int8)
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
     b = np.zeros((TIE + many, LANES))
@@ -246,3 +251,5 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
             observe(statistics, now, b, watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
+        judge_lanes(status, statistics, state.q, state.v, block)
+    return status

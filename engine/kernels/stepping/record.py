@@ -9,6 +9,7 @@ from engine.kernels.jit import piece
 from engine.kernels.layout import (
     BELOW_AT,
     BOUND,
+    DIVERGED,
     DIVERGED_AT,
     LANES,
     LARGEST,
@@ -136,6 +137,18 @@ def close_statistics(to, statistics, watch, step, steps):
                 seconds += step[j] * steps
             statistics[i, SQUARES, j], statistics[i, SECONDS, j] = squares, seconds
     copy_statistics(to, statistics)
+
+
+@piece
+def judge_lanes(status, statistics, q, v, block):
+    """Note the lanes of a block that have diverged: a signal was beyond its bound, or the state q, v is not finite."""
+    for j in range(LANES):
+        for i in range(statistics.shape[0]):
+            if statistics[i, DIVERGED_AT, j] >= 0.0:
+                status[block, j] = DIVERGED
+        for k in range(q.shape[1]):
+            if not (np.isfinite(q[block, k, j]) and np.isfinite(v[block, k, j])):
+                status[block, j] = DIVERGED
 
 
 @piece
