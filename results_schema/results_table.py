@@ -31,9 +31,9 @@ def _row(where: str, variable: Variable) -> str:
         unit = "flags"
     elif variable.dtype == "str":
         unit = ""
-    text = variable.meaning or variable.long_name
+    text = variable.long_name + (f": {variable.meaning}" if variable.meaning else "")
     if variable.flags is not None:
         words = zip(flag_values(variable.flags), flag_meanings(variable.flags).split(), strict=True)
-        text += ": " + ", ".join(f"{value} {word}" for value, word in words)
+        text += "; " + ", ".join(f"{value} {word}" for value, word in words)
     cells = (f"`{variable.name}`", where, dims, variable.dtype, unit, text.replace("|", "\\|"))
     return "| " + " | ".join(cells) + " |"

@@ -59,7 +59,11 @@ declare(
     Variable("status", (), "int8", None, "status of the variant", "the highest that applies", Status),
     Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
     Variable(
-        "modes_used", (), "int32", long_name="number of modes used", meaning="0 for statics, which know all modes"
+        "modes_used",
+        (),
+        "int32",
+        long_name="number of modes used",
+        meaning="0 where results are static: by exact influence lines",
     ),
     Variable("steps_used", (), "int32", long_name="number of steps used", meaning="steps over one passage or cycle"),
     Variable(
@@ -77,7 +81,7 @@ declare(
         (),
         "int64",
         long_name="first step at which the variant had diverged",
-        meaning="counted from the start; -1 where it has not",
+        meaning="counted from the start; -1 where it did not diverge",
         required=False,
     ),
     Variable(
@@ -109,7 +113,7 @@ declare(
         "tolerance",
         ("result",),
         long_name="tolerance of every reported number",
-        meaning="that of its sensor, else solver.tolerance; NaN where the error is only told",
+        meaning="that of its sensor, else solver.tolerance; NaN where the error is reported, but not held",
         required=False,
         nan_allowed=True,
         lead="none",
@@ -129,7 +133,7 @@ def _extreme(which: str, word: str) -> tuple[Variable, Variable]:
             f"{{sensor}}_{which}_position",
             units="m",
             long_name=f"position of the first carriage at the {word} value of {{sensor}}",
-            meaning="whichever carriage the sensor belongs to; NaN where the first one was off its body",
+            meaning="of the first one also where the sensor is under another; NaN where it was off its body",
             nan_allowed=True,
         ),
     )
@@ -141,7 +145,7 @@ ROOT_MEAN_SQUARES: tuple[Variable, ...] = (
         "{sensor}_rms",
         units="{sensor}",
         long_name="root mean square of {sensor}",
-        meaning="of the average over the recorded time; of sensors that ride, over the time that they are on the body",
+        meaning="averaged over the recorded time; of sensors under a carriage, over the time that it is on the body",
         required=False,
     ),
 )
@@ -205,7 +209,7 @@ ENVELOPES: tuple[Variable, ...] = (
             ("{envelope}_place",),
             units="{envelope}",
             long_name=f"{word} value at each place of {{envelope}}",
-            meaning="over the same instants as the extremes of sensors",
+            meaning="over the instants over which extremes of sensors are taken",
         )
         for which, word in (("max", "largest"), ("min", "smallest"))
     ),
@@ -214,7 +218,7 @@ ENVELOPES: tuple[Variable, ...] = (
         ("{envelope}_place",),
         units="m",
         long_name="place of {envelope} along its body",
-        meaning="a coordinate",
+        meaning="coordinate of the envelope",
         required=False,
         lead="none",
     ),
@@ -323,7 +327,7 @@ declare(
         "changes, and one level beyond; over what estimated_error is divided by; NaN where it could not be compared",
     ),
     _audited("estimated_error", "estimated error of every reported number", "that of the archive"),
-    _audited("tolerance", "tolerance of every reported number", "NaN where the error is only told", ("result",)),
+    _audited("tolerance", "tolerance of every reported number", "NaN where none is held", ("result",)),
     _audited("tolerance_asked", "solver.tolerance of the variant over that of the study", "", ("sample",)),
     Variable(
         "variant_status",
@@ -338,7 +342,7 @@ declare(
         "left_out",
         (),
         "int64",
-        long_name="variants that were picked for the audit and have no values, or whose truth has none",
+        long_name="variants that were picked for the audit and have no values, or whose reference has none",
         meaning="not among the samples",
         lead="none",
     ),

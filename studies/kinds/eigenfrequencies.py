@@ -58,7 +58,7 @@ RESULTS = (
         "base_frequency",
         ("position", "mode"),
         units="Hz",
-        long_name="the same of the scene without sweep",
+        long_name="natural frequency of the coupled system, of the scene without sweep",
         lead="none",
         nan_allowed=True,
     ),
