@@ -64,7 +64,7 @@ class Choice:
         return self.measured.work
 
     def errors(self, variants: Counts) -> Array:
-        """(R, V) errors told for some variants; NaN where no estimate exists."""
+        """(R, V) estimated errors for some variants; NaN where no estimate exists."""
         return self.neighbour_errors.errors(self._march[self.rung[variants, None], self.neighbours[variants]])
 
     def held(self, variants: Counts, tighter: Array) -> Array:

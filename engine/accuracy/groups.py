@@ -33,8 +33,8 @@ TRUTH_PART = 0.1  # the same of the reference of an answer within what a study f
 
 
 class Found(NamedTuple):
-    """What V variants report, what they were computed with (by the names of the archive), the errors told (R, V), and
-    the largest of those that are held, less what the study fixes, over their tolerances (V,)."""
+    """What V variants report, what they were computed with (by the names of the archive), the estimated errors
+    (R, V), and the largest of those that are held, less what the study fixes, over their tolerances (V,)."""
 
     outcome: Outcome
     used: Flat

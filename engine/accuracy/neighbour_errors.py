@@ -21,7 +21,7 @@ from engine.march.outcome import Asked
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int32]
 
-#: Of the errors told for pilots that were left out are no smaller than the true ones: 0.993 doubled the work of
+#: Of the estimated errors for pilots that were left out are no smaller than the true ones: 0.993 doubled the work of
 #: `double-peak`, and told hardly better (displacements of 12 random scenes 2.0 % below the true errors, not 2.5 %).
 SURE = 0.985
 TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 some variants of `double-peak` missed it
@@ -38,7 +38,7 @@ class NeighbourErrors:
     wanted: Array
 
     def errors(self, marches: Numbers) -> Array:
-        """(R, V) errors told by the marches (V, k) of neighbours; NaN where no estimate exists."""
+        """(R, V) estimated errors by the marches (V, k) of neighbours; NaN where no estimate exists."""
         error = np.max(self.error[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(error), error, np.nan).T
 

@@ -45,8 +45,8 @@ DEAR, DOUBTED = 1e7, 0.4
 FIRST_PERIODS = 20  # steps per first period of average acceleration at level 0: 8e-3 of phase, 2e-6 at level 3
 USUAL_LEVEL = 2  # to which most pilots and answers go; for expected times only
 MARGIN = 1.25  # times the rules that no march may break: bands of growth end at 1.1, and 1.1 to 1.6 chose alike
-#: Times d that is left: at most, and where no change came before. Of the errors told of 60 random scenes 1 % were below
-#: the true ones and 1 % more than 30 times these, the median 6 to 9 times; 1 for the first told 3 to 13 % below.
+#: Times d that is left: at most, and where no change came before. Of the estimated errors of 60 random scenes 1 % were
+#: below the true ones and 1 % more than 30 times these, the median 6 to 9 times; 1 for the first told 3 to 13 % below.
 MOST_LEFT, FIRST_LEFT = 3.0, 2.0
 
 

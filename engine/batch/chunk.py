@@ -43,7 +43,7 @@ def run_chunk(
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
-    """(R, V) the errors told; of places no less than a step is long, and no more than the track."""
+    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track."""
     error = np.where(np.isfinite(found.error), found.error, np.nan)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):

@@ -46,8 +46,8 @@ class Cycle:
         return self.find_slope()
 
 
-#: Of what histories differ by that values on them may be off without differing: with none of it 40 % of the errors told
-#: of 300 passages were too small, as two extremes agree by chance.
+#: Of what histories differ by that values on them may be off without differing: with none of it 40 % of the estimated
+#: errors of 300 passages were too small, as two extremes agree by chance.
 HISTORY_PART = 0.5
 
 

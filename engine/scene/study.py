@@ -312,7 +312,9 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
     if quantity in body.untold:
         expected = f"one of {', '.join(told for told in quantities_of_a_body() if told not in body.untold)}"
         raise BadInput(
-            f"the body {name} tells no {quantity}", where=study.source.where(f"{here}.quantity"), expected=expected
+            f"{quantity} is not available on body {name}",
+            where=study.source.where(f"{here}.quantity"),
+            expected=expected,
         )
     if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
         where = study.source.where(f"body.{name}.{missing}")

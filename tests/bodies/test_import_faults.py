@@ -142,7 +142,7 @@ def test_faults(files: Files, tmp_path: Path) -> None:
 @pytest.mark.parametrize("quantity", ["stress", "bending_moment", "shear_force"])
 def test_no_section_forces(files: Files, quantity: str) -> None:
     sensor = {"middle": {"body": "bed", "at": 7.5, "quantity": quantity}}
-    with pytest.raises(BadInput, match=f"sensor.middle.quantity.*tells no {quantity}"):
+    with pytest.raises(BadInput, match=f"sensor.middle.quantity.*{quantity} is not available"):
         study(files.table(), sensor=sensor)
 
 

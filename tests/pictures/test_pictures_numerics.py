@@ -232,7 +232,7 @@ def test_errors_stand_beside_their_tolerances_the_nearest_first(plane: xr.Datase
     tolerances = {"a": 1e-3, "b": 1e-2, "unknown": 1e-3, "told": np.nan}
     dataset = put_errors(plane, tolerances, np.stack([errors, errors], axis=1))
     figure = drawn(dataset)["estimates"]
-    assert figure.title == "All errors told are within their tolerances; a comes nearest, at 90 %"
+    assert figure.title == "All estimated errors are within their tolerances; a comes nearest, at 90 %"
     found = rows_of(figure)
     assert list(found) == ["a", "b", "told"]
     np.testing.assert_allclose(found["a"][1], [1e-4, 2e-4, 9e-4], rtol=1e-6)
@@ -287,18 +287,18 @@ def test_told_against_observed_is_honest_about_what_has_no_place() -> None:
         [[4e-4, 2e-4], [0.0, nan], [5e-4, 1e-2]], [[2e-4, 6e-4], [1e-4, 3e-4], [nan, 1e-3]], {"a": 1e-3, "b": nan}
     )
     (figure,) = estimates.compared(found)
-    assert figure.title == "Of 4 audited numbers 50 % are no further off than told"
+    assert figure.title == "Of 4 audited numbers 50 % are no further off than estimated"
     assert figure.caption == (
-        "3 variants, a dot for every reported number; below the line its error was told large enough. Worst above it: "
-        "a, 100 times what was told. Not drawn: 2 numbers without one of both."
+        "3 variants, a dot for every reported number; below the line its estimate was large enough. Worst above it: "
+        "a, 100 times its estimate. Not drawn: 2 numbers without one of both."
     )
     (axes,) = figure.drawing.axes
     assert axes.get_ylim() == axes.get_xlim() and axes.get_xlim()[0] < estimates.LEAST < axes.get_xlim()[1]
     lines = legend_of(axes)
-    assert set(lines) == {"as told", "tolerance", "held to a tolerance", "told only"}
-    np.testing.assert_allclose(lines["as told"].get_xdata(), lines["as told"].get_ydata())
+    assert set(lines) == {"equal", "tolerance", "held to a tolerance", "not held"}
+    np.testing.assert_allclose(lines["equal"].get_xdata(), lines["equal"].get_ydata())
     np.testing.assert_allclose(lines["held to a tolerance"].get_data(), [[4e-4, estimates.LEAST], [2e-4, 1e-4]])
-    np.testing.assert_allclose(lines["told only"].get_data(), [[2e-4, 1e-2], [6e-4, 1e-3]])
+    np.testing.assert_allclose(lines["not held"].get_data(), [[2e-4, 1e-2], [6e-4, 1e-3]])
     np.testing.assert_allclose(lines["tolerance"].get_ydata(), 1e-3)
 
 
@@ -307,7 +307,9 @@ def test_told_against_observed_needs_two_of_both() -> None:
     assert estimates.compared(None) == []
     assert estimates.compared(group([[1e-4, nan, 1e-4]], [[1e-4, 1e-4, nan]], {"a": 1e-3, "b": 1e-3, "c": 1e-3})) == []
     (figure,) = estimates.compared(group([[1e-4], [3e-4]], [[1e-4], [2e-4]], {"a": 1e-3}))
-    assert figure.title == "Of 2 audited numbers 100 % are no further off than told" and "Worst" not in figure.caption
+    assert (
+        figure.title == "Of 2 audited numbers 100 % are no further off than estimated" and "Worst" not in figure.caption
+    )
     assert estimates.compared(group([[0.0], [0.0]], [[0.0], [0.0]], {"a": nan}))
 
 

@@ -123,7 +123,7 @@ class NoSections:
         self._refuse(quantity)
 
     def _refuse(self, quantity: str) -> NoReturn:
-        what, expected = f"an imported body tells no {quantity}", "displacement, velocity or acceleration"
+        what, expected = f"{quantity} is not available on an imported body", "displacement, velocity or acceleration"
         raise BadInput(what, where="sensor", expected=expected)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
-MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those that are told only
+MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one
 
 
 def pictures(results: Results) -> list[Figure]:
@@ -48,9 +48,8 @@ def _title(name: str, error: Array, tolerance: float) -> str:
     if np.isnan(tolerance):
         return "No result is held to a tolerance"
     if error.max() <= tolerance:
-        return (
-            f"All errors told are within their tolerances; {name} comes nearest, at {percent(error.max() / tolerance)}"
-        )
+        nearest = percent(error.max() / tolerance)
+        return f"All estimated errors are within their tolerances; {name} comes nearest, at {nearest}"
     share = percent(float(np.mean(error > tolerance)))
     return (
         f"{name} may miss its tolerance in {share} of the variants, {number(error.max() / tolerance, 2)} times at most"
@@ -66,7 +65,7 @@ def _draw_results(rows: list[tuple[str, Array, float]], drawing: Drawing) -> Non
         (mark,) = axes.plot(tolerance, place, "|", color=VERMILION, markersize=9.0, label="" if place else "tolerance")
         mark.set_markeredgewidth(1.6)
     axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
-    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="error told")
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="estimated error")
     axes.grid(False, axis="y")
     logarithmic(axes.xaxis)
     legend_beside(axes)
@@ -85,11 +84,11 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
     pairs = np.maximum(np.stack([told[both], observed[both]]), LEAST)
     times, variants = pairs[1] / pairs[0], counted(int(both.any(axis=1).sum()), "variant")
     enough = percent(float(np.mean(times <= 1.0)))
-    title = f"Of {counted(times.size, 'audited number')} {enough} are no further off than told"
-    caption = f"{variants}, a dot for every reported number; below the line its error was told large enough."
+    title = f"Of {counted(times.size, 'audited number')} {enough} are no further off than estimated"
+    caption = f"{variants}, a dot for every reported number; below the line its estimate was large enough."
     if times.max() > 1.0:
         worst = np.broadcast_to(group["result"].values, both.shape)[both][np.argmax(times)]
-        caption += f" Worst above it: {worst}, {number(float(times.max()), 2)} times what was told."
+        caption += f" Worst above it: {worst}, {number(float(times.max()), 2)} times its estimate."
     caption += "" if both.all() else f" Not drawn: {counted(int((~both).sum()), 'number')} without one of both."
     held = np.broadcast_to(np.isfinite(group["tolerance"].values), both.shape)[both]
     fill = partial(_draw_compared, pairs, held, np.unique(known(group["tolerance"].values)))
@@ -99,15 +98,15 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
 def _draw_compared(pairs: Array, held: NDArray[np.bool_], tolerances: Array, drawing: Drawing) -> None:
     axes = drawing.subplots()
     ends = pairs.min() / 1.8, max(pairs.max(), *tolerances, LEAST) * 1.8
-    axes.plot(ends, ends, color=INK, linewidth=0.9, label="as told")
-    for label, own, colour in (("held to a tolerance", held, BLUE), ("told only", ~held, MUTED)):
+    axes.plot(ends, ends, color=INK, linewidth=0.9, label="equal")
+    for label, own, colour in (("held to a tolerance", held, BLUE), ("not held", ~held, MUTED)):
         if own.any():
             axes.plot(*pairs[:, own], "o", color=colour, markersize=3.0, label=label, rasterized=own.sum() > 500)
     for place, tolerance in enumerate(tolerances):
         axes.axhline(tolerance, color=VERMILION, linewidth=0.9, linestyle="--", label="" if place else "tolerance")
     for axis in (axes.xaxis, axes.yaxis):
         logarithmic(axis)
-    axes.set(xlim=ends, ylim=ends, xlabel="error told", ylabel="error observed")
+    axes.set(xlim=ends, ylim=ends, xlabel="estimated error", ylabel="observed error")
     axes.set_box_aspect(1.0)
     axes.set_anchor("W")
     legend_beside(axes)
