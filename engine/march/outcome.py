@@ -31,7 +31,6 @@ from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import counts_reduced
-from engine.observation.signals import silent
 from engine.scene.study import Study
 from results_schema.status import Fidelity, SchemeUsed, Status
 
@@ -284,7 +283,7 @@ def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
         own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
         columns.append(own if sensor.offset_order else np.maximum(static, STILL * usual * weight))
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
-    found[:, silent(tables.model, tables.sensors[:count])] = np.inf
+    found[:, [sensor.silent(tables.model) for sensor in tables.sensors[:count]]] = np.inf
     return np.where(found > 0.0, found, np.inf)
 
 

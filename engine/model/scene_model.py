@@ -274,7 +274,7 @@ def _standing(
 def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
     """A body of the study in modal coordinates, its modes counted from ``first``."""
     try:
-        modal = build_body(body)
+        modal = build_body(body, study.spots(name))
     except BadInput as error:
         where = study.source.where(f"body.{name}.{error.where}")
         raise BadInput(

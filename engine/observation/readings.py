@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal.modal_body import ModalBody, Sections
+from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
 from engine.model.attachment import holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.scene_model import BodyPart, SceneModel
@@ -24,6 +24,8 @@ from results_schema.quantities import QUANTITIES, Quantity
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
 
 
 class Channel(NamedTuple):
@@ -112,14 +114,19 @@ class Sensor:
             return np.zeros((1, model.omega.size))
         return _spread(model, model.bodies[self.body], self._rows(model, along))
 
-    def shown(self, model: SceneModel, places: Array) -> Array:
-        """(P,) the most that one of its body's modes would show, to some scale, if it read at other places (m)."""
-        sections = self._sections(model)
+    def silent(self, model: SceneModel) -> bool:
+        """Whether no mode of its body says anything there, such as the deflection at a support: what it reads is
+        rounding, and has no relative error."""
+        if self.under is not None:
+            return False
+        modal = self._modal(model)
+        places, sections = np.array([self.at, *np.linspace(0.0, modal.length, PLACES)]), self._sections(model)
         if sections is not None:
             rows = sections.rows(self.quantity, places)
         else:
-            rows = self._modal(model).shape(places, self.reads.derivative)
-        return np.asarray(np.abs(rows).max(axis=1))
+            rows = modal.shape(places, self.reads.derivative)
+        here, *elsewhere = np.abs(rows).max(axis=1)
+        return bool(here <= SILENT * max(elsewhere))
 
     def rides(self, model: SceneModel) -> int | None:
         """The rider that it moves with."""
@@ -203,6 +210,31 @@ class Sensor:
     def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, self.under is None or along[self.under].active)
+
+
+@dataclass(frozen=True, eq=False)
+class SpotSensor(Sensor):
+    """The motion of a place of a body off its track, which the modal body knows by the sensor's name; ``at`` is NaN."""
+
+    def shape(self, model: SceneModel, along: tuple[StationPath, ...], derivative: int) -> Array:
+        return self._gauge(model).row[None]
+
+    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+        weighs = model.bodies[self.body].own_weight and self.offset_order == 0
+        return np.full(along[0].s.size, self._gauge(model).own_weight() if weighs else 0.0)
+
+    def silent(self, model: SceneModel) -> bool:
+        """Whether no load on the track moves it, nor its body as a rigid one."""
+        modal, gauge = self._modal(model), self._gauge(model)
+        places = np.linspace(0.0, modal.length, PLACES)
+        felt = np.abs([*gauge.along(places), *gauge.points.values()]).max()
+        return bool(not modal.rigid_modes and felt <= SILENT * np.abs(modal.influence_at(places, places)).max())
+
+    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
+        return self._gauge(model).influence(loaded)
+
+    def _gauge(self, model: SceneModel) -> Gauge:
+        return self._modal(model).gauges[self.name]
 
 
 @dataclass(frozen=True, eq=False)

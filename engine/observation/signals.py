@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +10,11 @@ from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.ties import CarriageTie
 from engine.observation.contact_forces import ContactForce, ContactSensor, contact_forces
-from engine.observation.readings import Sensor, SprungSensor
+from engine.observation.readings import Sensor, SpotSensor, SprungSensor
 
 Array = NDArray[np.float64]
 
 Signal = Sensor | ContactForce
-
-SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
 
 
 def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
@@ -39,6 +35,8 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     spec, study = model.study.sensor[name], model.study
     under = None if spec.rides is None else carriages.index(spec.rides)
     body = [part.name for part in model.bodies].index(study.body_of(name))
+    if spec.spot is not None:
+        return SpotSensor(name, spec.quantity, body, np.nan, None)
     at = 0.0 if spec.at is None else spec.at
     if spec.carriage is None or under is None:
         return Sensor(name, spec.quantity, body, at, under)
@@ -106,18 +104,3 @@ def _stacked(rows: list[Array], modes: int) -> Array:
     for channel, row in enumerate(rows):
         found[:, channel, : row.shape[1]] = row
     return found
-
-
-def silent(model: SceneModel, sensors: Iterable[Sensor]) -> NDArray[np.bool_]:
-    """(J,) sensors where no mode of their body says anything, such as the deflection at a support: what they read is
-    rounding, and has no relative error."""
-    return np.array(
-        [type(sensor) is Sensor and sensor.under is None and _says_nothing(model, sensor) for sensor in sensors],
-        dtype=np.bool_,
-    )
-
-
-def _says_nothing(model: SceneModel, sensor: Sensor) -> bool:
-    places = np.linspace(0.0, model.bodies[sensor.body].modal.length, PLACES)
-    here, *elsewhere = sensor.shown(model, np.array([sensor.at, *places]))
-    return bool(here <= SILENT * max(elsewhere))

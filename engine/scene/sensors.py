@@ -8,11 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from engine.study_file.spec import NUMBER, WORD, Spec, form_of_amount, one_of
+from engine.bodies.frame.frame import Vector
+from engine.bodies.modal.description import Spot
+from engine.study_file.spec import LIST, NUMBER, WORD, Spec, by_form, form_of_amount, one_of
 from engine.study_file.units import Dimensionless, Length, fault
 from results_schema.quantities import MEANT, QUANTITIES, Quantity
 
+AXES = ("x", "y", "z")
 MOST_PLACES = 201
+PLACES = 6  # ways to say where a sensor stands
+EXPECTED = 'at = metres, node, member or point = "its name", under = "a carriage", or carriage = "a carriage"'
 
 
 def _of_a_body(word: str) -> str:
@@ -36,8 +41,14 @@ OwnTolerance = Annotated[
 ]
 
 
+_Axis = Annotated[str, AfterValidator(one_of(*AXES))]
+Direction = Annotated[Annotated[_Axis, Tag(WORD)] | Annotated[Vector, Tag(LIST)], by_form]
+NodeName = Annotated[Annotated[str, Tag(WORD)] | Annotated[int, Tag(NUMBER)], by_form]
+
+
 class Sensor(Spec):
-    """A quantity at a fixed place `at` (m along the track) of a body, at the point that a carriage touches (`under`),
+    """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
+    m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
     of a carriage's own sprung mass (`carriage`), or the contact force of a carriage (of a body that rides, that at one
     `contact`).
 
@@ -48,6 +59,10 @@ class Sensor(Spec):
 
     body: str | None = None
     at: Length | None = Field(default=None, ge=0)
+    node: NodeName | None = None
+    member: str | None = None
+    point: str | None = None
+    direction: Direction | None = None
     under: str | None = None
     carriage: str | None = None
     contact: str | None = None
@@ -56,11 +71,20 @@ class Sensor(Spec):
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:
-        if [self.at, self.under, self.carriage].count(None) != 2:
-            expected = 'at = metres, under = "a carriage", or carriage = "a carriage"'
-            raise fault("a sensor has exactly one place", expected=expected)
-        if self.at is not None and self.body is None:
+        off_track = [self.node, self.member, self.point]
+        along = None if self.member is not None else self.at
+        if [along, *off_track, self.under, self.carriage].count(None) != PLACES - 1:
+            raise fault("a sensor has exactly one place", expected=EXPECTED)
+        if self.rides is None and self.body is None:
             raise fault("a sensor at a fixed place needs its body", expected='body = "a body"')
+        if self.member is not None and self.at is None:
+            raise fault("a sensor on a member needs its place", expected="at = metres from the member's first node")
+        if self.direction is not None and self.node is None and self.member is None:
+            raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
+        if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
+            known = ", ".join(name for name, q in QUANTITIES.items() if not q.derivative and not q.of_contact)
+            expected, remedy = f"quantity: one of {known}", "at = metres along the track"
+            raise fault(f"only a track has {self.quantity}", expected=expected, remedy=remedy)
         if self.carriage is not None and not (self.reads.of_mass or self.reads.of_contact):
             known = ", ".join(name for name, q in QUANTITIES.items() if q.of_mass or q.of_contact)
             raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {known}")
@@ -79,6 +103,16 @@ class Sensor(Spec):
     def rides(self) -> str | None:
         """The carriage that it moves with, if any."""
         return self.carriage if self.under is None else self.under
+
+    @property
+    def spot(self) -> Spot | None:
+        """The place that it reads off its body's track, if it does."""
+        if (self.node, self.member, self.point) == (None, None, None):
+            return None
+        way = self.direction
+        if isinstance(way, str):
+            way = (float(way == "x"), float(way == "y"), float(way == "z"))
+        return Spot(self.node, self.member, self.at or 0.0, self.point, way)
 
 
 class Envelope(Spec):

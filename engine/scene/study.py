@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
-from engine.bodies.modal.description import Recorded
+from engine.bodies.modal.description import Recorded, Spot, Spots
 from engine.scene.carriages import AnyCarriage
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
@@ -107,6 +107,11 @@ class Study(Scene):
         """Name of the body that a sensor reads."""
         place = self.sensor[sensor]
         return self.carriage[place.rides].on if place.rides is not None else str(place.body)
+
+    def spots(self, body: str) -> Spots:
+        """What its sensors read off the track of a body."""
+        found = ((name, sensor.spot) for name, sensor in self.sensor.items() if sensor.body == body)
+        return tuple((name, spot) for name, spot in found if spot is not None)
 
     def value(self, path: str) -> Any:
         """The value at a dotted key, SI, defaults included. KeyError where there is none.
@@ -212,7 +217,7 @@ def checks(study: Study) -> Iterator[Check]:
     for name, carriage in study.carriage.items():
         yield from carriage.checks(f"carriage.{name}")
     for name, sensor in study.sensor.items():
-        if sensor.at is not None:
+        if sensor.at is not None and sensor.spot is None:
             here = f"sensor.{name}.at"
             yield on_body(here, (here, f"body.{sensor.body}.length"), "a sensor off its body")
     for name, envelope in study.envelope.items():
@@ -301,6 +306,8 @@ def _check_references(study: Study) -> None:
             where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
             raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
         _check_quantity(study, here, body, sensor.quantity)
+        if sensor.spot is not None:
+            _check_spot(study, here, body, sensor.spot)
     for name, envelope in study.envelope.items():
         _must_exist(study, f"envelope.{name}.body", envelope.body, "body")
         _check_quantity(study, f"envelope.{name}", envelope.body, envelope.quantity)
@@ -319,6 +326,17 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
     if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
         where = study.source.where(f"body.{name}.{missing}")
         raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
+
+
+def _check_spot(study: Study, here: str, body: str, spot: Spot) -> None:
+    """A body has the place off its track that a sensor reads."""
+    try:
+        study.body[body].check_spot(spot)
+    except BadInput as error:
+        where = study.source.where(f"{here}.{error.where}")
+        raise BadInput(
+            error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
+        ) from None
 
 
 def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:

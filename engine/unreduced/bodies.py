@@ -5,7 +5,8 @@ What the march of modes leaves out by reduction is all here. A uniform beam is c
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -16,6 +17,7 @@ from engine.bodies.beam.beam import Beam, Spring
 from engine.bodies.frame.assembly import Assembly, assemble
 from engine.bodies.frame.body import frame_modes, kept_modes
 from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.gauges import FrameSpot
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.points import point_loads
 from engine.bodies.frame.track import track_of
@@ -24,7 +26,7 @@ from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.rigid.rigid import Rigid
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
-from engine.unreduced.track import FrameTrack, Rows, no_rows
+from engine.unreduced.track import FrameTrack, Rows, no_rows, rows_of
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -69,13 +71,22 @@ class Damping(NamedTuple):
     rates: Array
 
 
+class FullGauge(NamedTuple):
+    """A place that a sensor reads off the track: rows (1,) on the degrees of freedom of the body; what a unit force at
+    places (S,) of the track, and own weight per unit gravity, add between the ends of its element."""
+
+    rows: Rows
+    within: Callable[[Array], Array]
+    under_weight: float
+
+
 @dataclass(frozen=True, eq=False)
 class FullBody:
     """A body with all its n degrees of freedom.
 
     rigid (n, r): rigid-body motions of unit mass; pull (n,): own weight per unit gravity; flexibility: the elastic
-    answer to loads, None where nothing bends; points: rows (n,) by name; gravity_share: of gravity along the track's
-    direction.
+    answer to loads, None where nothing bends; points: rows (n,) by name; gauges: by the names of sensors;
+    gravity_share: of gravity along the track's direction.
     """
 
     name: str
@@ -88,6 +99,7 @@ class FullBody:
     flexibility: Flexibility | None
     track: FullTrack
     points: dict[str, Array]
+    gauges: Mapping[str, FullGauge] = field(default_factory=dict)
     gravity_share: float = 1.0
 
     @property
@@ -197,6 +209,7 @@ def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> Fu
     track, ends = track_of(frame, assembly.mesh)
     gravity = unit(frame.gravity)
     numbers, loads = point_loads(frame, assembly)
+    spots = ((sensor, FrameSpot(frame, assembly, track, spot)) for sensor, spot in study.spots(name))
     return FullBody(
         name=name,
         length=float(track.places[-1]),
@@ -208,8 +221,16 @@ def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> Fu
         flexibility=flexibility,
         track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
         points={word: loads[:, number] for word, number in numbers.items()},
+        gauges={sensor: _gauge(place, loads, numbers) for sensor, place in spots},
         gravity_share=float(track.direction @ gravity),
     )
+
+
+def _gauge(place: FrameSpot, loads: Array, numbers: Mapping[str, int]) -> FullGauge:
+    """What a sensor reads; loads (n, P): of the points with these numbers."""
+    if place.spot.point is not None:
+        return FullGauge(rows_of(loads[:, numbers[f"point.{place.spot.point}"]]), np.zeros_like, 0.0)
+    return FullGauge(rows_of(place.row), place.within, place.under_weight)
 
 
 def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> Damping:

@@ -205,10 +205,11 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
         rows = no_rows(count)
         rows.freedoms[:] = model.sprung[sensor.carriage]
         rows.values[:, 0] = 1.0
-        on = [rows.values if sensor.reads.rate == k else none for k in range(3)]
-        return _Parts(Rows(rows.freedoms, on[0]), on[1], on[2])
+        return _of_rate(rows, sensor)
     body = model.study.body_of(name)
     track, first = model.bodies[body].track, model.firsts[body]
+    if sensor.spot is not None:
+        return _of_rate(model.bodies[body].gauges[name].rows.moved(first).repeated(count), sensor)
     place, rider = _place(model, sensor, along)
     rate = sensor.reads.rate
     if sensor.reads.of_section:
@@ -230,15 +231,23 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     return _Parts(Rows(shape.freedoms, on_u), on_v, on_a)
 
 
+def _of_rate(rows: Rows, sensor: Sensor) -> _Parts:
+    """A displacement, or its velocity or acceleration, at what does not move along its body."""
+    on = [rows.values * (sensor.reads.rate == rate) for rate in range(3)]
+    return _Parts(Rows(rows.freedoms, on[0]), on[1], on[2])
+
+
 def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> tuple[Array, Array]:
     """(S, T) what the ties' forces on the sensor's own element add, and (S,) what own weight on it does."""
     body = model.study.body_of(name)
-    track = model.bodies[body].track
+    track, gauge = model.bodies[body].track, model.bodies[body].gauges.get(name)
     place, _ = _place(model, sensor, along)
     section = sensor.reads.of_section
     forces = np.zeros((len(along.s), len(model.ties)))
 
     def adds(s: Array) -> Array:
+        if gauge is not None:
+            return gauge.within(s)
         return track.sections_within(sensor.quantity, place, s) if section else track.within(place, s)
 
     for j, tie in enumerate(model.ties):
@@ -247,7 +256,9 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
         if tie.rides == body and tie.at is not None:
             forces[:, j] -= adds(np.full(len(place), tie.at))
     added = np.zeros(len(place))
-    if _weighs(model.study, body):
+    if _weighs(model.study, body) and gauge is not None:
+        added += gauge.under_weight * model.study.gravity
+    elif _weighs(model.study, body):
         spread = track.sections_under_weight(sensor.quantity, place) if section else track.under_weight(place)
         added += spread * model.study.gravity
     return forces, added

@@ -34,6 +34,10 @@ class Rows(NamedTuple):
         """The same where the body's degrees of freedom begin at `first`."""
         return Rows(self.freedoms + first, self.values)
 
+    def repeated(self, count: int) -> Rows:
+        """One row, at so many stations."""
+        return Rows(np.repeat(self.freedoms, count, axis=0), np.repeat(self.values, count, axis=0))
+
     def of(self, state: Array) -> Array:
         """(S,) products with states (n,), or with one state per row (S, n)."""
         taken = state[self.freedoms] if state.ndim == 1 else np.take_along_axis(state, self.freedoms, axis=1)
@@ -49,6 +53,14 @@ class Rows(NamedTuple):
 def no_rows(count: int, width: int = WIDTH) -> Rows:
     """Rows of zeros."""
     return Rows(np.zeros((count, width), dtype=np.int64), np.zeros((count, width)))
+
+
+def rows_of(row: Array) -> Rows:
+    """One row (n,) with at most 12 entries."""
+    found = no_rows(1)
+    entries = np.flatnonzero(row)
+    found.freedoms[0, : len(entries)], found.values[0, : len(entries)] = entries, row[entries]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

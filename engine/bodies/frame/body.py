@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
+from engine.bodies.frame.gauges import Read, frame_gauge
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.points import frame_points, point_loads
 from engine.bodies.frame.sections import TrackSections
@@ -17,7 +18,7 @@ from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics, track_statics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
-from engine.bodies.modal.description import AUTO_MODES, MAX_MODES
+from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Spots
 from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
 from engine.bodies.modal.modal_body import Array, ModalBody, Shapes
 from engine.linear_algebra import one_thread
@@ -30,21 +31,21 @@ if TYPE_CHECKING:
 _UNFELT = 1e-9  # part of the largest deflection below which a mode does not move the track
 
 
-def frame_body(frame: Frame) -> ModalBody:
-    """The frame in modal coordinates with its exact statics; the last few are remembered.
+def frame_body(frame: Frame, spots: Spots = ()) -> ModalBody:
+    """The frame in modal coordinates with its exact statics, read at some spots; the last few are remembered.
 
     Raises BadInput, with the key within the body as its place, for a frame that cannot be reduced as it asks.
     """
-    return _frame_body(Content.of(frame))
+    return _frame_body(Content.of(frame), spots)
 
 
 @lru_cache(maxsize=8)
-def _frame_body(content: Content) -> ModalBody:
+def _frame_body(content: Content, spots: Spots) -> ModalBody:
     import scipy.linalg  # noqa: F401, its library is to be held too
 
     try:
         with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
-            found = _reduced(content.frame)
+            found = _reduced(content.frame, spots)
             probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
     except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
         raise _unsolvable(str(error)) from error
@@ -82,7 +83,7 @@ def _whole(content: Content) -> _Whole:
     return _Whole(assembly, flexibility, track, ends, statics)
 
 
-def _reduced(frame: Frame) -> ModalBody:
+def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     whole = _whole(Content.of(frame, without=ABOUT_MODES))
     assembly, flexibility, track, statics = whole.assembly, whole.flexibility, whole.track, whole.statics
     omega, shapes = frame_modes(frame, assembly, flexibility)
@@ -97,6 +98,8 @@ def _reduced(frame: Frame) -> ModalBody:
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
     loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
+    points = frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None
+    read = Read(frame, assembly, flexibility, statics, whole.ends, omega, shapes)
     bending = track.bending
     return ModalBody(
         length=statics.length,
@@ -110,7 +113,8 @@ def _reduced(frame: Frame) -> ModalBody:
         statics=statics,
         gravity_share=float(track.direction @ gravity),
         sections=sections,
-        points=frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None,
+        points=points,
+        gauges={name: frame_gauge(read, spot, loads) for name, spot in spots},
     )
 
 

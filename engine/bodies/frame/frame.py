@@ -14,8 +14,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
 from engine.bodies.frame.geometry import DIRECTIONS, TrackLine
-from engine.bodies.frame.refusals import check_frame, track_line
-from engine.bodies.modal.description import Body
+from engine.bodies.frame.refusals import check_frame, check_spot, track_line
+from engine.bodies.modal.description import Body, Spot, Spots
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
@@ -242,6 +242,9 @@ class Frame(Body):
                 return f"section.{section}.fibre_distance_lateral"
         return ""
 
+    def check_spot(self, spot: Spot) -> None:
+        check_spot(self, spot)
+
     def place(self, node: str) -> Three:
         """Coordinates of a node, m; in a plane frame two may be given."""
         given = self.node[node]
@@ -279,9 +282,12 @@ class Frame(Body):
         return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
 
     def build(self) -> ModalBody:
+        return self.read_at(())
+
+    def read_at(self, spots: Spots) -> ModalBody:
         from engine.bodies.frame.body import frame_body
 
-        return frame_body(self)
+        return frame_body(self, spots)
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         found: list[tuple[str, float | str, float]] = []

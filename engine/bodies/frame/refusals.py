@@ -10,9 +10,11 @@ from pydantic import ValidationError
 from pydantic_core import InitErrorDetails
 
 from engine.bodies.frame.geometry import SAME_PLACE, Array, TrackLine, local_axes, parallel, unit
+from engine.bodies.modal.description import Spot, check_spot_name
 from engine.study_file.document import shortened
 from engine.study_file.spec import nearest
 from engine.study_file.units import fault
+from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
@@ -235,6 +237,24 @@ def track_line(frame: Frame) -> TrackLine:
             refuse(key, "the track is not straight here", expected="members end to end on one straight line")
     places = np.concatenate([[0.0], np.cumsum(lengths)])
     return TrackLine(tuple(zip(names, backward, strict=True)), tangent, places, unit(frame.direction))
+
+
+def check_spot(frame: Frame, spot: Spot) -> None:
+    """A sensor's place is there and not held in its direction. Raises BadInput with the key within the sensor."""
+    check_spot_name("node", spot.node, frame.node)
+    check_spot_name("member", spot.member, frame.member)
+    check_spot_name("point", spot.point, frame.point)
+    if spot.member is not None:
+        ends = member_ends(frame, spot.member)
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        if spot.at > length:
+            expected = f"0 to {length:.10g} m, from its first node"
+            raise BadInput("a sensor off its member", where="at", expected=expected, received=f"{spot.at:.10g} m")
+    held = frame.still if spot.node is None else (*frame.still, *frame.holds(str(spot.node)))
+    way = unit(frame.gravity if spot.direction is None else spot.direction)
+    if spot.point is None and not any(way[axis] for axis, word in enumerate("xyz") if word not in held):
+        what = "nothing moves here in this direction"
+        raise BadInput(what, where="direction", expected="a direction that is not held", remedy=f"{spot.key} elsewhere")
 
 
 def _check_modes(frame: Frame) -> None:

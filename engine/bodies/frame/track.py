@@ -7,6 +7,7 @@ direction. What it does to the ends of its element, and what the deflection ther
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
 Counts = NDArray[np.int64]
+Members = Sequence[tuple[str, bool]]  # in a row, with whether each runs against it
 _END = 1e-12  # lengths before the end of a track that are its end
 _FELT = 1e-6  # part of a unit load along an axis that counts
 
@@ -178,19 +180,28 @@ class TrackPoints:
 
 def track_of(frame: Frame, mesh: Mesh) -> tuple[TrackBeams, TrackPoints]:
     """The elements under a frame's track, turned so that all run along it."""
-    elements, turned = [], []
-    for name, backward in frame.line.members:
-        chain = mesh.chains[name]
-        elements.append(chain[::-1] if backward else chain)
-        turned.append(np.full(len(chain), backward))
-    order, reverse = np.concatenate(elements), np.concatenate(turned)
+    return line_of(frame, mesh, frame.line.members, frame.line.direction, np.array(frame.track.offset))
+
+
+def elements_of(mesh: Mesh, members: Members) -> tuple[Counts, NDArray[np.bool_]]:
+    """The elements of members in a row, and which of them run against it."""
+    chains = [mesh.chains[name][::-1] if backward else mesh.chains[name] for name, backward in members]
+    turned = [np.full(len(chain), backward) for chain, (_, backward) in zip(chains, members, strict=True)]
+    return np.concatenate(chains), np.concatenate(turned)
+
+
+def line_of(
+    frame: Frame, mesh: Mesh, members: Members, direction: Array, offset: Array
+) -> tuple[TrackBeams, TrackPoints]:
+    """The elements of members in one straight row; loads in a direction (3,), off their axis by an offset (3,), m."""
+    order, reverse = elements_of(mesh, members)
     flip = np.where(reverse, -1.0, 1.0)[:, None]
     axes = mesh.axes[order] * np.stack([flip, flip, np.ones_like(flip)], axis=1)
     pairs = np.where(reverse[:, None], mesh.pairs[order, ::-1], mesh.pairs[order])
     arms = np.where(reverse[:, None, None], mesh.arms[order, ::-1], mesh.arms[order])
     beams = mesh.beams.part(order)
-    sections = [frame.section[frame.member[name].section] for name, _ in frame.line.members]
-    counts = [len(mesh.chains[name]) for name, _ in frame.line.members]
+    sections = [frame.section[frame.member[name].section] for name, _ in members]
+    counts = [len(mesh.chains[name]) for name, _ in members]
     fibres = [[_or_nan(section.fibre_distance_lateral), _or_nan(section.fibre_distance)] for section in sections]
     return TrackBeams(
         places=np.concatenate([[0.0], np.cumsum(beams.length)]),
@@ -198,8 +209,8 @@ def track_of(frame: Frame, mesh: Mesh) -> tuple[TrackBeams, TrackPoints]:
         beams=beams,
         area=np.repeat([section.area for section in sections], counts),
         fibres=np.repeat(np.array(fibres), counts, axis=0),
-        direction=frame.line.direction,
-        offset=np.array(frame.track.offset),
+        direction=direction,
+        offset=offset,
     ), TrackPoints(np.append(pairs[:, 0], pairs[-1, 1]), np.concatenate([arms[:, 0], arms[-1:, 1]]))
 
 

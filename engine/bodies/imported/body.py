@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +14,9 @@ from engine.bodies.imported.checks import findings
 from engine.bodies.imported.line import LinePoints, LineShapes, LineStatics, LineStress, NoSections
 from engine.bodies.imported.model import HeldModel, held_model
 from engine.bodies.imported.rows import node_rows, track_rows
-from engine.bodies.modal.description import AUTO_MODES
+from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility
-from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, held_weight
 from engine.linear_algebra import one_thread
 from engine.study_file.document import shortened
 from results_schema.errors import BadInput
@@ -40,22 +40,22 @@ class _Content:
     body: Imported = field(compare=False)
 
 
-def imported_body(body: Imported) -> ModalBody:
-    """The body in modal coordinates with its exact statics; the last few are remembered.
+def imported_body(body: Imported, spots: Spots = ()) -> ModalBody:
+    """The body in modal coordinates with its exact statics, read at some spots; the last few are remembered.
 
     Raises BadInput, with the key within the body as its place, for a model that cannot be a body as it stands.
     """
     text = body.model_dump_json(exclude={"damping_ratio": True, "own_weight": True}) + body.content
-    return _imported_body(_Content(text, body))
+    return _imported_body(_Content(text, body), spots)
 
 
 @lru_cache(maxsize=8)
-def _imported_body(content: _Content) -> ModalBody:
+def _imported_body(content: _Content, spots: Spots) -> ModalBody:
     import scipy.linalg  # noqa: F401, its library is to be held too
 
     try:
         with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
-            found = _modal_body(content.body)
+            found = _modal_body(content.body, spots)
     except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
         raise _unsolvable(str(error)) from error
     statics = found.statics
@@ -71,7 +71,7 @@ def _unsolvable(reason: str) -> BadInput:
     return BadInput(what, where="supports", expected="a model that is held, of one scale", received=shortened(reason))
 
 
-def _modal_body(body: Imported) -> ModalBody:
+def _modal_body(body: Imported, spots: Spots) -> ModalBody:
     held = held_model(body)
     rows, slopes = track_rows(body, held)
     omega, shapes = _modes(body, held)
@@ -91,6 +91,7 @@ def _modal_body(body: Imported) -> ModalBody:
     along = LineShapes(places, np.ascontiguousarray(ends))
     names, loads = _point_loads(body, held)
     sections = _sections(body, held, statics, (shapes, rows, slopes, pull, loads))
+    read = [(name, _node_load(body, held, spot.node, spot.direction)) for name, spot in spots]
     return ModalBody(
         length=body.length,
         mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
@@ -104,6 +105,7 @@ def _modal_body(body: Imported) -> ModalBody:
         gravity_share=float(unit(body.direction) @ gravity),
         sections=sections,
         points=_points(names, held, statics, sections, (shapes, rows, slopes, pull, loads)) if names else None,
+        gauges={name: _gauge(held, statics, load, (shapes, rows, slopes, pull, loads), names) for name, load in read},
         checks=findings(body, held, along),
     )
 
@@ -157,15 +159,32 @@ def _wave_number(along: LineShapes, size: Array) -> Array:
 
 def _point_loads(body: Imported, held: HeldModel) -> tuple[dict[str, int], Array]:
     """Names of points with their numbers, and unit forces (n, Q) there. Raises BadInput for one that cannot move."""
-    at = {int(number): index for index, number in enumerate(held.file.nodes)}
     columns = np.zeros((len(held.free), len(body.point)))
     for number, (name, point) in enumerate(body.point.items()):
-        way = unit(body.gravity_direction if point.direction is None else point.direction)
-        columns[:, number] = node_rows(held, [at[point.node]], way, 0).toarray()[:, 0]
+        columns[:, number] = _node_load(body, held, point.node, point.direction)
         if not columns[:, number].any():
             what = f"node {point.node} cannot move in this direction"
             raise BadInput(what, where=f"point.{name}", expected="a free node")
     return {f"point.{name}": number for number, name in enumerate(body.point)}, columns
+
+
+def _node_load(body: Imported, held: HeldModel, node: Any, direction: Any) -> Array:
+    """(n,) a unit force at a node, along gravity unless given."""
+    way = unit(body.gravity_direction if direction is None else direction)
+    return np.asarray(node_rows(held, np.flatnonzero(held.file.nodes == node), way, 0).toarray()[:, 0])
+
+
+def _gauge(held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, names: dict[str, int]) -> Gauge:
+    """A node that a sensor reads, from its unit force (n,)."""
+    shapes, rows, slopes, pull, loads = parts
+    moved = held.flexibility.solve(load[:, None])[:, 0]
+    response = slopes @ (rows.T @ moved)
+    return Gauge(
+        row=load @ shapes,
+        along=partial(statics.under, response, derivative=0),
+        points={name: float(loads[:, number] @ moved) for name, number in names.items()},
+        own_weight=partial(held_weight, statics.refuse_loose, float(moved @ pull)),
+    )
 
 
 def _points(

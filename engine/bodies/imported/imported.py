@@ -18,7 +18,7 @@ from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
 from engine.bodies.frame.frame import Place, Support, Vector
 from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
-from engine.bodies.modal.description import Body
+from engine.bodies.modal.description import Body, Spot, Spots, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
@@ -173,6 +173,24 @@ class Imported(Body):
                 refuse(("point", name, "node"), "there is no such node", received=str(point.node))
         return self
 
+    def check_spot(self, spot: Spot) -> None:
+        if spot.member is not None:
+            remedy = "node = its number, or at = metres along its track"
+            raise BadInput("a body out of files has no members", where="member", expected="a node", remedy=remedy)
+        check_spot_name("point", spot.point, self.point)
+        if spot.node is None or self.recorded is not None:
+            return
+        if spot.node not in self.model.nodes:
+            raise BadInput("there is no such node", where="node", expected="its number", received=shortened(spot.node))
+        place = int(np.flatnonzero(self.model.nodes == spot.node)[0])
+        rows = self.model.rows_of(place)[:3]
+        way = unit(self.gravity_direction if spot.direction is None else spot.direction)
+        held = {word for text in self.supports if place in self.group(text) for word in self.holds(text)}
+        free = [row >= 0 and not self.model.held[row] for row in rows]
+        if not any(way[axis] and free[axis] and DIRECTIONS[axis] not in held for axis in range(3)):
+            what = f"node {spot.node} does not move in this direction"
+            raise BadInput(what, where="direction", expected="a direction that is not held", remedy="node elsewhere")
+
     def _check_track_rows(self) -> None:
         """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""
         if self.lacking == "held":
@@ -212,9 +230,12 @@ class Imported(Body):
         return _HOLDS[support] if isinstance(support, str) else support
 
     def build(self) -> ModalBody:
+        return self.read_at(())
+
+    def read_at(self, spots: Spots) -> ModalBody:
         from engine.bodies.imported.body import imported_body
 
-        return imported_body(self)
+        return imported_body(self, spots)
 
     def checks(self, here: str) -> list[Check]:
         return []

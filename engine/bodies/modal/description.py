@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
@@ -10,9 +11,10 @@ from pydantic import Field, PrivateAttr, Strict, Tag
 
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
-from engine.study_file.document import Beside
-from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form
+from engine.study_file.document import Beside, shortened
+from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form, nearest
 from engine.study_file.units import Dimensionless, Rate, Time
+from results_schema.errors import BadInput
 
 MAX_MODES = 64
 AUTO_MODES = 12
@@ -30,6 +32,35 @@ DampingRatio = Annotated[
     Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
 ]
 Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)], by_form]
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place that a sensor reads off the track: a node (its name or number), a member with metres from its first node,
+    or a point; and the direction that it reads, along gravity unless given."""
+
+    node: str | int | None = None
+    member: str | None = None
+    at: float = 0.0
+    point: str | None = None
+    direction: tuple[float, float, float] | None = None
+
+    @property
+    def key(self) -> str:
+        """The key of the sensor that names it."""
+        return next(key for key in ("node", "member", "point") if getattr(self, key) is not None)
+
+
+Spots = tuple[tuple[str, Spot], ...]  # by the names of sensors
+
+
+def check_spot_name(key: str, name: object, names: Iterable[str]) -> None:
+    """Raise BadInput where a sensor's key names a node, member or point that there is not."""
+    known = list(names)
+    if name is not None and name not in known:
+        expected = f"one of {', '.join(known[:12])}" if known else "a body that has some"
+        hint = nearest(name, known)
+        raise BadInput(f"no such {key}", where=key, expected=expected, received=shortened(name), remedy=hint)
 
 
 @dataclass(frozen=True)
@@ -77,9 +108,18 @@ class Body(Spec):
     def build(self) -> ModalBody:
         """The body in modal coordinates. Raises BadInput, with the key within the body as its place."""
 
+    def read_at(self, spots: Spots) -> ModalBody:
+        """The same with gauges at nodes and places of members, where it has such."""
+        return self.build()
+
     @abstractmethod
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""
+
+    def check_spot(self, spot: Spot) -> None:
+        """Raise BadInput, with the key within the sensor as its place, for a place that cannot be read."""
+        what, remedy = f"this body has no {spot.key} to read", "at = metres along its track"
+        raise BadInput(what, where=spot.key, expected="a place on its track", remedy=remedy)
 
     @property
     def is_simply_supported(self) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -73,6 +73,36 @@ class Points(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Gauge:
+    """A place that a sensor reads in one direction.
+
+    row (N,): what every mode moves it by, kg^(-1/2); along: its motion per unit force at places (S,) of the track, m/N;
+    points: the same at points, by name; own_weight: its motion under the body's own weight per unit gravity.
+    """
+
+    row: Array
+    along: Callable[[Array], Array]
+    points: Mapping[str, float]
+    own_weight: Callable[[], float]
+
+    def influence(self, loaded: Array | str) -> Array:
+        """Its motion per unit force at places (S,) of the track, or at a point (1,); m/N."""
+        return np.array([self.points[loaded]]) if isinstance(loaded, str) else self.along(loaded)
+
+
+def held_weight(refuse_loose: Callable[[], None], weight: float) -> float:
+    """The motion under own weight of a place of a body that is held, else what `refuse_loose` raises."""
+    refuse_loose()
+    return weight
+
+
+def gauge_at(points: Points, name: str) -> Gauge:
+    """A sensor at a point."""
+    between = {other: points.between(name, other) for other in points.numbers}
+    return Gauge(points.row(name), partial(points.influence, name), between, partial(points.own_weight, name))
+
+
+@dataclass(frozen=True, eq=False)
 class ModalBody:
     """A body in modal coordinates with unit modal mass; SI units, w positive along gravity.
 
@@ -89,6 +119,7 @@ class ModalBody:
     shapes, statics     where the functions of place come from
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
     points              places off the track; None: there are none
+    gauges              places that sensors read off the track, by the sensors' names
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     """
@@ -107,6 +138,7 @@ class ModalBody:
     fibre_distance: float = np.nan
     sections: Sections | None = None
     points: Points | None = None
+    gauges: Mapping[str, Gauge] = field(default_factory=dict)
     checks: tuple[tuple[str, str], ...] = ()
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 

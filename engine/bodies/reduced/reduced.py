@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from engine.bodies.frame.refusals import refuse
-from engine.bodies.modal.description import Body
+from engine.bodies.modal.description import Body, Spot, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
-from results_schema.errors import WanderlastError
+from results_schema.errors import BadInput, WanderlastError
 
 
 class Reduced(Body):
@@ -69,6 +69,16 @@ class Reduced(Body):
             what = getattr(error, "what", str(error))
             refuse(("file",), f"no reduced body can be read: {what}", received=shortened(self.file))
         return self
+
+    def check_spot(self, spot: Spot) -> None:
+        from results_schema.store.bodies import read_body
+
+        if spot.point is None:
+            what, remedy = f"a reduced body has no {spot.key}s", "save it with a point there, and read point = its name"
+            raise BadInput(what, where=spot.key, expected="one of its points", remedy=remedy)
+        if self.recorded is None:
+            points = read_body(self.file).points
+            check_spot_name("point", spot.point, (p.removeprefix("point.") for p in points if p.startswith("point.")))
 
     def with_more_modes(self, times: int) -> Reduced:
         """The same body with more of the modes in its file."""

@@ -1,0 +1,127 @@
+"""Places of a frame that sensors read off its track, or on it in another direction.
+
+A node, or a place of a member between its nodes, is one number v = r . u of the frame's motion (r from the element's
+static shapes), so that by Maxwell's theorem the load r tells what a load on the track moves it by. Where both stand on
+one element, that bends between its ends besides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.bodies.frame.assembly import MASSES, Assembly
+from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.shapes import mode_forces, track_shapes
+from engine.bodies.frame.statics import TrackStatics
+from engine.bodies.frame.track import TrackBeams, TrackPoints, elements_of, line_of
+from engine.bodies.modal.description import Spot
+from engine.bodies.modal.flexibility import Flexibility, without_rounding
+from engine.bodies.modal.modal_body import Array, Gauge, held_weight
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
+
+
+class Read(NamedTuple):
+    """What a frame is read with: its matrices, its track with the points under it, frequencies and whole shapes."""
+
+    frame: Frame
+    assembly: Assembly
+    flexibility: Flexibility
+    statics: TrackStatics
+    ends: TrackPoints
+    omega: Array
+    shapes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSpot:
+    """A spot of a frame in its matrices; track: that of the frame."""
+
+    frame: Frame
+    assembly: Assembly
+    track: TrackBeams
+    spot: Spot
+
+    @property
+    def direction(self) -> Array:
+        """(3,) unit vector that is read."""
+        return unit(self.frame.gravity if self.spot.direction is None else self.spot.direction)
+
+    @cached_property
+    def line(self) -> tuple[TrackBeams, TrackPoints]:
+        """The member that it stands on."""
+        members = [(str(self.spot.member), False)]
+        return line_of(self.frame, self.assembly.mesh, members, self.direction, np.zeros(3))
+
+    @property
+    def row(self) -> Array:
+        """(n,) r: its motion from the free degrees of freedom, and the load that a unit force there is."""
+        size = 6 * len(self.assembly.mesh.points)
+        if self.spot.member is None:
+            row = np.zeros((size // 6, 6))
+            row[list(self.frame.node).index(str(self.spot.node)), :3] = self.direction
+            return np.asarray(row.reshape(-1)[self.assembly.free])
+        beams, ends = self.line
+        element, _ = beams.at(np.array([self.spot.at]))
+        acts = beams.to_ends(np.array([self.spot.at])).reshape(2, 1, 6)
+        first, second = (ends.loads(part, element + end, size)[:, 0] for end, part in enumerate(acts))
+        return np.asarray((first + second)[self.assembly.free])
+
+    def within(self, s: Array) -> Array:
+        """(S,) m/N: what a unit force at s on the track adds where it bends the spot's own element."""
+        if self.spot.member is None:
+            return np.zeros(len(s))
+        beams, _ = self.line
+        order, turned = elements_of(self.assembly.mesh, self.frame.line.members)
+        (element,), (x,) = beams.at(np.array([self.spot.at]))
+        here = np.flatnonzero(order == self.assembly.mesh.chains[self.spot.member][element])
+        if not len(here):
+            return np.zeros(len(s))
+        j = here[0]
+        place = self.track.places[j] + (beams.beams.length[element] - x if turned[j] else x)
+        held = self.track.held_parts(np.full(len(s), place), s, 0)
+        return np.asarray((self.track.axes[j] @ self.direction) @ held[:3])
+
+    @property
+    def under_weight(self) -> float:
+        """What own weight on its element adds per unit gravity."""
+        if self.spot.member is None or self.frame.mass_matrix != "consistent":
+            return 0.0
+        beams, _ = self.line
+        spread = beams.spread_weight(unit(self.frame.gravity))
+        return float(beams.under_spread_load(np.array([self.spot.at]), spread)[0])
+
+    def mode_row(self, omega: Array, shapes: Array) -> Array:
+        """(N,) what modes of shapes (n, N) move it by; inside a member as precisely as along a track."""
+        if self.spot.member is None:
+            return np.asarray(self.row @ shapes)
+        beams, ends = self.line
+        moved = without_rounding(ends.of(self.assembly.whole(shapes)), (0, 1))
+        forces = mode_forces(beams, moved, omega, MASSES[self.frame.mass_matrix](beams.beams))
+        return np.asarray(track_shapes(beams, moved, forces).derivatives([self.spot.at], (0,))[0, 0])
+
+
+def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) -> Gauge:
+    """A place that a sensor reads; points: names and loads (n, P) of the frame's points."""
+    statics, assembly = read.statics, read.assembly
+    place = FrameSpot(read.frame, assembly, statics.track, spot)
+    row = place.row
+    moved = read.flexibility.solve(row[:, None])
+    response = read.ends.of(assembly.whole(moved)).reshape(-1)
+    weight = float(moved[:, 0] @ (assembly.drag @ unit(read.frame.gravity))) + place.under_weight
+    names, loads = points
+    return Gauge(
+        row=place.mode_row(read.omega, read.shapes),
+        along=partial(_along, statics, response, place),
+        points={name: float(loads[:, number] @ moved[:, 0]) for name, number in names.items()},
+        own_weight=partial(held_weight, statics.refuse_loose, weight),
+    )
+
+
+def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -> Array:
+    return statics.under_response(response, s) + place.within(s)
