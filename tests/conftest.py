@@ -1,8 +1,34 @@
-"""One thread of linear algebra: its matrices are small here, and idle threads that spin take the processors' time."""
+"""One thread of linear algebra: its matrices are small here, and idle threads that spin take the processors' time.
+
+And with NO_SKIPS set in the environment a skipped test fails.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
+
+import pytest
 
 for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for processes that tests start
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+
+def _failed(report: pytest.CollectReport | pytest.TestReport) -> None:
+    if os.environ.get("NO_SKIPS") and report.skipped:
+        report.outcome = "failed"
+        report.longrepr = f"{report.nodeid} was skipped: {report.longrepr}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    _failed(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    report = yield
+    _failed(report)
+    return report

@@ -149,10 +149,6 @@ def test_importing_takes_no_longer_than_numpy_and_a_fifth_of_a_second() -> None:
     assert best_seconds("-c", "import engine") < best_seconds("-c", "import numpy") + 0.2
 
 
-def test_help_takes_less_than_three_tenths_of_a_second() -> None:
-    assert best_seconds("-m", "studies", "--help") < 0.3
-
-
 def best_seconds(*arguments: str) -> float:
     """Processor seconds of the quickest of five runs of Python: other processes, of tests too, take none of them."""
 

@@ -6,6 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -24,7 +25,7 @@ def versions_tried() -> dict[str, str]:
 
 def test_versions_tried_lie_in_the_ranges() -> None:
     tested = versions_tried()
-    extras = [text for name in ("test", "nastran", "ansys") for text in PROJECT["optional-dependencies"][name]]
+    extras = [text for name in ("test", "nastran", "ansys", "jax") for text in PROJECT["optional-dependencies"][name]]
     wanted = [Requirement(text) for text in (*PROJECT["dependencies"], *extras)]
     assert len(wanted) >= 16
     for requirement in wanted:
@@ -33,16 +34,18 @@ def test_versions_tried_lie_in_the_ranges() -> None:
         assert len(requirement.specifier) > 0, requirement
 
 
-def test_extras() -> None:
-    assert set(PROJECT["optional-dependencies"]) == {"test", "nastran", "ansys", "robots"}
+def test_the_slow_command_installs_all_extras() -> None:
+    asked = re.search(r"-e '\.\[(.*)\]'", (ROOT / ".ci" / "slow").read_text(encoding="utf-8"))
+    assert asked is not None and set(asked[1].split(",")) == set(PROJECT["optional-dependencies"])
 
 
-def test_the_readme_has_the_command_that_ci_runs() -> None:
-    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["run", "slow"])
+def test_the_readme_has_the_commands_that_ci_runs(name: str) -> None:
+    script = (ROOT / ".ci" / name).read_text(encoding="utf-8")
     command = re.search(r"^(\.ci/venv && .*)\Z", script, re.DOTALL | re.MULTILINE)
     assert command is not None
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert _one_line(command[1]) in _one_line(readme)
+    assert _one_line(command[1]) in _one_line(readme) and f"`.ci/{name}`" in readme
 
 
 def test_data_files_lie_inside_their_package() -> None:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +15,7 @@ from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
 from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
 from results_schema.status import Status
-from tests.accuracy.chosen import LENGTHS, SPEEDS, STUDIES, TOLERANCE, WEIGHTS, executed, observed, run_of
+from tests.accuracy.chosen import SPEEDS, STUDIES, TOLERANCE, executed, observed, run_of
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
 
 Array = NDArray[np.float64]
@@ -66,24 +62,6 @@ def test_kernels_are_their_numpy_twins(seed: int) -> None:
     np.testing.assert_array_equal(neighbours, near_by_numpy(points, pilots, 4))
     np.testing.assert_array_equal(rung, cheapest_by_numpy(held, order, 9, neighbours, limit))
     assert len(np.unique(rung)) > 3
-
-
-def test_kernels_without_the_compiler(tmp_path: Path) -> None:
-    script = (
-        "import json; from tests.accuracy.test_choice import by_kernels\n"
-        "print(json.dumps([part.tolist() for part in by_kernels(1)]))"
-    )
-    plain = os.environ | {"NUMBA_DISABLE_JIT": "1", "WANDERLAST_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", script], env=plain, capture_output=True, text=True, check=True, cwd=ROOT
-    )
-    assert json.loads(done.stdout) == [part.tolist() for part in by_kernels(1)]
-
-
-def test_fewer_pilots_than_neighbours() -> None:
-    found = np.empty((5, 2), dtype=np.int32)
-    nearest(np.linspace(0.0, 1.0, 5)[:, None], np.array([[0.9, 0.1]]), found)
-    assert found.tolist() == [[1, 0], [1, 0], [0, 1], [0, 1], [0, 1]] or found[2].tolist() == [1, 0]
 
 
 def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
@@ -184,29 +162,6 @@ def test_a_tolerance_of_a_sensors_own_is_held_beside_a_looser_one() -> None:
     assert fine.mean() > 0.95
     assert np.all(run.arrays["estimated_error"][fine][:, own] <= 2e-3 * (1.0 + 1e-6))
     assert np.mean(observed("own tolerance, others swept")[own][:, fine].max(axis=0) <= 2e-3) >= 0.97
-
-
-def test_a_structural_axis_is_one_of_the_distance() -> None:
-    """Lengths make scenes of their own, among whose variants pilots are drawn alike."""
-    run = run_of("lengths")
-    assert len(run.plan.grids) == len(LENGTHS["length"]["values"])
-    assert all(np.isin(members, run.choice.pilots).any() for members in run.plan.members)
-    spread = coordinates(run.plan.cases, np.arange(run.plan.size))
-    assert spread.shape[1] >= 3 and len(WEIGHTS["weight"]["values"]) == 3
-
-
-def test_an_axis_of_one_value_changes_nothing() -> None:
-    one, without = run_of("one value"), run_of("passages")
-    for name in ("midspan_max", "midspan_rms", "estimated_error", "work", "status"):
-        assert one.arrays[name].tobytes() == without.arrays[name].tobytes(), name
-
-
-def test_kept_histories_do_not_keep_a_study_from_choosing() -> None:
-    """Disk space is asked for before anything is chosen."""
-    every, few = run_of("every history"), run_of("passages")
-    assert np.unique(every.choice.rung).size > 1
-    assert every.arrays["work"].mean() < 4.0 * few.arrays["work"].mean()
-    assert np.all(observed("every history")[:3] < 2e-2)
 
 
 def test_statics_are_chosen_where_they_are_enough() -> None:

@@ -88,10 +88,3 @@ def test_very_many_steps_are_compared_at_some_stations() -> None:
     assert 4000 < time.size < 9000
     assert set(grid.grid.parts[1][:2]) <= set(time[~free].tolist())
     np.testing.assert_allclose(instants(grid, 2)[1], time, rtol=0, atol=1e-12)
-
-
-def test_pairs_are_halved_however_many_steps_they_have() -> None:
-    grid = only_grid(passages(solver={"scheme": "richardson", "steps": 25_602}))
-    fine = grid.tables(grid.scene, 1)
-    halves = [2 * segment.steps for segment in fine.coarser.timeline.segments]
-    assert len(halves) > 1 and halves == [segment.steps for segment in fine.timeline.segments]

@@ -80,19 +80,6 @@ def test_held_errors_fall_along_a_column() -> None:
         assert not np.any(risen & known[:-1])
 
 
-def test_more_modes_leave_less() -> None:
-    """Of the full model with the finest steps that were marched."""
-    climb = climbed()
-    modes, left = [], []
-    for column, numerics in enumerate(climb.ladder.columns):
-        last = climb.held[column, -1]
-        if (numerics.fidelity, numerics.scheme.name) == ("auto", "fox-goodwin") and np.isfinite(last).all():
-            modes.append(numerics.modes)
-            left.append(float(last.max()))
-    assert modes == sorted(modes) and len(modes) > 3
-    assert left[-1] < 0.5 * left[0]
-
-
 def test_every_pilot_has_a_rung_that_holds() -> None:
     measured = climbed().measured()
     assert np.all(measured.held.min(axis=(0, 1)) <= 1.0)

@@ -21,12 +21,6 @@ from tests.engine.build import beam, cruise, fixed
 from tests.unreduced.test_unreduced import frame
 
 
-def test_it_is_a_value() -> None:
-    one, other = (Numerics.of(passages(solver={"fidelity": "force", "scheme": "fox-goodwin"})) for _ in range(2))
-    assert one == other and hash(one) == hash(other) and one._replace(modes=3) != other
-    assert (one.fidelity, one.scheme.name, one.static_correction) == ("force", "fox-goodwin", True)
-
-
 def test_building_with_it_leaves_the_study_as_it_is() -> None:
     given = passages()
     model, text = build_model(given, {}, {}), given.model_dump_json()
@@ -84,11 +78,6 @@ def test_modes_of_an_imported_body(tmp_path: Path) -> None:
     files = Files(tmp_path, straight(PINNED, elements=16))
     found = only_body(files.table(modes=4))
     assert [modes_of(found.with_more_modes(times)) for times in (1, 3)] == [4, 12]
-
-
-def test_a_rigid_body_has_none_that_bend() -> None:
-    found = only_body({"kind": "rigid", "length": 1.0, "mass": 2.0, "inertia": 0.1})
-    assert found.with_more_modes(4) == found.with_modes(9) == found
 
 
 @pytest.mark.parametrize(("modes", "more", "kept"), [(0, 1, 10), (3, 1, 3), (3, 4, 3)])

@@ -12,10 +12,9 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
 from engine.bodies.modal.description import MAX_MODES
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from results_schema.status import Status
-from tests.accuracy.passages import OPEN, WEIGHT, ZETA, only_grid, passages
+from tests.accuracy.passages import OPEN, WEIGHT, only_grid, passages
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.reference import values
 
@@ -45,18 +44,6 @@ def test_levels_converge_to_the_published_moving_masses(case: values.MovingMass)
     error = told(grid, found, "midspan_max")[0]
     assert error <= 1e-3
     assert abs(found.outcome.numbers["midspan_max"][0] - case.largest) <= error + 1e-8
-
-
-@pytest.mark.parametrize(
-    ("which", "zeta"), [("MOVING_MASS_DAMPED_2_PERCENT", 0.02), ("MOVING_MASS_WITHOUT_CONVECTIVE", 0.0)]
-)
-def test_levels_converge_to_its_variations(which: str, zeta: float) -> None:
-    fidelity = "full" if zeta else "mass-without-convective"
-    for case in getattr(values, which):
-        grid = only_grid(crossing(case.alpha, case.mu, damping_ratio=zeta, solver={"fidelity": fidelity}))
-        found = levels(grid)
-        off = abs(found.outcome.numbers["midspan_max"][0] - case.largest)
-        assert off <= told(grid, found, "midspan_max")[0] + 1e-8
 
 
 def test_levels_converge_to_moving_forces_of_many_modes() -> None:
@@ -155,14 +142,6 @@ def test_levels_keep_to_what_the_study_fixes(changes: dict[str, Any], free: bool
         assert study_.solver.scheme in ("auto", numerics.scheme.name)
     assert (found.steps == "grow") == (study_.solver.steps == "auto")
     assert {numerics.fidelity for numerics in in_full(grid).numerics} == {"full"}
-
-
-def test_lanes_may_stop_at_different_levels() -> None:
-    sweep = {"zeta": {"of": ZETA, "values": [0.0, 0.3]}, "weight": {"of": WEIGHT, "values": [0.01, 2.0]}}
-    grid = only_grid(passages(bed=OPEN, sweep=sweep, solver={"tolerance": 1e-4}))
-    found = levels(grid)
-    assert len(np.unique(found.used["work"])) > 1
-    assert isinstance(grid.values, VariantValues) and np.all(found.used["steps_used"] > 0)
 
 
 @pytest.mark.parametrize("modes", ["auto", 4, 20, 64])

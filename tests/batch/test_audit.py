@@ -11,9 +11,9 @@ import pytest
 from engine.accuracy.results import results_of
 from engine.batch.audit import audit, audit_size, joined, sampled
 from engine.batch.plan import Plan, make_plan
-from tests.accuracy.chosen import STUDIES, chosen_plan, observed, run_of
+from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import WEIGHT, axis, passages
-from tests.engine.build import beam, mass, study, swing
+from tests.engine.build import beam, cruise, mass, study, swing
 
 
 def on(plan: Plan, variants: Any) -> Any:
@@ -44,31 +44,15 @@ def test_no_pilot_is_audited() -> None:
     np.testing.assert_array_equal(sampled(plan), others)
 
 
-def test_a_hundredth_is_audited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", np.inf)
+def test_a_hundredth_is_audited() -> None:
     assert [audit_size(masses(count)) for count in (3, 100, 4000, 100_000)] == [3, 16, 40, 256]
 
 
-def test_half_as_many_until_that_takes_no_longer_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.batch.audit.MOST_TIME", 0.0)
-    sizes = []
-    for seconds in (1e3, 1e-2, 1e-3, 1e-9):
-        monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", seconds)
-        sizes.append(audit_size(masses(4000)))
-    assert sizes == sorted(sizes, reverse=True) and sizes[0] == 40 and sizes[-1] == 0
-    assert set(sizes) <= {40, 20, 10, 5, 2, 1, 0}
-
-
-def test_what_is_observed_is_what_a_finer_march_finds() -> None:
-    """Beside what the archive tells, for every result."""
-    run = run_of("passages")
-    picked = np.arange(0, 300, 11)
-    found = on(run.plan, picked)
-    np.testing.assert_array_equal(found.variants, picked)
-    assert found.left_out == 0 and found.observed.shape == (len(results_of(run.plan.asked)), picked.size)
-    np.testing.assert_allclose(found.observed[:3], observed("passages")[:3, picked], rtol=0.1, atol=1e-4)
-    np.testing.assert_allclose(found.told.T, run.arrays["estimated_error"][picked], rtol=1e-6)
-    assert np.mean(found.observed[:3] <= found.told[:3]) >= 0.95
+def test_less_is_audited_of_what_takes_long_beside_the_run() -> None:
+    """Statics of ever slower masses, which cost nothing but in an audit."""
+    cars = [mass(0.2, cruise(0.0, 1.0, speed)) for speed in (1e-3, 1e-4, 1e-5)]
+    sizes = [audit_size(masses(4000, car=car, solver={"fidelity": "static"})) for car in cars]
+    assert sizes == sorted(sizes, reverse=True) and (sizes[0], sizes[-1]) == (40, 0)
 
 
 def test_parts_are_joined_to_the_same_audit() -> None:

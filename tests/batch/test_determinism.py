@@ -6,8 +6,6 @@ from __future__ import annotations
 import hashlib
 import math
 import threading
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -76,15 +74,6 @@ def digest(plan: Plan, chunk: int | None, threads: int) -> str:
     return found.hexdigest()
 
 
-def test_the_mixed_study_is_mixed() -> None:
-    (plan, _), ds = of_mixed(), dataset_of_mixed()
-    assert plan.size == 150
-    assert np.unique(ds.steps_used.values).size >= 3
-    assert len({id(group.scene) for group in plan.groups}) == 2
-    assert {0, 1} <= set(ds.status.values.ravel().tolist())
-    assert np.isfinite(ds.midspan_max.values).sum() == 150
-
-
 def test_same_bits_for_any_chunks_and_threads() -> None:
     plan, given = make_plan(mixed()), ((7, 2), (64, 1), (64, 2), (None, 1), (None, 2))
     assert len({digest(plan, chunk, threads) for chunk, threads in given}) == 1
@@ -129,34 +118,12 @@ def test_a_sensor_has_the_same_bits_in_any_company(riding: dict[str, Any]) -> No
     assert all(one.identical(results[0]) for one in results[1:])
 
 
-Poison = Callable[[LaneTable, NDArray[np.bool_]], LaneTable]
+POISON = {"mass": math.nan, "weight": math.inf, "rates": -200.0}  # what a lane has in place of a sound number
 
 
-def nan_mass(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
-    return replace(lanes, mass=np.where(bad[:, None], np.nan, lanes.mass))
-
-
-def infinite_weight(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
-    return replace(lanes, weight=np.where(bad[:, None], np.inf, lanes.weight))
-
-
-def nan_damping(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
-    return replace(lanes, rates=np.where(bad[:, None], np.nan, lanes.rates))
-
-
-def negative_damping(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
-    return replace(lanes, rates=np.where(bad[:, None], -200.0, lanes.rates))
-
-
-def nan_weight(lanes: LaneTable, bad: NDArray[np.bool_]) -> LaneTable:
-    return replace(lanes, weight=np.where(bad[:, None], np.nan, lanes.weight))
-
-
-@pytest.mark.parametrize("poison", [nan_mass, infinite_weight, nan_damping, negative_damping, nan_weight])
+@pytest.mark.parametrize("name", POISON)
 @pytest.mark.parametrize("carriages", ["one", "two"])
-def test_one_bad_lane_leaves_its_neighbours_alone(
-    poison: Poison, carriages: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_bad_lane_leaves_its_neighbours_alone(name: str, carriages: str, monkeypatch: pytest.MonkeyPatch) -> None:
     riding = {"car": mass(0.5, cruise(0.0, 1.0, 1.0)), "next": mass(0.2, cruise(0.0, 1.0, 1.0), headway=0.3)}
     riding = riding if carriages == "two" else {"car": riding["car"]}
     sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 37}}
@@ -165,8 +132,9 @@ def test_one_bad_lane_leaves_its_neighbours_alone(
     table = engine.march.march.lane_table
 
     def poisoned(model: SceneModel, lane_values: VariantValues) -> LaneTable:
-        bad = np.isclose(lane_values.own_mass("car"), clean.weight.values[20])
-        return poison(table(model, lane_values), to_blocks(bad))
+        lanes = table(model, lane_values)
+        bad = to_blocks(np.isclose(lane_values.own_mass("car"), clean.weight.values[20]))
+        return replace(lanes, **{name: np.where(bad[:, None], POISON[name], getattr(lanes, name))})
 
     monkeypatch.setattr(engine.march.march, "lane_table", poisoned)
     found = run(given, threads=2)
@@ -292,12 +260,9 @@ def test_what_the_sink_raises_reaches_the_caller() -> None:
         if len(calls) == 3:
             raise Broken
 
-    before = threading.active_count()
     with pytest.raises(Broken):
         execute(make_plan(mixed()), sink, chunk=5, threads=2)
     assert len(calls) == 3
-    time.sleep(0.2)
-    assert threading.active_count() <= before + 2
 
 
 def test_what_a_chunk_raises_reaches_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,23 +276,25 @@ def test_what_a_chunk_raises_reaches_the_caller(monkeypatch: pytest.MonkeyPatch)
         execute(plan, Recorder(), chunk=5, threads=2)
 
 
-@pytest.mark.parametrize("steps", [400, 20_000_000])
-def test_stop_is_heard_within_two_seconds(steps: int) -> None:
-    """In a study of many chunks, and within one variant that would take minutes."""
-    sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 400_000 if steps == 400 else 2}}
-    plan = make_plan(study(beam(modes=10), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep, solver={"steps": steps}))
-    stop = threading.Event()
-    set_at: list[float] = []
+def test_a_stop_is_heard_between_chunks() -> None:
+    """Only what is in flight is finished."""
+    sweep = {"weight": {"of": "carriage.car.mass", "from": 0.1, "to": 1.0, "count": 10_000}}
+    plan = make_plan(study(beam(modes=3), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep, solver={"steps": 400}))
+    stop, sink = threading.Event(), Recorder()
+    with pytest.raises(Interrupted):
+        execute(plan, lambda *found: (sink(*found), stop.set()), stop=stop, chunk=50, threads=2)
+    assert 50 <= len(sink.variants) <= 200
 
-    def ask() -> None:
-        set_at.append(time.monotonic())
-        stop.set()
 
-    timer = threading.Timer(0.7, ask)
+def test_a_stop_is_heard_within_a_variant() -> None:
+    """Which alone would take minutes."""
+    plan = make_plan(study(beam(modes=10), mass(0.5, cruise(0.0, 1.0, 1.0)), solver={"steps": 20_000_000}))
+    stop, sink = threading.Event(), Recorder()
+    timer = threading.Timer(0.5, stop.set)
     timer.start()
     with pytest.raises(Interrupted):
-        execute(plan, Recorder(), stop=stop)
-    assert time.monotonic() - set_at[0] < 2.0
+        execute(plan, sink, stop=stop)
+    assert sink.variants == []
 
 
 def test_stop_before_the_start() -> None:
@@ -342,10 +309,3 @@ def test_stop_before_the_start() -> None:
 def test_no_threads_is_bad_input() -> None:
     with pytest.raises(BadInput, match="threads"):
         run(mixed(), threads=0)
-
-
-def test_dataset_of_chunks_has_the_grid() -> None:
-    ds = dataset_of_mixed()
-    assert dict(ds.sizes)["speed"] == 5
-    assert ds.status.dims == ("speed", "weight", "zeta", "stiffness")
-    np.testing.assert_allclose(ds.mass_ratio.values, ds.weight.values)

@@ -9,37 +9,11 @@ import pytest
 
 from engine.accuracy.ladder import ladder_of
 from engine.batch.plan import EVERY_MARCH, make_plan
-from engine.scene.study import load
 from results_schema.errors import BadInput
 from studies.protocol.study import kind_of
+from tests.studies import scenes
 
-TEXT = """
-schema_version = 1
-kind = "{kind}"
-
-[body.bed]
-kind = "beam"
-length = 10.0
-area = 0.01
-second_moment = 8e-6
-youngs_modulus = "210 GPa"
-density = 7850
-supports = "pinned-pinned"
-damping_ratio = 0.03
-
-[carriage.table]
-on = "bed"
-kind = "mass"
-mass = 1.0
-motion = {{ kind = "cruise", start = 0.0, end = 10.0, speed = 0.01 }}
-
-[sensor.midspan]
-body = "bed"
-at = 5.0
-
-[solver]
-tolerance = 1e-2
-"""
+SLOW = "[solver]\ntolerance = 1e-2\n"
 RUN = """
 import sys
 {imports}
@@ -52,13 +26,14 @@ print(int(found.fidelity_used), sha256(repr(text).encode()).hexdigest())
 IMPORTS = ("", "import studies", "import studies\nfor kind in studies.kind_names(): studies.kind_named(kind)")
 
 
-@pytest.mark.parametrize("kind", ["trajectory", "passage"])
-def test_a_run_is_the_same_with_and_without_studies(kind: str) -> None:
+def test_a_run_is_the_same_with_and_without_studies() -> None:
     """The choice of the model and what is kept, in fresh processes with different imports."""
-    text = TEXT.format(kind=kind)
     told = {
         subprocess.run(
-            [sys.executable, "-c", RUN.format(imports=imports), text], capture_output=True, text=True, check=True
+            [sys.executable, "-c", RUN.format(imports=imports), scenes.text_of("trajectory", extra=SLOW)],
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout
         for imports in IMPORTS
     }
@@ -68,7 +43,7 @@ def test_a_run_is_the_same_with_and_without_studies(kind: str) -> None:
 
 def test_a_study_says_whose_results_it_keeps() -> None:
     """Accelerations, which a trajectory keeps and statics have not, take more than statics."""
-    study = load(TEXT.format(kind="trajectory"))
+    study = scenes.study("trajectory").with_values({"body.bed.modes": "auto", "carriage.table.mass": 1.0})
     kind = kind_of(study)
     plans = {results: make_plan(study, results=results) for results in (EVERY_MARCH, kind.name)}
     lowest = {results: ladder_of(plan.asked, plan.grids[0]).columns[0].fidelity for results, plan in plans.items()}

@@ -7,21 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.linalg import eigh
 
-import engine.bodies.beam.dimensionless_modes
-from engine.bodies.beam.dimensionless_modes import _decomposed, unit_modes
 from engine.bodies.beam.modes import MOST_MODES, BeamProperties, Spring, uniform_beam
-from engine.bodies.beam.statics import Restraint
 from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
-from tests.bodies.waves import Support, WaveBeam, hermite_model
+from tests.bodies.waves import Support, WaveBeam
 from tests.reference.closed_forms import CLAMPED, FREE, PINNED, characteristic_values
 
 MODES = 64
-PINNED_ENDS = (Restraint(0.0, 0, 0.0), Restraint(1.0, 0, 0.0))
 KINDS = {"pinned": PINNED, "clamped": CLAMPED, "free": FREE}
 ALL_ENDS = [(left, right) for left in KINDS for right in KINDS]
 SUPPORTS: dict[str, tuple[Support, ...]] = {
@@ -88,15 +81,6 @@ def test_sixty_four_modes_are_orthonormal(ends: tuple[str, str]) -> None:
     np.testing.assert_allclose(stiffness, np.diag(body.omega**2), atol=1e-12 * body.omega[-1] ** 2)
 
 
-@pytest.mark.parametrize("derivative", range(4))
-def test_pinned_shapes_are_sines(derivative: int) -> None:
-    s = np.linspace(0.0, 1.0, 1001)
-    k = np.arange(1, MODES + 1) * np.pi
-    expected = math.sqrt(2.0) * np.sin(np.outer(s, k) + 0.5 * np.pi * derivative)
-    found = on_ends("pinned", "pinned").shape(s, derivative) / k**derivative
-    np.testing.assert_allclose(found, expected, atol=2e-12)
-
-
 @pytest.mark.parametrize("name", SUPPORTS)
 def test_modes_on_springs_keep_mass_and_stiffness_diagonal(name: str) -> None:
     body = on_springs(SUPPORTS[name])
@@ -121,17 +105,6 @@ def test_modes_on_springs_are_the_exact_waves(name: str) -> None:
         for j, limit in enumerate((2e-10, 2e-10, 2e-10, 5e-9)):  # the worst: stiff springs 0.001 apart
             found = shapes[j][:, mode] / b**j
             np.testing.assert_allclose(found, scale * wave[j], atol=limit, err_msg=f"mode {mode}, derivative {j}")
-
-
-def test_modes_on_springs_agree_with_a_fine_finite_element_model() -> None:
-    supports = ((0.1, 300.0, 2.0), (0.5, 5e4, 0.0), (0.55, 10.0, 40.0), (1.0, 1e3, 0.0))
-    stiffness, mass = hermite_model(supports, 200)
-    squares, vectors = eigh(stiffness, mass, subset_by_index=(0, 7))
-    body = on_springs(supports, 8)
-    np.testing.assert_allclose(body.omega, np.sqrt(squares), rtol=2e-7)
-    nodal = body.shape(np.linspace(0.0, 1.0, 201))
-    vectors = vectors[::2] * np.sign(np.sum(vectors[::2] * nodal, axis=0))
-    np.testing.assert_allclose(nodal, vectors, atol=1e-6)
 
 
 def test_a_stiff_spring_is_a_pin_and_a_soft_one_no_support() -> None:
@@ -221,18 +194,6 @@ def test_jumps_are_taken_from_the_right_and_at_the_end_from_the_left() -> None:
     np.testing.assert_allclose(body.shape([1.0], 3)[0], 60.0 * body.shape([1.0])[0], rtol=1e-9, atol=1e-9)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(-9.0, 12.0), st.floats(-9.0, 12.0)), min_size=1, max_size=4))
-def test_any_springs_give_orthonormal_ascending_modes(drawn: list[tuple[float, float, float]]) -> None:
-    supports = tuple((round(at, 3), 10.0**k, 10.0**k_r) for at, k, k_r in drawn)
-    body = on_springs(supports, 10)
-    mass, stiffness = energies(body, supports)
-    assert np.all(body.omega > 0.0)
-    assert np.all(np.diff(body.omega) >= -1e-12 * body.omega[1:])
-    np.testing.assert_allclose(mass, np.eye(10), atol=1e-12)
-    np.testing.assert_allclose(np.diag(stiffness), body.omega**2, rtol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("change", "where"),
     [
@@ -265,37 +226,3 @@ def test_a_bad_number_of_modes_is_refused(modes: int) -> None:
 def test_places_off_the_beam_and_unknown_derivatives_are_refused(s: float, derivative: int) -> None:
     with pytest.raises(BadInput):
         on_ends("pinned", "pinned", 2).shape([s], derivative)
-
-
-def test_few_modes_are_the_lowest_of_many() -> None:
-    """The same frequencies and shapes, third derivatives included, as from a decomposition of their own."""
-    restraints = (Restraint(0.1, 0, 0.01), Restraint(0.9, 0, 0.02))
-    few, own = unit_modes(restraints, 5), _decomposed(restraints, 5)
-    np.testing.assert_allclose(few.omega, own.omega, rtol=1e-12)
-    x = np.linspace(0.0, 1.0, 41)
-    for derivative in range(4):
-        size = np.abs(own.rows(x, derivative)).max(axis=0)
-        np.testing.assert_allclose(few.rows(x, derivative) / size, own.rows(x, derivative) / size, atol=1e-9)
-
-
-@pytest.mark.parametrize("derivative", range(4))
-def test_closed_forms_of_pinned_ends_are_what_the_decomposition_finds(derivative: int) -> None:
-    closed, found = unit_modes(PINNED_ENDS, 20), _decomposed(PINNED_ENDS, 20)
-    np.testing.assert_allclose(closed.omega, found.omega, rtol=1e-13)
-    np.testing.assert_allclose(closed.integral, found.integral, atol=1e-13)
-    x = np.linspace(0.0, 1.0, 77)
-    size = closed.omega ** (0.5 * derivative)
-    np.testing.assert_allclose(closed.rows(x, derivative) / size, found.rows(x, derivative) / size, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", SUPPORTS)
-def test_waves_are_the_polynomials_that_they_stand_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    restraints = BeamProperties(
-        1.0, 1.0, 1.0, 1.0, 1.0, supports=tuple(Spring(*support) for support in SUPPORTS[name])
-    ).restraints
-    x = np.random.default_rng(6).random(200)
-    waves = engine.bodies.beam.dimensionless_modes._solved(restraints, 40).derivatives(x, range(4))
-    monkeypatch.setattr(engine.bodies.beam.dimensionless_modes, "BENT", math.inf)
-    series = engine.bodies.beam.dimensionless_modes._solved(restraints, 40).derivatives(x, range(4))
-    size = np.abs(series).max(axis=1, keepdims=True)
-    assert np.all(np.abs(waves - series) <= 1e-12 * size)

@@ -163,10 +163,9 @@ def test_own_weight_of_a_pinned_beam_in_units() -> None:
     assert force == pytest.approx(closed_forms.influence_pinned(4.0, 9.0, 15.0, stiffness), rel=1e-13)
 
 
-@pytest.mark.parametrize("name", FREE_BODIES)
-def test_own_weight_of_a_body_that_nothing_holds_is_refused(name: str) -> None:
+def test_own_weight_of_a_body_that_nothing_holds_is_refused() -> None:
     with pytest.raises(BadInput, match="own weight"):
-        unit_beam(**FREE_BODIES[name]).own_weight_deflection(X)
+        unit_beam(ends=("free", "pinned")).own_weight_deflection(X)
 
 
 springs = st.lists(

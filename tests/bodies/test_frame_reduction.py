@@ -200,11 +200,6 @@ def test_craig_bampton_statics_of_interface_loads_are_exact(count: int) -> None:
     np.testing.assert_allclose(reduction.response(loads), exact, atol=1e-10 * np.abs(exact).max())
 
 
-def test_all_fixed_interface_modes_are_the_full_model() -> None:
-    table = portal(elements=1, interface=["d"], fixed_interface_modes=64)
-    np.testing.assert_allclose(body(table).omega, body(portal(elements=1)).omega, rtol=1e-8)
-
-
 def test_free_body_keeps_its_rigid_modes() -> None:
     free = portal(supports={}, modes=12)
     reduced = body(free | {"interface": ["a", "b", "d"]})
@@ -242,13 +237,3 @@ def test_missing_modes_are_noticed() -> None:
     omega, _ = flexibility.modes(9)
     assert flexibility._is_complete(omega**2)
     assert not flexibility._is_complete(np.delete(omega, 4) ** 2)
-
-
-def test_modes_are_deterministic_and_shared() -> None:
-    table = portal(elements=30)
-    frame = Frame.model_validate(table)
-    model = assemble(frame)
-    flexibility = factorised(model.stiffness, model.mass, model.rigid)
-    one, other = (flexibility.modes(8) for _ in range(2))
-    assert np.array_equal(one[0], other[0]) and np.array_equal(one[1], other[1])
-    assert body(table) is body(table | {"damping_ratio": 0.05, "own_weight": True})

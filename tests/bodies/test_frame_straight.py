@@ -20,7 +20,6 @@ from tests.bodies.frames import (
     LENGTH,
     MODULUS,
     PINNED,
-    RAIL,
     SECOND_MOMENT,
     beam,
     body,
@@ -37,7 +36,6 @@ ENDS: dict[tuple[str, str], dict[str, Any]] = {
     ("clamped", "clamped"): {"a": "clamped", "b": ["z", "ry"]},
 }
 SHEAR = MODULUS / 2.6
-DROP = np.array([0.0, 0.0, -1.0])
 
 
 def worst(found: Array, expected: Array) -> float:
@@ -107,17 +105,6 @@ def test_section_forces_of_a_pinned_beam(theory: str) -> None:
         frame.sections.rows("moment", [1.0])
 
 
-def test_section_forces_of_modes_are_those_of_the_beam() -> None:
-    frame, exact = (
-        body(straight(ENDS["clamped", "pinned"], elements=32, modes=4, **PLANE)),
-        beam(("clamped", "pinned"), 4),
-    )
-    assert frame.sections is not None
-    stiffness = MODULUS * SECOND_MOMENT
-    assert worst(frame.sections.rows("bending_moment", X), -stiffness * exact.shape(X, 2)) < 1e-4
-    assert worst(frame.sections.rows("shear_force", X), -stiffness * exact.shape(X, 3)) < 1e-4
-
-
 def timoshenko(number: int, second_moment: float = SECOND_MOMENT, shear_area: float = 1e-4) -> float:
     """Lower root of the pinned Timoshenko beam's frequency equation (Huang 1961), rad/s."""
     k = number * np.pi / LENGTH
@@ -151,26 +138,6 @@ def test_rotary_inertia_of_timoshenko_members(suffix: str, direction: list[float
     bare = np.sqrt(np.sqrt(np.square(expected) * DENSITY * AREA / (MODULUS * 2e-3)))
     np.testing.assert_allclose(fine.wave_number[felt], k, rtol=5e-4)
     assert (fine.wave_number[felt] > 1.02 * bare).all()  # waves of a deep beam are shorter than Euler-Bernoulli's
-
-
-def test_timoshenko_frequencies() -> None:
-    """Soft in shear: the elements' error falls with the square of their length, and Richardson's limit is exact."""
-    soft: dict[str, Any] = {"member_theory": "timoshenko", "section": {"shear_area": 1e-4}, "modes": 4} | PLANE
-    frame, coarse = (body(straight(ENDS["pinned", "pinned"], elements=n, **soft)) for n in (80, 40))
-    expected = [timoshenko(n) for n in range(1, 5)]
-    np.testing.assert_allclose((4.0 * frame.omega - coarse.omega) / 3.0, expected, rtol=2e-6)
-    np.testing.assert_allclose(frame.omega, expected, rtol=2e-4)
-    assert timoshenko(4) < 0.95 * beam(("pinned", "pinned"), 4).omega[3]
-    k = np.arange(1, 5) * np.pi / LENGTH
-    np.testing.assert_allclose(frame.wave_number, k, rtol=2e-4)
-    scale = np.sqrt(2.0 / (DENSITY * AREA * LENGTH))
-    shape = frame.shape(X)
-    curve = frame.shape(X, 2)
-    for mode in range(4):
-        turn = np.sin(k[mode] * X)
-        assert worst(shape[:, mode], shape[:, mode].max() / turn.max() * turn) < 1e-4
-        assert worst(curve[:, mode], -(k[mode] ** 2) * shape[:, mode].max() / turn.max() * turn) < 2e-3
-    assert 0.9 * scale < shape.max() <= scale
 
 
 def test_timoshenko_statics() -> None:
@@ -300,14 +267,6 @@ def test_members_end_to_end_and_backwards_are_one_track() -> None:
     assert worst(body(table).influence(X, S), beam(("pinned", "pinned"), 1).influence(X, S)) < 1e-9
     table["track"] = {"members": ["second", "first"]}
     assert worst(body(table).influence(X, S), beam(("pinned", "pinned"), 1).influence(X, S)[::-1, ::-1]) < 1e-9
-
-
-def test_rigid_arms_carry_the_axis_beside_the_nodes() -> None:
-    """A clamped node 0.5 m below the axis holds the axis as if it were clamped there."""
-    table = straight(CLAMPED_FREE, elements=4, member_offsets=[[0.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
-    frame = body(table)
-    assert worst(frame.influence(X, S), beam(("clamped", "free"), 1).influence(X, S)) < 1e-9
-    assert RAIL["density"] * RAIL["area"] * LENGTH == pytest.approx(frame.mass)
 
 
 def test_an_arm_lengthens_the_lever() -> None:

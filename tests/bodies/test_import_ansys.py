@@ -17,8 +17,9 @@ from engine.bodies.build import build_body
 from engine.bodies.imported.imported import Ansys
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
-from tests.bodies.models import in_process, optional
+from tests.bodies.models import optional
 
+pytestmark = pytest.mark.extras
 full = optional("ansys.mapdl.reader.full")
 archive = optional("mapdl_archive")
 
@@ -32,13 +33,6 @@ TABLE: dict[str, Any] = {
     "modes": 6,
 }
 PUBLISHED = (1283.200, 1283.200, 5781.975, 6919.399)  # Hz
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
-    """Files are read here, as a process for each takes seconds; but in the tests of OWN_PROCESS."""
-    if request.function not in OWN_PROCESS:
-        monkeypatch.setattr("engine.bodies.imported.imported.read_files", in_process)
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +123,7 @@ def words_of(table: dict[str, Any]) -> str:
     return f"{detail['loc']} {detail['ctx']}"
 
 
+@pytest.mark.usefixtures("own_process")
 def test_damaged_matrices(tmp_path: Path) -> None:
     whole = (EXAMPLES / "file.full").read_bytes()
     path = tmp_path / "cut.full"
@@ -145,6 +140,3 @@ def test_damaged_nodes(tmp_path: Path) -> None:
     head = [line.replace("321,       321", "320,       320") for line in text]
     path.write_text("".join([*head[:100], *head[101:]]), encoding="utf-8")
     assert "node 65 of" in words_of(TABLE | {"nodes": str(path)})
-
-
-OWN_PROCESS = (test_damaged_matrices,)

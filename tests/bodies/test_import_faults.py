@@ -13,25 +13,13 @@ from scipy.io import mmwrite
 from scipy.sparse import csc_matrix, save_npz
 
 from engine.batch.plan import make_plan
-from engine.bodies.imported import imported
 from engine.bodies.imported.imported import Matrices
 from engine.scene.study import load
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, PINNED, straight
-from tests.bodies.models import CRUISE, Files, in_process, refusal, study
-from tests.scene.mutations import Mutation, distinct, survives
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    return Files(tmp_path_factory.mktemp("held"), straight(PINNED, elements=16))
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files are read here, as a process for each takes a second."""
-    monkeypatch.setattr(imported, "read_files", in_process)
+from tests.bodies.models import CRUISE, Files, refusal, study
+from tests.scene.mutations import HOW, How, accepted, distinct
 
 
 def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[str]]]:
@@ -189,9 +177,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return found
 
 
-@pytest.mark.parametrize("mutation", distinct(EVERY_KEY), ids=str)
-def test_every_key(small: Files, mutation: Mutation) -> None:
-    survives(mutation, lambda text: load(text.replace("FOLDER", str(small.folder))))
+@pytest.mark.parametrize("how", HOW)
+def test_every_key(small: Files, how: How) -> None:
+    accepted(how, distinct(EVERY_KEY), lambda text: load(text.replace("FOLDER", str(small.folder))))
 
 
 def test_every_key_is_there(small: Files) -> None:

@@ -15,34 +15,32 @@ from engine.bodies.files.ansys import scan_nodes
 from engine.bodies.files.cards import cards_of, check_matrices, check_nodes, rows_of, scalars
 from engine.bodies.files.reader import Request, read_files
 from engine.bodies.files.text import lines_of
-from engine.bodies.imported import imported
 from engine.bodies.imported.body import imported_body
 from engine.bodies.imported.imported import Matrices
 from results_schema.errors import BadInput
 from tests.bodies.frames import PINNED, straight
-from tests.bodies.models import BULK, CDB, Files, damaged, in_process
+from tests.bodies.models import BULK, CDB, Files, damaged
 
 EACH = {"stiffness.mtx": 200, "mass.npz": 100, "nodes.csv": 150, "freedoms.csv": 150}
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+def model(tmp_path_factory: pytest.TempPathFactory) -> Files:
     found = Files(tmp_path_factory.mktemp("model"), straight(PINNED, elements=4))
     mmwrite(found.folder / "mass.mtx", found.assembly.mass, symmetry="symmetric")
     return found
 
 
 @pytest.mark.parametrize("name", list(EACH))
-def test_damaged_matrices(files: Files, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(imported, "read_files", in_process)
-    path = files.folder / name
+def test_damaged_matrices(model: Files, name: str) -> None:
+    path = model.folder / name
     whole = path.read_bytes()
     outcomes = [0, 0]
     try:
         for text in damaged(whole, EACH[name], seed=len(whole)):
             path.write_bytes(text)
             try:
-                body = imported_body(Matrices.model_validate(files.table(modes=4)))
+                body = imported_body(Matrices.model_validate(model.table(modes=4)))
             except (BadInput, ValidationError) as error:
                 outcomes[0] += 1
                 if isinstance(error, ValidationError):
@@ -86,14 +84,14 @@ def test_damaged_texts(text: str, reads: tuple[Callable[[list[Any]], Any], ...])
     assert len(outcomes) == 200 and 20 < sum(outcomes) < 180
 
 
-def test_a_handful_in_the_process_of_its_own(files: Files, tmp_path: Path) -> None:
-    whole = (files.folder / "stiffness.mtx").read_bytes()
+def test_a_handful_in_the_process_of_its_own(model: Files, tmp_path: Path) -> None:
+    whole = (model.folder / "stiffness.mtx").read_bytes()
     for number, text in enumerate(damaged(whole, 3, seed=3)):
         path = tmp_path / f"stiffness{number}.mtx"
         path.write_bytes(text)
-        table = files.table(stiffness=str(path), mass=str(files.folder / "mass.mtx"))
+        table = model.table(stiffness=str(path), mass=str(model.folder / "mass.mtx"))
         request = Request("matrices", tuple((key, table[key]) for key in ("stiffness", "mass", "nodes", "freedoms")))
         try:
-            assert read_files(request).size == len(files.assembly.free)
+            assert read_files(request).size == len(model.assembly.free)
         except BadInput as error:
             assert error.where or error.what

@@ -15,7 +15,6 @@ from scipy.sparse.linalg import spsolve
 import engine
 from engine.batch.plan import make_plan
 from engine.bodies.build import build_body
-from engine.bodies.imported import imported
 from engine.bodies.imported.imported import Matrices
 from engine.bodies.modal.modal_body import ModalBody
 from engine.scene.study import Study, load
@@ -24,27 +23,15 @@ from results_schema.errors import BadInput
 from studies.commands.preview import preview
 from studies.runs.identity import run_key
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, PINNED, body, straight
-from tests.bodies.models import Files, in_process, refusal, study
+from tests.bodies.models import Files, refusal, study
 
 X = np.linspace(0.0, LENGTH, 31)
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    return Files(tmp_path_factory.mktemp("held"), straight(PINNED, elements=16))
 
 
 @pytest.fixture(scope="module")
 def loose(tmp_path_factory: pytest.TempPathFactory) -> Files:
     """A frame that nothing holds: its files have all rows."""
     return Files(tmp_path_factory.mktemp("loose"), straight({}, elements=12))
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
-    """Files are read here, as a process for each takes a second; but in the tests of OWN_PROCESS."""
-    if request.function not in OWN_PROCESS:
-        monkeypatch.setattr(imported, "read_files", in_process)
 
 
 def modal(table: Any) -> ModalBody:
@@ -96,29 +83,8 @@ def test_statics_are_a_direct_solve_with_the_same_interpolation(files: Files, in
             assert np.array_equal(found.influence_at(x, [s] * 4, derivative), line)
 
 
-@pytest.mark.parametrize("interpolation", ["rotations", "spline"])
-def test_shapes_are_smooth(files: Files, interpolation: str) -> None:
-    track = files.table()["track"] | {"interpolation": interpolation}
-    found = modal(files.table(track=track))
-    nodes = np.linspace(0.0, LENGTH, 17)[1:-1]
-    continuous = 1 if interpolation == "rotations" else 2
-    for derivative in range(continuous + 1):
-        gap = found.shape(nodes, derivative) - found.shape(nodes - 1e-10, derivative)
-        assert np.abs(gap).max() < 1e-6 * np.abs(found.shape(X, derivative)).max()
-    step = 1e-5
-    for derivative in range(3):
-        slope = (found.shape(X[1:-1] + 0.1 + step, derivative) - found.shape(X[1:-1] + 0.1 - step, derivative)) / (
-            2 * step
-        )
-        given = found.shape(X[1:-1] + 0.1, derivative + 1)
-        assert np.abs(slope - given).max() < 1e-5 * np.abs(given).max()
-
-
-def test_supports_of_the_study_hold_what_the_files_leave_free(files: Files, loose: Files) -> None:
-    held = Files(loose.folder, straight(PINNED, elements=12))
+def test_supports_of_the_study_hold_what_the_files_leave_free(loose: Files) -> None:
     exact = body(straight(PINNED, elements=12))
-    Files(loose.folder, straight({}, elements=12))
-    del held
     supports = {"1": ["x", "y", "z", "rx"], "2": ["y", "z"]}
     found = modal(loose.table(supports=supports, track={"nodes": [1, *range(3, 14), 2]}))
     assert np.abs(found.omega / exact.omega - 1.0).max() < 1e-9
@@ -258,6 +224,7 @@ def test_points_and_other_directions(loose: Files) -> None:
     assert sideways.gravity_share == 0.0
 
 
+@pytest.mark.usefixtures("own_process")
 def test_a_passage_is_the_frames(files: Files) -> None:
     given = engine.run(study(files.table(modes=8, damping_ratio=0.01), output={"histories": "all"}))
     frame = engine.run(study(straight(PINNED, elements=16, modes=8, damping_ratio=0.01), output={"histories": "all"}))
@@ -266,6 +233,7 @@ def test_a_passage_is_the_frames(files: Files) -> None:
     assert float(np.abs(given["middle"].values - frame["middle"].values).max()) < 2e-4 * scale
 
 
+@pytest.mark.usefixtures("own_process")
 def test_checks_are_printed_and_the_key_follows_the_files(files: Files, tmp_path: Path) -> None:
     copy = Files(tmp_path, straight(PINNED, elements=16))
     plan = make_plan(study(copy.table()))
@@ -310,22 +278,3 @@ def test_a_loose_part_beside_the_body(tmp_path: Path, end: tuple[float, float, f
     both = modal(table | {"supports": {"1": "clamped", "6": "clamped"}, "modes": 8})
     single = body(straight(CLAMPED_FREE, elements=4, modes=4) | frame)
     assert np.abs(both.omega[::2] / single.omega - 1.0).max() < 1e-8
-
-
-def test_a_table_out_of_files_rides(tmp_path: Path) -> None:
-    """A free body on two shoes does what the frame does that it was written from."""
-    plank = straight({}, elements=6) | {"node": {"a": [0.0, 0.0, 0.0], "b": [2.0, 0.0, 0.0]}}
-    shoes = {name: {"at": at, "stiffness": 1e6, "damping": 100.0} for name, at in (("front", 1.8), ("rear", 0.2))}
-    motion = {"kind": "cruise", "start": 1.0, "end": 14.0, "speed": 5.0}
-    found = []
-    for table in (Files(tmp_path, plank).table(modes=10), plank | {"modes": 10}):
-        bodies = {"bed": straight(PINNED, elements=8), "table": table}
-        carriage = {"on": "bed", "kind": "body", "body": "table", "contacts": shoes, "motion": motion}
-        sensor = {"middle": {"body": "bed", "at": 7.5}, "tool": {"body": "table", "at": 1.0}}
-        more = {"body": bodies, "carriage": {"table": carriage}, "sensor": sensor, "solver": {"steps": 8000}}
-        found.append(engine.run(Study(kind="passage", **more)))
-    for name in ("middle_max", "tool_max"):
-        assert float(found[0][name]) == pytest.approx(float(found[1][name]), rel=1e-5)
-
-
-OWN_PROCESS = (test_a_passage_is_the_frames, test_checks_are_printed_and_the_key_follows_the_files)

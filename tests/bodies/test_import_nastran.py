@@ -14,8 +14,9 @@ from engine.bodies.build import build_body
 from engine.bodies.imported.imported import Nastran
 from engine.bodies.modal.modal_body import ModalBody
 from tests.bodies.frames import CLAMPED_FREE, body, straight
-from tests.bodies.models import Files, in_process, optional, write_cards
+from tests.bodies.models import Files, optional, write_cards
 
+pytestmark = pytest.mark.extras
 pyyeti = optional("pyyeti")
 
 MODELS = Path(pyyeti.__file__).parent / "tests"
@@ -25,13 +26,6 @@ PUBLISHED = (
     25.655202,
 )  # fmt: skip
 MASS, CENTRE = 1.5904, 600.0 - 415.360203
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
-    """Files are read here, as a process for each takes seconds; but in the tests of OWN_PROCESS."""
-    if request.function not in OWN_PROCESS:
-        monkeypatch.setattr("engine.bodies.imported.imported.read_files", in_process)
 
 
 def modal(matrices: Path, nodes: Path, track: list[int], **more: Any) -> ModalBody:
@@ -128,6 +122,7 @@ def test_refusals(punched: tuple[Path, Files], keys: dict[str, Any], words: list
     assert all(word in found for word in words), found
 
 
+@pytest.mark.usefixtures("own_process")
 def test_damaged_binary_matrices(tmp_path: Path) -> None:
     path, nodes = tmp_path / "cut.op4", str(MODELS / "cla_test_data" / "outboard.asm")
     whole = (MODELS / "cla_test_data" / "outboard.op4").read_bytes()
@@ -135,6 +130,3 @@ def test_damaged_binary_matrices(tmp_path: Path) -> None:
     with pytest.raises(ValidationError) as caught:
         Nastran.model_validate({"kind": "nastran", "matrices": str(path), "nodes": nodes, "track": {"nodes": [3, 11]}})
     assert str(path) in str(caught.value.errors()[0])
-
-
-OWN_PROCESS = (test_damaged_binary_matrices,)

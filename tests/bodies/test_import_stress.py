@@ -10,21 +10,14 @@ import pytest
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, save_npz
 
-import engine
 from engine.bodies.build import build_body
-from engine.bodies.imported import imported
 from engine.bodies.imported.imported import Matrices, Nastran
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, MODULUS, PINNED, RAIL, body, straight
-from tests.bodies.models import Files, in_process, optional, study
+from tests.bodies.models import Files, optional
 
 ELEMENTS = 16
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(imported, "read_files", in_process)
 
 
 @pytest.fixture(scope="module")
@@ -81,16 +74,7 @@ def test_influence_and_own_weight(recovered: dict[str, Any]) -> None:
         found.sections.rows("strain", nodes)
 
 
-def test_a_passage(recovered: dict[str, Any]) -> None:
-    """Stress at a node in the march, within the mean of both elements under the load."""
-    sensor = {"stress": {"body": "bed", "at": 7.5, "quantity": "stress"}}
-    found = [
-        float(engine.run(study(table | {"modes": 8}, sensor=sensor))["stress_max"])
-        for table in (recovered, straight(PINNED, elements=ELEMENTS))
-    ]
-    assert found[0] == pytest.approx(found[1], rel=0.05)
-
-
+@pytest.mark.extras
 def test_element_forces_of_a_file() -> None:
     """Second source: the file's own rows times the free vibration modes by scipy, in the file's own directions."""
     pyyeti = optional("pyyeti")

@@ -73,17 +73,6 @@ def test_rows_tell_the_range_of_steps_and_the_largest_error(plan: Plan) -> None:
     assert compared
 
 
-def test_groups_are_those_of_the_choice_whatever_was_asked_before_it() -> None:
-    """Sizes of what is kept are asked for when a plan is made, before anything is measured."""
-    bed, sweep = beam(modes="auto", damping_ratio=0.02), {"speed": SPEEDS, "mass": MASSES}
-    moving = mass(0.1, cruise(0.0, 1.0, 0.1))
-    found = make_plan(study(bed, moving, sweep=sweep, output={"histories": "none"}))
-    before = found.seconds
-    assert len(found.groups) == 1
-    found.choose(lambda jobs: run_jobs(jobs, 1), lambda: False, 16)
-    assert len(found.groups) > 2 and found.seconds > 2.0 * before
-
-
 def test_what_the_study_fixes_is_one_row() -> None:
     found = planned(beam(modes=5), {"speed": SPEEDS, "mass": MASSES}, steps=1200, fidelity="mass")
     found.choose(lambda jobs: run_jobs(jobs, 1), lambda: False, 16)

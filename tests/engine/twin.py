@@ -221,13 +221,13 @@ class Twin(NamedTuple):
 def march_twin(study: Study, body: str, t: Array) -> Twin:
     """March one body of a study at the instants t."""
     bed, scene, riders, start = scene_of(study, body, float(t[-1]))
-    alpha = alpha_of(study)
-    if alpha is not None:
-        return Twin(bed, scene, riders, study.gravity, naive.march_alpha(scene, t, start, alpha))
-    scheme, own = newmark_of(study), study.body[body].own_weight
-    on_sag = march_on_sag(scene, bed, study.gravity, t, start, scheme) if own else None
-    history = naive.march(scene, t, start, scheme) if on_sag is None else on_sag
-    return Twin(bed, scene, riders, study.gravity, history)
+    gravity = study.gravity
+    sagging: dict[str, Any] = {  # the coordinates count from the body's exact own sag
+        "at": lambda t, side: heavy(scene, bed, gravity, t, side),
+        "strike": lambda t, state: arrival_on_sag(scene, bed, gravity, t, state),
+    }
+    history = naive.march(scene, t, start, scheme_of(study), **(sagging if study.body[body].own_weight else {}))
+    return Twin(bed, scene, riders, gravity, history)
 
 
 def solve_twin(study: Study, body: str, t: Array) -> Twin:
@@ -271,18 +271,12 @@ BETA = {"average-acceleration": 1 / 4, "linear-acceleration": 1 / 6, "fox-goodwi
 BETA["auto"] = BETA["average-acceleration"]  # with fixed steps
 
 
-def newmark_of(study: Study) -> naive.Newmark:
-    """The member of Newmark's family that a study names."""
+def scheme_of(study: Study) -> naive.Newmark | naive.GeneralizedAlpha:
+    """The scheme that a study names."""
     solver = study.solver
     if solver.scheme == "newmark":
         assert solver.beta is not None and solver.gamma is not None
         return naive.Newmark(solver.beta, solver.gamma)
-    return naive.Newmark(BETA[solver.scheme], 0.5)
-
-
-def alpha_of(study: Study) -> naive.GeneralizedAlpha | None:
-    """The alpha scheme that a study names, if it does."""
-    solver = study.solver
     if solver.scheme == "hht-alpha":
         assert solver.alpha is not None
         return naive.GeneralizedAlpha(0.0, -solver.alpha)
@@ -290,7 +284,7 @@ def alpha_of(study: Study) -> naive.GeneralizedAlpha | None:
         assert solver.rho_inf is not None
         rho = solver.rho_inf
         return naive.GeneralizedAlpha((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
-    return None
+    return naive.Newmark(BETA[solver.scheme], 0.5)
 
 
 def sagging_weight(bed: Bed, load: Load, gravity: float, t: float, side: scenes.Side) -> float:
@@ -347,35 +341,3 @@ def arrival_on_sag(scene: Scene, bed: Bed, gravity: float, t: float, state: Stat
             slope = gravity * bed.sag(after.s(t), 1)
             extra += load.convective_mass * scene.phi(after.s(t), 0) * change * slope
     return jump - np.linalg.solve(scenes.system(scene, t, "right").mass, extra)
-
-
-def march_on_sag(
-    scene: Scene, bed: Bed, gravity: float, times: Array, start: State, scheme: naive.Newmark
-) -> naive.History:
-    """The naive march once more, the coordinates counted from the body's exact own sag."""
-    t, inner = naive.snapped(scene, times)
-    beta, gamma = scheme
-    state = start
-    a = scenes.acceleration(heavy(scene, bed, gravity, t[0], "right"), t[0], state, "right")
-    states, accelerations = [state], [a]
-    forces, before = [], []
-    for n in range(1, len(t)):
-        h, (q, v), a = t[n] - t[n - 1], states[-1], accelerations[-1]
-        u_star, v_star = q + h * v + (0.5 - beta) * h**2 * a, v + (1.0 - gamma) * h * a
-        now = heavy(scene, bed, gravity, t[n], "left")
-        m, c, k, f = scenes.system(now, t[n], "left")
-        a = np.linalg.solve(m + gamma * h * c + beta * h**2 * k, f - c @ v_star - k @ u_star)
-        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
-        if n in inner:
-            force = scenes.contact_forces(now, t[n], state, a, "left")
-            before.append(naive.Event(n, t[n], state.v, a, force))
-            state = State(state.q, state.v + arrival_on_sag(scene, bed, gravity, t[n], state))
-            a = scenes.acceleration(heavy(scene, bed, gravity, t[n], "right"), t[n], state, "right")
-        states.append(state)
-        accelerations.append(a)
-    found = naive.collect(scene, t, states, accelerations, before)
-    for n in range(len(t)):
-        side: scenes.Side = "right" if n < len(t) - 1 else "left"
-        now = heavy(scene, bed, gravity, t[n], side)
-        forces.append(scenes.contact_forces(now, t[n], states[n], accelerations[n], side))
-    return replace(found, contact_force=np.array(forces))

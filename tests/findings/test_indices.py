@@ -64,12 +64,6 @@ def test_harmonics_of_a_cycle_that_does_not_close_are_of_second_order(omega: flo
     assert errors[0] < 1e-3 / 2.0 * (omega / 61.0) + 1e-5
 
 
-def test_harmonics_of_a_ramp_are_exact() -> None:
-    """c_0 = 1/2, |c_k| = 1/(2 pi k) of w = x, whatever the number of stations."""
-    found = indices.harmonics(np.linspace(0.0, 1.0, 41)[:, None])[:, 0]
-    np.testing.assert_allclose(found, [1.0, *(1.0 / (math.pi * k) for k in range(1, 17))], rtol=1e-13)
-
-
 def out_and_back(stations: int, edge: float, shift: float) -> tuple[Array, Array, Array, Array]:
     """Cycle of an out-and-back path whose cruise is from `edge` to 1/2 - edge: position, response, static and slope.
 
@@ -126,14 +120,6 @@ def test_the_way_back_ends_where_the_cycle_does() -> None:
     field = np.linspace(0.0, 3.0, 41)[:, None]
     legs = indices.folded((0.0, 0.5), field, field, field)
     np.testing.assert_array_equal(legs.backward[:, 0], field[::-1, 0][:21])
-
-
-def test_interval_weights_integrate_what_is_linear_exactly() -> None:
-    nodes = np.array([0.0, 0.3, 0.35, 1.0, 1.7])
-    for low, high in ((0.0, 1.7), (0.1, 0.2), (0.3, 1.0), (0.31, 1.69)):
-        weights = indices.interval_weights(nodes, low, high)
-        assert weights.sum() == pytest.approx(1.0)
-        assert weights @ nodes == pytest.approx(0.5 * (low + high))
 
 
 def test_uneven_phases_are_made_even() -> None:

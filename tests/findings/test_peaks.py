@@ -147,13 +147,3 @@ def test_a_peak_where_a_cycle_nearly_closes_is_no_guess_of_stations() -> None:
         found = evenly_spaced((np.cos(2.0 * np.pi * phase) + 0.03 * phase)[:, None])
         assert found.number[0] == 1
         assert found.value[0, 0] == pytest.approx(1.03, abs=1e-4)
-
-
-@pytest.mark.parametrize("stations", [200, 350])
-def test_a_lane_has_the_same_bits_in_any_company(stations: int) -> None:
-    cycles = np.concatenate([waves(3, stations, 37), waves(4, stations, 37)], axis=1)
-    whole = evenly_spaced(cycles)
-    for lanes in (slice(0, 1), slice(5, 12), slice(36, 37)):
-        alone = evenly_spaced(np.ascontiguousarray(cycles[..., lanes]))
-        for expected, found in zip(whole, alone, strict=True):
-            assert np.array_equal(expected[..., lanes], found, equal_nan=True)

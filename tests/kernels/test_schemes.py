@@ -66,12 +66,6 @@ def test_phase_is_that_of_the_amplification_matrix(name: str) -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-7, equal_nan=False)
 
 
-def test_phase_of_average_acceleration() -> None:
-    x = np.array([0.0, 1e-8, 1.0, 30.0, 1e12, 1e200])
-    found = SCHEMES["average-acceleration"]({}).phase(x)
-    np.testing.assert_allclose(found, 2.0 * np.arctan(x / 2.0), rtol=0, atol=1e-7, equal_nan=False)
-
-
 @pytest.mark.parametrize("name", CONDITIONAL)
 def test_phase_is_half_a_turn_at_the_limit(name: str) -> None:
     scheme = SCHEMES[name]({})
@@ -103,15 +97,6 @@ def test_alpha_schemes_have_no_limit(scheme: AlphaScheme) -> None:
     largest = max(radius(kernel_matrix(scheme, x)) for x in np.geomspace(1e-3, 1e6, 60))
     assert largest < 1.0 + 1e-7
     assert scheme.stability_limit == math.inf
-
-
-@pytest.mark.parametrize("name", ["average-acceleration", *CONDITIONAL, "newmark"])
-def test_amplification_of_newmarks_family(name: str) -> None:
-    scheme = SCHEMES[name]({"beta": 0.3025, "gamma": 0.6})
-    assert isinstance(scheme, NewmarkScheme)
-    for x in X:
-        found = np.poly(scheme.amplification(float(x)))
-        np.testing.assert_allclose(found, np.poly(newmark_matrix(scheme.beta, scheme.gamma, x)), rtol=1e-12)
 
 
 DAMPED = [({"alpha": -0.05}, True), ({"alpha": -0.02}, True), ({"alpha": -0.01}, False), ({"alpha": -1e-6}, False)]

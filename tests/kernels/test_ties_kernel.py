@@ -238,30 +238,3 @@ def test_nothing_missed_may_be_left_out(kinds: tuple[str, ...]) -> None:
     ):
         np.testing.assert_array_equal(found, expected)
         assert np.isfinite(found).all()
-
-
-def test_a_rigid_tie_is_one_body() -> None:
-    """A mass of its own coordinate on a rigid tie swings with the body: omega^2 = k/(m1 + m2), as one such mode."""
-    one = system(("rigid",), 2)
-    ones = np.ones_like(one.inverse_modal_mass)
-    both = replace(
-        one,
-        omega=np.array([3.0, 0.0]),
-        zeta=0.0 * ones,
-        inverse_modal_mass=ones * np.array([[1.0], [0.25]]),
-        p=np.broadcast_to(np.array([[1.0], [-1.0]]), (STATIONS, 2, 1)),
-        **{name: 0.0 * getattr(one, name) for name in ("rate", "curve", "drive", "level", "residual")},
-    )
-    scheme, (q, v) = SCHEMES["average acceleration"], start_of(both)
-    places, forces = marched(both, scheme)
-    # the two start apart and at different speeds, and what is between them goes on as it began: index 2, not 3
-    apart = (q[0] - q[1]) + np.arange(STATIONS) * one.h[0, 0] * (v[0] - v[1])
-    np.testing.assert_allclose(places[0, :, 0, 0] - places[0, :, 1, 0], apart, rtol=0, atol=1e-12)
-    # the force moves the second coordinate alone: q'' = -F/m
-    rate = np.diff(places[0, :, 1, 0], 2) / one.h[0, 0] ** 2
-    push = -0.25 * (forces[0, :-2, 0, 0] + 2.0 * forces[0, 1:-1, 0, 0] + forces[0, 2:, 0, 0]) / 4.0
-    np.testing.assert_allclose(rate, push, rtol=0, atol=1e-9)
-    whole = -9.0 / 5.0 * places[0, :, 0, 0]
-    np.testing.assert_allclose(
-        np.diff(places[0, :, 0, 0], 2) / one.h[0, 0] ** 2, 0.25 * (whole[:-2] + 2 * whole[1:-1] + whole[2:]), atol=1e-9
-    )

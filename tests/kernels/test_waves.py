@@ -57,16 +57,6 @@ def test_decay() -> None:
 
 
 @pytest.mark.parametrize("kind", AMPLITUDES)
-def test_compiled_as_without_the_compiler(kind: str) -> None:
-    x, turns = np.linspace(-1.0, 1.0, 501), np.array([0.5, 3.0, 20.25, 100.0, 300.0])
-    sine, cosine = plain(sin_cos)(x[:, None] * turns)  # type: ignore[operator]
-    rate = np.pi * turns
-    near, far = (plain(decay)((1.0 + side * x[:, None]) * rate) for side in (1.0, -1.0))  # type: ignore[operator]
-    expected = {"sine": sine, "cosine": cosine, "near": near, "far": far}[kind]
-    np.testing.assert_allclose(wave(kind, turns, x), expected, rtol=1e-13, atol=4e-16)  # a contracted argument
-
-
-@pytest.mark.parametrize("kind", AMPLITUDES)
 @pytest.mark.parametrize("order", range(4))
 def test_derivatives_follow_each_other(kind: str, order: int) -> None:
     """Of wave number 2: a sine becomes a cosine, the wave from the left end changes its sign."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -11,23 +10,15 @@ import pytest
 
 import engine
 from results_schema.errors import ArchiveError, BadInput
-from results_schema.store.archive import open_archive
 from results_schema.validate import validate
-from studies.commands.cli import main
 from studies.pictures.common import envelopes, estimates
 from studies.pictures.common import numerics_used as choice
-from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.reporting.report import write_report
 from studies.results.results import Results
-from studies.runs import part_writer as gathering
-from studies.runs.runner import run_to_archive
-from tests.commands.test_cli_interrupted import after_parts, assert_same_results
 from tests.pictures.test_report import archive, check_standing_alone
-from tests.scene.mutations import mutations, survives
 from tests.studies import scenes
-from tests.studies.small import SCENES, write
 
 EXTRA = """\
 [envelope.shape]
@@ -113,31 +104,6 @@ def test_what_is_not_as_declared_is_found() -> None:
         validate(turned, "passage", *given)
     with pytest.raises(ArchiveError, match="shape_envelope_min: expected a declared name"):
         validate(dataset, "passage", *given[:2], {"moments": "N m"})
-
-
-def test_a_run_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
-    text = SCENES.replace('steps = "auto"', "steps = 800\naudit = 0\ntolerance = 1e-2")
-    text = text.replace("[sweep]", '[envelope.shape]\nbody = "beam"\n\n[sweep]')
-    write(tmp_path, text)
-    assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
-    with monkeypatch.context() as patch:
-        after_parts(patch, 2, signal.SIGINT)
-        assert main(["run", "small.toml"]) == 130
-    outcome = run_to_archive(engine.load("small.toml"), Path("small.nc"), RunOptions())
-    assert 2 <= outcome.resumed < 16
-    assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
-    assert open_archive("small.nc").root.shape_envelope_max.shape == (8, 2, 51)
-
-
-@pytest.mark.parametrize("how", ["drop", "misspell", "retype", "text", "nan"])
-def test_every_key(how: str) -> None:
-    text = scenes.text_of("passage", extra=EXTRA)
-    tried = [one for one in mutations(text) if one.path[0] == "envelope" and one.how == how]
-    assert len(tried) >= 2
-    for mutation in tried:
-        survives(mutation, engine.load)
 
 
 @pytest.mark.parametrize("kind", ["work-precision", "stability"])

@@ -41,14 +41,6 @@ def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
         studies.run(scenes.study("asymmetry").with_values({"kind": "asymetry"}))
 
 
-def test_importing_studies_imports_nothing_heavy() -> None:
-    heavy = "numpy", "xarray", "matplotlib", "numba", "jinja2", "pydantic"
-    code = f"import sys, studies; studies.kind_names(); print([name for name in {heavy} if name in sys.modules])"
-    assert (
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
-    )
-
-
 def test_running_a_kind_does_not_import_matplotlib() -> None:
     code = (
         "import sys, studies; [studies.kind_named(k) for k in studies.kind_names()]; print('matplotlib' in sys.modules)"

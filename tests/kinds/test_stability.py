@@ -95,13 +95,6 @@ def test_the_alias_rule(modes: int) -> None:
         assert alias.passage_growth(scene, mass, speed, wide).max() <= 1.1
 
 
-def test_the_rule_is_the_formula_of_average_acceleration() -> None:
-    speed = 0.2
-    steps = float(alias.rule_steps(GROUND.passage(7), np.array([speed]))[0])
-    h = 1.0 / (speed * math.pi) / steps
-    assert 7 * math.pi / steps == pytest.approx(2.0 * math.atan(2.0 / ((7 * math.pi) ** 2 * h)), rel=1e-9)
-
-
 @pytest.mark.parametrize(("mass", "within"), [(0.1, 0.01), (0.5, 0.05), (1.0, 0.1)])
 def test_the_parametric_tongue(mass: float, within: float) -> None:
     formula = (1.0 + 1.706 * mass) ** -0.5
@@ -121,10 +114,6 @@ def test_the_one_mode_formula_of_a_pinned_beam_has_bessel_functions() -> None:
     inertia = 1.0 + j0(z) + (0.5 * math.pi) ** 2 * (0.5 - j1(z) / z)
     mass = np.array([0.1, 1.0, 7.0])
     assert np.allclose(shuttle.one_mode(GROUND.shuttle(2), mass), (1.0 + mass * inertia) ** -0.5, rtol=1e-12)
-
-
-def test_multipliers_of_a_body_without_mass_are_one() -> None:
-    assert np.allclose(shuttle.multipliers(GROUND.shuttle(3), 0.0, np.linspace(0.3, 1.4, 9), 0.0), 1.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("modes", "wanted"), [(1, 0.7071), (19, 0.6432)])
@@ -156,27 +145,6 @@ def test_flutter_of_the_frozen_station_is_told_from_divergence(supports: str) ->
             assert straight <= 1.0
         assert (straight > 1.0) == (np.linalg.det(stiffness) < 0.0)
         assert (swinging**frozen.STEPS > 1.01) == (supports != "pinned-pinned")
-
-
-def test_a_limit_below_the_slowest_speed_is_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(frozen, "SLOWEST", 0.8)  # the station of one mode diverges from 0.7071 on
-    assert math.isnan(frozen.divergence(GROUND.passage(1)))
-
-
-def test_a_girder_that_flutters_at_any_speed_diverges_where_theory_says() -> None:
-    asked = study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-pinned", "damping_ratio": 0.01})
-    dataset = studies.run(asked)
-    assert np.allclose(dataset["frozen_divergence"], dataset["frozen_divergence_theory"], rtol=3e-4)
-    (said,) = frozen.sentences(dataset)
-    assert "flutter" in said and "from 0.3 on, the slowest tried, in 100 %" in said
-    most = dataset.isel(held_mode_count=-1)
-    grown = most["passage_growth"].values[most["frozen_growth"].values > 1.01]
-    assert f"of {grown.size} real passages where it grows, {(grown <= 1.01).sum()} do not grow at all" in said
-    free = studies.run(study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-free"}))
-    assert free["frozen_divergence"].isnull().all()
-    (said,) = frozen.sentences(free)
-    assert "no speed at which it begins to diverge" in said and "flutter" in said
-    assert "flutter" not in frozen.sentences(studies.run(study({"maps": ["frozen"], "fineness": 0.1})))[0]
 
 
 def test_a_real_passage_beyond_the_frozen_limit_need_not_grow() -> None:

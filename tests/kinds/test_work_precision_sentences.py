@@ -13,7 +13,6 @@ from results_schema.status import Status
 from studies.precision import findings as advice
 from studies.precision import pareto as trade
 from studies.reporting import answers
-from studies.results.formatting import number
 from tests.studies import precision
 
 
@@ -62,33 +61,6 @@ def test_the_sentence_follows_from_the_points(tolerance: float) -> None:
     assert any(reached) or tolerance < 1e-2
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
-def test_the_sentence_of_the_steps_alone_follows_from_the_points(tolerance: float) -> None:
-    dataset = precision.small()
-    for scene in map(str, dataset.scene.values):
-        best, own = None, float(dataset.reference_error.sel(scene=scene, quantity="history"))
-        for scheme in ("average-acceleration", "fox-goodwin", "richardson"):
-            error = dataset.error.sel(scene=scene, scheme=scheme, quantity="history").values
-            for n, steps in enumerate(dataset.step_count.values):
-                cost = float(dataset.seconds_per_variant.sel(scene=scene, scheme=scheme, step_count=steps))
-                if all(e + own <= tolerance for e in error[n:]) and (best is None or cost < best[0]):
-                    best = cost, f"{advice.scheme_words(scheme)} with {steps:,} steps"
-        said = advice.steps_alone(dataset, scene, "history", [tolerance])
-        assert "2 modes" in said
-        assert (f"take {best[1]}" in said and advice.short_time(best[0]) in said) if best else "is not reached" in said
-
-
-def test_a_lucky_point_is_not_taken() -> None:
-    dataset = precision.small().copy(deep=True)
-    place = {"scene": "light", "mode_count": 1, "correction": 0, "scheme": "fox-goodwin", "step_count": 40}
-    dataset.total_error.loc[place | {"quantity": "history"}] = 1e-9
-    assert advice.advice(dataset, "light", "history", [0.5]) == advice.advice(
-        precision.small(), "light", "history", [0.5]
-    )
-    points = [point for point in trade.choices(dataset, "light", "history") if point.modes == 1 and not point.corrected]
-    assert min(point.error for point in points if point.scheme == "fox-goodwin") > 1e-3
-
-
 def test_findings_say_what_diverged_and_what_orders_are() -> None:
     text = "\n".join(answers.findings(precision.small()))
     gone = int((precision.small().status == int(Status.DIVERGED)).sum())
@@ -99,21 +71,6 @@ def test_findings_say_what_diverged_and_what_orders_are() -> None:
         r"batch on 1 thread ",
         text,
     )
-
-
-def test_the_time_of_a_useless_solver_says_nothing() -> None:
-    dataset = precision.small().copy(deep=True)
-    own = dataset.error.sel(quantity="history").where(dataset.comparison_only == 0)
-    ratios = [
-        float(dataset.solver_seconds_per_variant.sel(scene=scene, solver=solver))
-        / float(dataset.seconds_per_variant.sel(scene=scene).where(own.sel(scene=scene) <= error).min())
-        for scene, solver in product(dataset.scene.values, dataset.solver.values)
-        if (error := float(dataset.solver_error.sel(scene=scene, solver=solver, quantity="history"))) <= 1e-2
-    ]
-    (said,) = advice._solvers(dataset)
-    assert f"need {number(np.nanmin(ratios), 2)} to {number(np.nanmax(ratios), 2)} times" in said
-    dataset.solver_error[:] = 0.02
-    assert advice._solvers(dataset) == []
 
 
 def lead(known: tuple[float, float], best: tuple[float, float], *wanted: float) -> str:
@@ -142,11 +99,6 @@ def test_the_lead_judges_as_the_advice_does() -> None:
         "But in 1 of 2 scenes it cannot be judged, as the reference itself is good to 0.002 only."
     )
     assert "in 1 of 2 scenes it cannot" in lead((1e-5, 2e-4), (9e-4, 9e-4), 1e-3)  # 9e-4 + 2e-4 > 1e-3
-
-
-def test_the_lead_takes_the_loosest_accuracy_whatever_the_order() -> None:
-    assert lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-6, 1e-2) == lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-2, 1e-6)
-    assert "within 0.01" in lead((1e-5, 1e-5), (9e-4, 9e-4), 1e-6, 1e-2)
 
 
 def with_automatic(dataset: xr.Dataset, tolerance: float, factors: tuple[float, ...], errors: tuple[float, ...]) -> str:

@@ -79,17 +79,6 @@ def test_the_engine_agrees_with_the_dense_twin(name: str) -> None:
         assert np.abs(found["place"] - place).max() <= 1e-9 * np.abs(place).max()
 
 
-@pytest.mark.parametrize("name", ["rigid, passing", "flexible on three", "frame on points"])
-def test_what_rides_obeys_newton(name: str) -> None:
-    """The mean acceleration of a body that rides is gravity less the contact forces over its mass: as a whole."""
-    found, twin, (x, _, _), _ = histories(SCENES[name]())
-    rigid = twin.table.omega == 0.0
-    heave = twin.table.participation[rigid] / twin.table.mass
-    rate = np.gradient(np.gradient(x[:, twin.nb :][:, rigid] @ heave))
-    push = 9.81 - found["total"] / twin.table.mass
-    assert np.corrcoef(rate[3:-3], push[3:-3])[0, 1] > 0.99
-
-
 def test_lanes_agree_with_single_variants() -> None:
     """Speed, gravity and damping of a contact are lanes; stiffness makes scenes of their own."""
     swept = {

@@ -50,14 +50,3 @@ def test_stations_of_a_cycle(steps: int, stations: int, expected: int) -> None:
     counts = counts_reduced(timeline, stations)
     assert (counts[0], counts[-1]) == (2 * steps, 3 * steps)
     assert counts.size == expected + 1 and np.ptp(np.diff(counts)) == 0
-
-
-def test_statics_are_made_when_they_are_asked_for() -> None:
-    """They cost as much as a march where a cycle has many stations."""
-    kept = Kept(1000)
-    run(study(beam(modes=3), force(2.0, swing(0.5, 0.4, 0.3, 1)), solver={"steps": 64}), reduction=kept)
-    cycle = kept.cycles[0]
-    assert not {"static", "static_slope"} & set(vars(cycle))
-    middle = int(np.argmin(np.abs(cycle.position - 0.5)))
-    assert cycle.static[middle, 0, 0] == pytest.approx(2.0 / 48.0, rel=1e-3)
-    assert cycle.static is cycle.static and cycle.static_slope.shape == cycle.history.shape

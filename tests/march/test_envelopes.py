@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import engine.march.envelopes
 from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import Plan, make_plan
-from engine.bodies.build import build_body
-from engine.bodies.frame.frame import Frame
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import straight
@@ -122,24 +119,6 @@ def strut(**more: Any) -> dict[str, Any]:
     return straight(supports, elements=6, plane="xz", modes=6, damping_ratio=0.2, node=nodes, **more)
 
 
-def test_lines_of_many_places_are_those_of_each() -> None:
-    """All places with all loads at once, against pairs; loads at joints, at the places, and at both ends."""
-    modal = build_body(Frame.model_validate(strut()))
-    x = np.array([0.0, 0.7, 2.5, 3.1, 5.0])
-    s = np.sort(np.concatenate([np.linspace(0.0, 5.0, 37), x]))
-    pairs = np.repeat(x, s.size), np.tile(s, x.size)
-    assert modal.sections is not None
-    compared = 0
-    for quantity in ("axial_force", "bending_moment", "shear_force", "stress"):
-        expected = modal.sections.influence_at(quantity, *pairs).reshape(x.size, s.size)
-        compared += assert_close(modal.sections.influence_at(quantity, x[:, None], s), expected, expected.max(), 1e-11)
-    for derivative in range(4):
-        expected = modal.influence_at(*pairs, derivative).reshape(x.size, s.size)
-        scale = np.abs(expected).max()
-        compared += assert_close(modal.influence_at(x[:, None], s, derivative), expected, scale, 1e-11)
-    assert compared == 8 * x.size * s.size
-
-
 def climbing(load: float, speed: float, bed: dict[str, Any], **changes: Any) -> Study:
     """A force that acts straight down and climbs the strut."""
     tables = {"body": {"bed": bed}, "sensor": {"middle": fixed(2.0, "axial_force")}} | changes
@@ -218,37 +197,11 @@ def mixed(**changes: Any) -> Study:
     return study(beam(supports=SPRINGS), carriages, **(tables | changes))
 
 
-def test_same_bits_for_any_chunks_threads_and_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_same_bits_for_any_chunks_and_threads() -> None:
     given = mixed()
     whole = digest(make_plan(given), None, 2)
     assert "shape_envelope_max" in whole
     assert digest(make_plan(given), 17, 1) == whole
-    monkeypatch.setattr(engine.march.envelopes, "MOST_READINGS", 1)
-    cut = make_plan(given)
-    assert [len(part.places) for part in cut.groups[0].tables.companions] == [4, 4, 4, 2]
-    monkeypatch.setattr("engine.march.outcome.MOST_KEPT", 1)
-    assert digest(cut, 64, 2) == whole
-
-
-def test_sensors_do_not_feel_envelopes() -> None:
-    """With steps of the study's own, as chosen ones serve envelopes too; nor are the errors told the same."""
-    fixed_steps = {"steps": 600, "tolerance": 0.1}
-    both = (mixed(solver=fixed_steps), mixed(solver=fixed_steps, envelope={}))
-    with_them, without = (digest(make_plan(given), None, 2) for given in both)
-    told = ("estimated_error", "error_estimate")
-    expected = {name: data for name, data in without.items() if name not in told}
-    assert expected == {name: data for name, data in with_them.items() if name not in told and "envelope" not in name}
-
-
-def test_done_variants_are_left_out() -> None:
-    plan = make_plan(mixed())
-    whole, rest = Collector(plan.size), Collector(plan.size)
-    execute(plan, whole.add)
-    execute(plan, rest.add, done=np.arange(0, 75, 3), chunk=11)
-    left = np.setdiff1d(np.arange(75), np.arange(0, 75, 3))
-    for name in ("shape_envelope_max", "moments_envelope_min"):
-        assert np.isfinite(whole.arrays[name]).all()
-        assert rest.arrays[name][left].tobytes() == whole.arrays[name][left].tobytes()
 
 
 def test_failed_variants_have_no_envelope() -> None:
@@ -260,15 +213,6 @@ def test_failed_variants_have_no_envelope() -> None:
     for end in ("max", "min"):
         missing = np.isnan(found[f"shape_envelope_{end}"].values)
         assert missing.tolist() == [[False] * 5, [True] * 5, [False] * 5]
-
-
-def test_the_plan_counts_them() -> None:
-    bare, more = make_plan(mixed(envelope={})), make_plan(mixed())
-    assert more.disk_bytes - bare.disk_bytes == 8 * 75 * (2 * 14 + 2)  # and errors of four results
-    assert more.seconds > 1.5 * bare.seconds
-    many = mixed(envelope={"shape": along(places=201)})
-    group = make_plan(many).groups[0]
-    assert make_plan(many).lanes_per_chunk(group) <= 4096
 
 
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
@@ -291,12 +235,6 @@ def test_refusals_name_the_place(name: str) -> None:
     envelope, words = REFUSED[name]
     with pytest.raises(BadInput, match=words):
         study(beam(), mass(0.5, cruise(0.0, 1.0, 0.8)), envelope={"e": envelope})
-
-
-@pytest.mark.parametrize("quantity", ["axial_force", "strain"])
-def test_sensors_are_refused_likewise(quantity: str) -> None:
-    with pytest.raises(BadInput, match="quantity" if quantity == "axial_force" else "fibre_distance"):
-        study(beam(), mass(0.5, cruise(0.0, 1.0, 0.8)), sensor={"one": fixed(0.5, quantity)})
 
 
 @pytest.mark.parametrize("name", ["status", "midspan_x", "0a"])
@@ -355,14 +293,3 @@ def test_a_rigid_body_has_no_section_forces() -> None:
     given = {"body": {"bed": beam(), "table": rigid}, "envelope": {"e": along("bending_moment", "table")}}
     with pytest.raises(BadInput, match=r"envelope\.e\.quantity: bending_moment is not available on body table"):
         study(beam(), mass(0.5, cruise(0.0, 1.0, 0.8)), **given)
-
-
-def test_both_marches_of_a_pair_have_the_same_stations() -> None:
-    solver = {"scheme": "richardson", "steps": 1000}
-    way = cruise(-0.1, 1.2, 0.5, after=0.5)
-    (group,) = make_plan(study(beam(), mass(0.2, way), envelope={"shape": along()}, solver=solver)).groups
-    tables = group.tables
-    (part,) = tables.companions
-    halves = [2 * segment.steps for segment in part.coarser.timeline.segments]
-    assert halves == [segment.steps for segment in part.timeline.segments]
-    assert halves == [segment.steps for segment in tables.timeline.segments]

@@ -183,11 +183,6 @@ def test_order_is_fitted(name: str, errors: dict[str, list[float]]) -> None:
     assert fitted == pytest.approx(SCHEMES[name][1], abs=0.06)
 
 
-def test_fox_goodwin_is_more_accurate_inside_its_limit(errors: dict[str, list[float]]) -> None:
-    for exact, average in zip(errors["fox-goodwin"], errors["average"], strict=True):
-        assert 0.0 < 4.0 * exact < average
-
-
 Change = Callable[[pytest.MonkeyPatch], None]
 ROWS = scenes.convective_rows
 

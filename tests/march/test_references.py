@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from typing import Any
 
@@ -11,8 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.batch.execution import run
-from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, swing, under
-from tests.naive import indices
+from tests.engine.build import Table, beam, cruise, fixed, force, mass, study, under
 from tests.reference import closed_forms, values
 
 Array = NDArray[np.float64]
@@ -50,16 +48,6 @@ def test_smallest_contact_force_of_a_moving_mass(row: values.MovingMass) -> None
     assert int(ds.status) == (1 if row.smallest_force < 0.0 else 0)
 
 
-def test_average_acceleration_reaches_the_same_numbers() -> None:
-    """2e-6 at 40000 steps."""
-    compared = 0
-    for row in values.MOVING_MASS:
-        ds = run(passing(row.mu, row.alpha, solver={"scheme": "average-acceleration", "steps": 40000}))
-        assert float(ds.midspan_max) == pytest.approx(row.largest, abs=2e-6)
-        compared += 1
-    assert compared == 5
-
-
 @pytest.mark.parametrize("row", values.MOVING_MASS_DAMPED_2_PERCENT)
 def test_moving_mass_with_damping(row: values.LargestMidspan) -> None:
     ds = run(passing(row.mu, row.alpha, zeta=0.02))
@@ -90,20 +78,6 @@ def test_moving_force() -> None:
     plain = study(beam(), force(values.WEIGHT, SPAN), sweep=given.data["sweep"])
     short = np.abs(run(plain).midspan_max.values - expected)
     assert values.MOVING_FORCE_N20_ERROR < short.max() < 1e-3  # what "auto" promises
-
-
-def test_dynamic_amplification_has_the_exact_static_value() -> None:
-    """The largest static midspan deflection is 1, and the moment PL/4."""
-    from engine.batch.chunk import run_chunk
-    from engine.batch.plan import make_plan
-
-    sensors = {"midspan": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "quarter": fixed(0.25, "bending_moment")}
-    given = study(beam(), force(values.WEIGHT, cruise(0.0, 1.0, 1.7, after=40.0)), sensor=sensors)
-    plan = make_plan(given)
-    found, _ = run_chunk(plan, plan.groups[0], plan.groups[0].variants)
-    assert found["midspan_static"] == pytest.approx(1.0, abs=1e-5)
-    assert found["moment_static"] == pytest.approx(values.WEIGHT / 4.0, rel=1e-5)
-    assert found["quarter_static"] == pytest.approx(values.WEIGHT * 3.0 / 16.0, rel=1e-5)
 
 
 def in_units_of(case: values.MovingForceCase, modes: int) -> Table:
@@ -206,97 +180,3 @@ def test_train(k: float) -> None:
         assert gain == pytest.approx(closed_forms.train_gain(values.TRAIN_FORCES, zeta, k), abs=2e-5)
         if (zeta, k) == (0.02, 1.0):
             assert gain == pytest.approx(values.TRAIN_GAIN_DAMPED, abs=1e-4)
-
-
-def last_cycle(ds: Any, cycles: int) -> Array:
-    """Midspan over the last cycle, its end left out; (..., stations)."""
-    steps = int(np.atleast_1d(ds.steps_used.values).flat[0])
-    series = ds.midspan.values
-    assert series.shape[-1] == cycles * steps + 1
-    found: Array = series[..., -steps - 1 : -1]
-    return found
-
-
-def test_asymmetry() -> None:
-    """Third cycle of the shuttle at auto steps, by the naive indices: lag for every damping, rms and area at 2 %."""
-    rows = [row for row in values.ASYMMETRY if row.mu == 0.3]
-    way = shuttle(
-        values.ASYMMETRY_START,
-        values.ASYMMETRY_END,
-        math.pi * values.ASYMMETRY_ALPHA,
-        values.ASYMMETRY_TURN,
-        values.ASYMMETRY_CYCLES,
-    )
-    given = study(
-        beam(modes=values.ASYMMETRY_MODES),
-        mass(0.3, way),
-        gravity=values.WEIGHT / 0.3,
-        sweep={"zeta": {"of": "body.bed.damping_ratio", "values": [row.zeta for row in rows]}},
-        solver={"static_correction": False, "steps": 20000},
-        output={"histories": "all"},
-    )
-    ds = run(given)
-    s = ds.car_position.values[0][-20001:-1]
-    stroke = values.ASYMMETRY_END - values.ASYMMETRY_START
-    depth = values.ASYMMETRY_TURN * stroke
-    inside = np.flatnonzero((s > values.ASYMMETRY_START + depth) & (s < values.ASYMMETRY_END - depth))
-    out = inside[inside < 10000]
-    model = closed_forms.PinnedBeam(values.ASYMMETRY_MODES)
-    soft = values.WEIGHT * model.phi(0.5, 0) / model.omega**2
-    static = [float(soft @ model.phi(x, 0)) for x in s[out]]
-    slope = [float(soft @ model.phi(x, 1)) for x in s[out]]
-    cycle = last_cycle(ds, values.ASYMMETRY_CYCLES)
-    found = [
-        indices.asymmetry(indices.Legs(list(s[out]), list(w[out]), list(w[20000 - out]), static, slope)) for w in cycle
-    ]
-    for row, index in zip(rows, found, strict=True):
-        assert index.lag == pytest.approx(row.lag, rel=5e-4)
-    two_percent = found[[row.zeta for row in rows].index(0.02)]
-    assert two_percent.odd_rms == pytest.approx(values.ASYMMETRY_ODD_RMS, rel=2e-3)
-    assert two_percent.even_excess == pytest.approx(values.ASYMMETRY_EVEN_EXCESS, rel=2e-3)
-    assert two_percent.loop_area == pytest.approx(values.ASYMMETRY_LOOP_AREA, rel=2e-3)
-
-
-@pytest.mark.parametrize("row", values.DOUBLE_PEAK, ids=lambda row: f"ratio={row.frequency_ratio}")
-def test_double_peak(row: values.DoublePeak) -> None:
-    frequency = row.frequency_ratio * 0.5 * math.pi
-    given = study(
-        beam(modes=6, damping_ratio=0.02),
-        mass(0.1, swing(0.5, 0.49, frequency, 20)),
-        gravity=values.WEIGHT / 0.1,
-        solver={"static_correction": False, "steps": 8000},
-        output={"histories": "all"},
-    )
-    cycle = list(last_cycle(run(given), 20)[::4])
-    if row.peaks is not None:
-        assert len(indices.peaks(cycle)) == row.peaks
-    if row.largest is not None:
-        assert max(cycle) == pytest.approx(row.largest, abs=1e-4)
-    found = indices.harmonics(cycle)
-    for k, expected in row.harmonics.items():
-        assert found[k] == pytest.approx(expected, abs=1e-4)
-
-
-def test_end_springs() -> None:
-    """A slow force on unequal springs: the ratio of harmonics tends to the static one."""
-    k_a, k_b = values.END_SPRINGS
-    springs = [{"at": 0.0, "stiffness": k_a}, {"at": 1.0, "stiffness": k_b}]
-    given = study(
-        beam(modes=4, damping_ratio=0.05, supports=springs),
-        force(values.WEIGHT, swing(0.5, 0.49, 0.002, 1)),
-        solver={"steps": 20000},
-        output={"histories": {"every": 20}},
-    )
-    cycle = list(run(given).midspan.values[:-1])
-    found = indices.harmonics(cycle)
-    assert found[1] / found[2] == pytest.approx(values.END_SPRINGS_FIRST_OVER_SECOND, abs=2e-3)
-    assert indices.odd_even_ratio(cycle) == pytest.approx(values.END_SPRINGS_ODD_OVER_EVEN, abs=2e-3)
-
-
-def test_complex_amplitude_is_that_of_free_vibration() -> None:
-    """What the train's gain is measured by stays constant but for damping."""
-    rate = complex(-0.02, math.sqrt(1.0 - 0.02**2)) * 3.0
-    q = [(0.7 * cmath.exp(rate * t)).imag / 3.0 for t in (0.0, 1.0)]
-    v = [(0.7 * rate * cmath.exp(rate * t)).imag / 3.0 for t in (0.0, 1.0)]
-    found = [abs(v[i] - rate.conjugate() * q[i]) for i in range(2)]
-    assert found[1] / found[0] == pytest.approx(math.exp(-0.06))

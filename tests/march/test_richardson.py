@@ -17,13 +17,12 @@ from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, STATISTICS
 from engine.kernels.stepping.richardson_pairs import survey
 from engine.march.richardson import march_pair
-from engine.march.tables import SceneTables
 from engine.model.variant_values import padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
 from results_schema.status import Status
 from tests.batch.test_determinism import digest, mixed
-from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.engine.build import beam, cruise, fixed, mass, shuttle, study, swing, under
 from tests.engine.kept_cycles import Kept
 from tests.engine.reading import Reading
 from tests.engine.twin import solve_twin
@@ -103,18 +102,6 @@ def test_order_is_four(name: str) -> None:
         assert all(two[sensor] < 0.2 * again[sensor] for sensor in SENSORS)
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_stations_between_those_of_both_marches_are_as_good(name: str) -> None:
-    given = SCENES[name]()
-    one, two = (run(with_solver(given, scheme="richardson", steps=steps)) for steps in (900, 7200))
-    nearest = np.searchsorted(two.elapsed.values, one.elapsed.values - 1e-9)
-    same = np.abs(two.elapsed.values[nearest] - one.elapsed.values) < 1e-9
-    assert same.sum() > 200
-    for sensor in SENSORS:
-        off = np.where(same, np.abs(one[sensor].values - two[sensor].values[nearest]), np.nan)
-        assert np.nanmax(off[1::2]) <= 3.0 * np.nanmax(off[::2]), sensor
-
-
 @pytest.mark.parametrize("name", SMOOTH)
 def test_estimate_is_the_error_of_the_finer_march(name: str) -> None:
     """Against DOP853: what a pair tells of its finer march is what one march with as many steps is off."""
@@ -127,25 +114,6 @@ def test_estimate_is_the_error_of_the_finer_march(name: str) -> None:
     t = alone.elapsed.values[::4]
     off = np.abs(alone.place.values[::4] - readings(place, t)["place"]).max()
     assert float(gap[0, 0]) == pytest.approx(off, rel=0.1)
-
-
-def test_phase_error_is_what_average_acceleration_falls_behind() -> None:
-    """Of free vibration after a force has left: omega^3 h^2/12 of phase per second, by the zeros of the velocity."""
-    motion = cruise(0.0, 1.0, 2.5, after=30.0)
-    given = study(
-        beam(modes=1),
-        force(1.0, motion),
-        sensor={"rate": fixed(0.5, "velocity")},
-        solver={"scheme": "average-acceleration", "steps": 20},
-        output={"histories": "all"},
-    )
-    ds = run(given)
-    t, v = ds.elapsed.values, ds.rate.values
-    zeros = np.flatnonzero((v[:-1] < 0.0) & (v[1:] >= 0.0) & (t[:-1] > 0.4))
-    at = t[zeros] - v[zeros] * (t[zeros + 1] - t[zeros]) / (v[zeros + 1] - v[zeros])
-    behind = math.pi**2 * (at[-1] - at[0]) - 2.0 * math.pi * (len(at) - 1)
-    omega, h = math.pi**2, t[-1] - t[-2]
-    assert behind == pytest.approx(omega**3 * h**2 / 12.0 * (at[-1] - at[0]), rel=0.02)
 
 
 def test_automatic_steps_hold_the_tolerance() -> None:
@@ -236,17 +204,6 @@ def test_reduction_gets_the_extrapolated_cycle() -> None:
     assert told[0] <= told[1]
 
 
-def test_contact_that_opens_before_the_last_cycle_is_seen() -> None:
-    motion = shuttle(0.1, 0.9, 1.0, 0.0, 2)
-    given = study(beam(modes=4, damping_ratio=0.3), mass(3.0, motion), solver=PAIR | {"steps": 2000}, initial="rest")
-    reduced = run(given, reduction=Kept(100))
-    whole = run(given)
-    alone = run(with_solver(given, scheme="average-acceleration", steps=2000), reduction=Kept(100))
-    assert float(alone.car_separation_position) == pytest.approx(float(whole.car_separation_position), abs=2e-3)
-    assert float(reduced.car_separation_position) == float(whole.car_separation_position)
-    assert int(reduced.status) == Status.SEPARATED
-
-
 def pairs_of_mixed() -> Study:
     data = dict(mixed().data)
     return Study(**(data | {"solver": PAIR | {"steps": 600, "tolerance": 0.1}}))
@@ -258,48 +215,3 @@ def test_same_bits_for_any_chunks_and_threads() -> None:
     execute(plan, collector.add)
     assert set(collector.arrays["status"].tolist()) == {Status.OK, Status.SEPARATED}
     assert len({digest(plan, chunk, threads) for chunk, threads in ((13, 2), (64, 1), (None, 2))}) == 1
-
-
-def test_same_bits_alone() -> None:
-    whole = run(pairs_of_mixed())
-    data = dict(pairs_of_mixed().data)
-    axes = {name: axis for name, axis in data["sweep"].items() if name != "zeta"}
-    alone = run(Study(**(data | {"sweep": axes, "body": {"bed": data["body"]["bed"] | {"damping_ratio": 0.01}}})))
-    for name in ("midspan_max", "below_min", "moment_rms", "estimated_error", "status"):
-        np.testing.assert_array_equal(alone[name].values, whole[name].sel(zeta=0.01).values)
-
-
-def test_divergence_is_told() -> None:
-    """Parametric resonance without damping grows until nothing is left; its neighbours are well."""
-    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
-    sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
-    ds = run(
-        study(
-            beam(modes=3, damping_ratio=0.0),
-            mass(0.5, way),
-            solver=PAIR | {"steps": 200, "tolerance": 0.1},
-            sweep=sweep,
-        )
-    )
-    assert ds.status.values.tolist() == [Status.OK, Status.DIVERGED, Status.OK]
-    assert 0 < ds.diverged_step.values[1] < 200 * 200
-    assert np.isnan(ds.midspan_max.values).tolist() == [False, True, False]
-
-
-def test_stations_of_the_coarser_march_are_every_second() -> None:
-    plan = make_plan(with_solver(SCENES["two masses that arrive on springs"](), scheme="richardson", steps=334))
-    fine = plan.groups[0].tables
-    assert fine.steps == 334
-    pairs = list(zip(fine.timeline.segments, fine.coarser.timeline.segments, strict=True))
-    assert len(pairs) == 4
-    for short, long in pairs:
-        assert (short.start, short.end, short.first) == (long.start, long.end, 2 * long.first)
-        assert short.steps == 2 * long.steps
-    assert sum(short.free for short, _ in pairs) >= 1
-
-
-def test_a_timeline_without_half_the_steps_is_refused() -> None:
-    plan = make_plan(with_solver(SCENES["cruise of a mass"](), scheme="richardson", steps=200))
-    tables = SceneTables(plan.base, 200, "whole")
-    with pytest.raises(ValueError, match="even"):
-        march_pair(tables, plan.values(plan.groups[0], np.zeros(16, dtype=np.int64)), np.arange(3), 16)

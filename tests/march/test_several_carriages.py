@@ -13,16 +13,13 @@ from engine.march.richardson import march_scheme
 from engine.model.variant_values import padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from tests.engine.bodies_on_contacts import RIGID as TABLE
+from tests.engine.bodies_on_contacts import TWO
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing
 from tests.engine.carriages_by_scipy import Company
 
-TABLE: Table = {"kind": "rigid", "length": 0.4, "mass": 0.5, "inertia": 0.01}
 UNEVEN: Table = TABLE | {"centre": 0.13, "mass": 0.3}
 SMALL: Table = {"kind": "rigid", "length": 0.2, "mass": 0.1, "inertia": 0.001}
-TWO: Table = {
-    "rear": {"at": 0.05, "stiffness": 400.0, "damping": 0.3},
-    "front": {"at": 0.35, "stiffness": 500.0, "damping": 0.2},
-}
 UNDAMPED: Table = {"rear": {"at": 0.05, "stiffness": 400.0}, "front": {"at": 0.35, "stiffness": 500.0}}
 SPRINGS = [{"at": 0.0, "stiffness": 40.0}, {"at": 1.0, "stiffness": 60.0}]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.kernels.layout import LARGEST, LARGEST_AT, SMALLEST, Newmark, State
+from engine.kernels.layout import LARGEST, LARGEST_AT, SMALLEST, Newmark
 from engine.kernels.schemes import generalized_alpha
 from engine.march.march import march
 from engine.march.tables import SceneTables
@@ -18,13 +18,11 @@ from engine.methods.comparison import (
     ComparisonScheme,
     frozen_track,
     march_comparison,
-    moving_track,
-    propagate_comparison,
     rigid_tie,
     wilson_theta,
 )
 from engine.model.scene_model import build_model
-from engine.model.variant_values import VariantValues, lane_table, padded
+from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -253,20 +251,6 @@ def test_variants_do_not_disturb_each_other(name: str) -> None:
         alone = run(SCHEMES[name], tables, **{path: column[[number]] for path, column in both.items()})
         np.testing.assert_array_equal(together.history[:, :, number], alone.history[:, :, 0])
         assert np.isfinite(alone.history).all()
-
-
-def test_a_moving_track_is_marched_without_loads() -> None:
-    """Unit states over a whole passage: the sum of what they become is what the sum becomes."""
-    tables = tables_of(crossing(), 50)
-    model, rk4 = tables.model, COMPARISON["rk4"]
-    lanes = lane_table(model, VariantValues(model.study, {}, 16)).steps_of(np.full((1, 16), 0.7 / 1.3 / 50))
-    q = np.zeros((1, 4, 16))
-    q[0, np.arange(4), np.arange(4)], q[0, :, 4] = 1.0, 1.0
-    state = State(q, 0.0 * q, 0.0 * q, 0.0 * q)
-    moved = propagate_comparison(rk4, moving_track(rk4, model, tables.timeline.segments[0]), lanes, state).state
-    assert np.abs(moved.q).max() > 0.1
-    np.testing.assert_allclose(moved.q[0, :, :4].sum(axis=1), moved.q[0, :, 4], rtol=1e-12)
-    assert (moved.q[0, :, 5:] == 0.0).all()
 
 
 def test_what_they_do_not_march_is_refused() -> None:

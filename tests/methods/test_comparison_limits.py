@@ -66,50 +66,9 @@ def test_limit_of_runge_kutta(modes: int) -> None:
     assert rk4.stability_limit == pytest.approx(limit, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["wilson-theta", "lagged-inertia", "lagged-convective", "picard-relaxed"])
-def test_no_limit(name: str) -> None:
-    model = held(3, 0.0)
-    assert not any(grows(COMPARISON[name], model, x / float(model.omega.max())) for x in (0.3, 3.0, 30.0, 300.0))
-    assert COMPARISON[name].stability_limit == math.inf
-
-
-def test_wilson_overshoots_57_times() -> None:
-    """Section 7.7: displaced by 1 and let go at omega h = 20, it is at -57.2 after one step."""
-    model = held(1, 0.0)
-    omega = float(model.omega[0])
-    lanes = lane_table(model, VariantValues(model.study, {}, 16)).steps_of(np.full((1, 16), 20.0 / omega))
-    one = np.ones((1, 1, 16))
-    state = State(one, 0.0 * one, -(omega**2) * one, 0.0 * one)
-    wilson = COMPARISON["wilson-theta"]
-    moved = propagate_comparison(wilson, frozen_track(wilson, model, 0.5, 1), lanes, state).state
-    assert moved.q == pytest.approx(-57.228, abs=1e-3)
-    assert (state.q == 1.0).all()
-
-
-@pytest.mark.parametrize(("modes", "critical"), [(1, 0.5), (3, 0.25), (5, 1 / 6), (10, 0.1), (20, 0.05)])
-@pytest.mark.parametrize("step", [1e-4, 3e-3, 0.1])
-def test_lagged_inertia_fails_at_m_phi_phi_1_whatever_the_step(modes: int, critical: float, step: float) -> None:
-    """Section 7.1; the step is in s, omega_1 being pi^2. Damping does not help."""
-    for damping in (0.0, 0.05):
-        limit = bisected(
-            lambda mu, zeta=damping: grows(COMPARISON["lagged-inertia"], held(modes, mu, zeta), step),
-            0.5 * critical,
-            2.0 * critical,
-        )
-        assert limit == pytest.approx(critical, rel=0.01)
-
-
 def test_lagged_convective_stays_stable_where_lagged_inertia_fails() -> None:
     assert not grows(COMPARISON["lagged-convective"], held(10, 0.5, 0.01), 3e-3, advance=1e-4)
     assert grows(COMPARISON["lagged-inertia"], held(10, 0.5, 0.01), 3e-3, advance=1e-4)
-
-
-def test_terms_of_the_speed_at_a_held_place() -> None:
-    """One mode diverges from alpha = 0.7071/sqrt(mu) on (section 7.4); alpha = v/pi here."""
-    mu, step = 0.25, 1e-3
-    model = held(1, mu)
-    found = bisected(lambda alpha: grows(COMPARISON["rk4"], model, step, alpha * math.pi * step), 1.0, 2.0)
-    assert found * math.sqrt(mu) == pytest.approx(math.sqrt(0.5), rel=1e-3)
 
 
 def test_limits_are_those_of_the_scheme_of_the_modes() -> None:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.march.tables import SceneTables
-from engine.methods.comparison import lagged_inertia, runge_kutta, wilson_theta
+from engine.methods.comparison import runge_kutta, wilson_theta
 from engine.methods.transition import (
     Frozen,
     FrozenCompared,
@@ -136,18 +136,6 @@ def test_weights_and_gravity_do_not_enter() -> None:
     assert np.array_equal(found[0], found[1])
 
 
-def test_several_ties_give_the_same_matrix_as_one() -> None:
-    study, model = scene()
-    cars = {
-        "car": build.mass(0.4, build.cruise(0.0, 1.0, 1.0)),
-        "load": build.force(3.0, build.cruise(0.0, 1.0, 1.0)),
-    }
-    other = build.study(build.beam(modes=MODES), cars)
-    both = build_model(other, {}, {})
-    found = transitions(SceneTables(both, 70, "whole"), VariantValues(other, {}, 1))
-    assert close(found, transitions(SceneTables(model, 70, "whole"), VariantValues(study, {}, 1)), 1e-12)
-
-
 @pytest.mark.parametrize("advance", [0.0, 0.02])
 @pytest.mark.parametrize("name", SCHEMES)
 def test_steps_at_a_frozen_station_equal_the_dense_twin(name: str, advance: float) -> None:
@@ -169,29 +157,6 @@ def test_steps_at_a_frozen_station_equal_the_dense_twin(name: str, advance: floa
         settled[2 * MODES : 3 * MODES] = h**2 * np.linalg.solve(matrices[0], forces)
         powered = np.linalg.matrix_power(whole[n], 7) @ settled
         assert close(np.vstack([powered[:MODES], powered[MODES : 2 * MODES] / (h * OMEGA[:, None])]), few[n])
-
-
-def test_several_steps_at_once_are_a_power() -> None:
-    study, model = scene("generalized")
-    values, step = VariantValues(study, {}, 1), np.array([0.01])
-    one, many = (step_matrices(Frozen(model, 0.5, 0.01), values, step, steps)[0] for steps in (1, 9))
-    assert close(many, np.linalg.matrix_power(one, 9))
-
-
-def test_terms_of_the_speed_act_where_they_are_kept() -> None:
-    study, model = scene()
-    values, step = VariantValues(study, {}, 1), np.array([0.01])
-    still, moving = (step_matrices(Frozen(model, 0.3, advance), values, step) for advance in (0.0, 0.01))
-    assert np.abs(still - moving).max() > 1e-3
-
-
-def test_lagged_inertia_grows_from_its_threshold_on() -> None:
-    study, model = scene()
-    values = VariantValues(study, {"carriage.car.mass": np.array([0.249, 0.251])}, 2)  # 2 m (1 + 0 + 1) = 1
-    found = spectral_radius(
-        step_matrices(FrozenCompared(model, 0.5, scheme=lagged_inertia()), values, np.full(2, 0.01))
-    )
-    assert found[0] <= 1.0 + 1e-9 and found[1] > 1.001
 
 
 @pytest.mark.parametrize("advance", [0.0, 0.01])
@@ -217,12 +182,3 @@ def test_a_march_that_overflows_has_an_infinite_radius() -> None:
     values = VariantValues(study, {"carriage.car.motion.speed": np.array([0.001, 0.5])}, 2)
     found = spectral_radius(transitions(SceneTables(model, 400, "whole"), values))
     assert found[0] == np.inf and np.isfinite(found[1])
-
-
-def test_a_rigid_mode_has_a_unit_state() -> None:
-    study, model = scene(supports="free-free")
-    found = transitions(
-        SceneTables(model, 100, "whole"), VariantValues(study, {"carriage.car.mass": np.array([1e-9])}, 1)
-    )
-    assert np.isfinite(found).all()
-    assert found[0, 0, 0] == pytest.approx(1.0, abs=1e-6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,10 @@ from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
-from engine.model.timeline import MOST_STATIONS, Rider, build_timeline
-from engine.observation.cycle_reduction import Compared, Cycle
+from engine.model.timeline import Rider, build_timeline
 from engine.scene.motions import Cruise, OutAndBack, Sinusoidal
 from engine.scene.study import Study
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.kept_cycles import Kept
 from tests.reference import closed_forms
@@ -96,29 +93,6 @@ def test_position_at_an_arrival_and_a_departure() -> None:
     np.testing.assert_allclose(found, [np.nan, np.nan, 0.0, 0.02, 1.0, np.nan, np.nan], atol=1e-12)
 
 
-@pytest.mark.parametrize("steps", [MOST_STATIONS + 5, 2 * MOST_STATIONS + 1])
-def test_slices_do_not_show(steps: int) -> None:
-    """Segments longer than a table, in the drive and in the free vibration, give what one table gives."""
-    ends = {}
-    for most in (MOST_STATIONS, 10 * MOST_STATIONS):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("engine.model.timeline.MOST_STATIONS", most)
-            way = cruise(0.0, 1.0, 1.0, after=20.505)
-            given = study(beam(), mass(0.5, way), solver={"steps": steps}, output={"histories": "all"})
-            ends[most] = run(given)
-    one, other = ends.values()
-    assert one.midspan.size == steps + 1 + 4101
-    scale = float(np.abs(one.midspan.values).max())
-    np.testing.assert_allclose(other.midspan.values, one.midspan.values, rtol=0, atol=1e-9 * scale, equal_nan=False)
-    assert np.all(np.diff(one.elapsed.values) > 0.0)
-
-
-def test_many_instant_turns_take_no_time_to_plan() -> None:
-    timeline = build_timeline((Rider(shuttling(0.0, 5000), 1.0),), 200, "whole")
-    assert len(timeline.segments) == 10000
-    assert sum(len(segment.strikes) for segment in timeline.segments) == 9999
-
-
 SENSORS = {"midspan": fixed(0.5), "moment": fixed(0.3, "bending_moment"), "below": under("car")}
 
 
@@ -186,26 +160,6 @@ def test_a_parked_carriage_stays_through_free_vibration() -> None:
     assert float(ds.midspan[-1]) == pytest.approx(0.5 * 10.0 / 48.0, rel=1e-6)
 
 
-class Nothing:
-    """A reduction that wants the last cycle and computes nothing."""
-
-    stations = 100
-    least_fidelity = Fidelity.STATIC
-    compared = ()
-
-    def outputs(self, study: Study) -> Mapping[str, tuple[str, ...]]:
-        return {}
-
-    def sizes(self, study: Study) -> Mapping[str, int]:
-        return {}
-
-    def differences(self, compared: Compared) -> dict[str, Array]:
-        return {}
-
-    def __call__(self, cycle: Cycle) -> dict[str, Array]:
-        return {}
-
-
 def test_a_sensor_that_never_reads_is_refused() -> None:
     given = study(
         beam(),
@@ -217,4 +171,4 @@ def test_a_sensor_that_never_reads_is_refused() -> None:
     )
 
     with pytest.raises(BadInput, match="reads nothing"):
-        make_plan(given, reduction=Nothing())
+        make_plan(given, reduction=Kept(100))

@@ -82,21 +82,6 @@ def instant_out_and_back(start: float, end: float, speed: float, cycles: int) ->
     return joined(phases)
 
 
-def reversed_motion(phases: tuple[Phase, ...], total: float) -> tuple[Phase, ...]:
-    """The same path ridden backward in time: s(total - t)."""
-    return tuple(_reversed_phase(phase, total) for phase in phases[::-1])
-
-
-def _reversed_phase(phase: Phase, total: float) -> Phase:
-    return Phase(
-        total - phase.end,
-        total - phase.start,
-        lambda t: phase.s(total - t),
-        lambda t: -phase.ds(total - t),
-        lambda t: phase.dds(total - t),
-    )
-
-
 def shifted(phase: Phase, delay: float) -> Phase:
     """The same piece of motion `delay` seconds later."""
     return Phase(

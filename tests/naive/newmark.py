@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,6 +20,9 @@ from tests.naive.scene import (
     impulse,
     system,
 )
+
+At = Callable[[float, Side], Scene]
+Strike = Callable[[float, State], Array]
 
 
 class Newmark(NamedTuple):
@@ -95,13 +98,15 @@ def snapped(scene: Scene, times: Sequence[float] | Array) -> tuple[Array, set[in
     return t, inner
 
 
-def collect(scene: Scene, t: Array, states: Sequence[State], a: Sequence[Array], before: Sequence[Event]) -> History:
+def collect(
+    scene: Scene, t: Array, states: Sequence[State], a: Sequence[Array], before: Sequence[Event], at: At | None = None
+) -> History:
     """Histories with contact forces, positions and displacements under the loads."""
     last = len(t) - 1
     sides: list[Side] = ["right" if n < last else "left" for n in range(len(t))]
-    force = np.array([contact_forces(scene, *at) for at in zip(t, states, a, sides, strict=True)]).reshape(
-        len(t), len(scene.loads)
-    )
+    now = [scene if at is None else at(*one) for one in zip(t, sides, strict=True)]
+    force = np.array([contact_forces(*one) for one in zip(now, t, states, a, sides, strict=True)])
+    force = force.reshape(len(t), len(scene.loads))
     position = np.full_like(force, np.nan)
     under = np.full_like(force, np.nan)
     for n, side in enumerate(sides):
@@ -114,58 +119,50 @@ def collect(scene: Scene, t: Array, states: Sequence[State], a: Sequence[Array],
     return History(t, q, v, np.array(a), force, position, under, tuple(before))
 
 
-def march_alpha(scene: Scene, times: Sequence[float] | Array, start: State, scheme: GeneralizedAlpha) -> History:
-    """Generalized-alpha by Arnold and Bruels (2007), otherwise as `march`.
+def _weights(scheme: Newmark | GeneralizedAlpha) -> tuple[float, float, float, float]:
+    """beta, gamma, alpha_m, alpha_f."""
+    if isinstance(scheme, Newmark):
+        return scheme.beta, scheme.gamma, 0.0, 0.0
+    m, f = scheme
+    return 0.25 * (1.0 - m + f) ** 2, 0.5 - m + f, m, f
 
-    With true accelerations q'' that satisfy the equations of motion at every instant, and auxiliary ones a from
-    (1 - m) a_new + m a = (1 - f) q''_new + f q'', in q = u* + beta h^2 a_new, q' = v* + gamma h a_new. The two unknown
-    accelerations are solved for at once.
+
+def march(
+    scene: Scene,
+    times: Sequence[float] | Array,
+    start: State,
+    scheme: Newmark | GeneralizedAlpha | None = None,
+    at: At | None = None,
+    strike: Strike | None = None,
+) -> History:
+    """The march over the instants `times` (S,) from `start`, which holds just after times[0] (no impulse there).
+
+    Generalized-alpha by Arnold and Bruels (2007), of which Newmark's methods are those with m = f = 0: true
+    accelerations q'' that satisfy the equations of motion at every instant, with matrices just before it, and auxiliary
+    ones a from (1 - m) a_new + m a = (1 - f) q''_new + f q'', in q = u* + beta h^2 a_new, q' = v* + gamma h a_new. Both
+    unknown accelerations are solved for at once. At an event the impulse is added and q'' computed anew with the
+    matrices just after it. at, strike: the scene of an instant and the impulse where they are not the scene's own.
     """
-    m_, f_ = scheme
-    gamma, beta = 0.5 - m_ + f_, 0.25 * (1.0 - m_ + f_) ** 2
+    at = at or (lambda t, side: scene)
+    strike = strike or (lambda t, state: impulse(scene, t, state))
+    beta, gamma, m_, f_ = _weights(scheme or Newmark())
     t, inner = snapped(scene, times)
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
-    states, true, before = [start], [acceleration(scene, t[0], start, "right")], []
+    states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
     a = true[0]
     for n in range(1, len(t)):
-        h, (q, v) = t[n] - t[n - 1], states[-1]
+        h, (q, v), here = t[n] - t[n - 1], states[-1], at(t[n], "left")
         u_star = q + h * v + (0.5 - beta) * h**2 * a
         v_star = v + (1.0 - gamma) * h * a
-        m, c, k, f = system(scene, t[n], "left")
+        m, c, k, f = system(here, t[n], "left")
         both = np.block([[m, gamma * h * c + beta * h**2 * k], [-(1.0 - f_) * one, (1.0 - m_) * one]])
         x = np.linalg.solve(both, np.concatenate([f - c @ v_star - k @ u_star, f_ * true[-1] - m_ * a]))
         now, a = x[:n_modes], x[n_modes:]
         state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
         if n in inner:
-            before.append(Event(n, t[n], state.v, now, contact_forces(scene, t[n], state, now, "left")))
-            state = State(state.q, state.v + impulse(scene, t[n], state))
-            now = a = acceleration(scene, t[n], state, "right")
+            before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
+            state = State(state.q, state.v + strike(t[n], state))
+            now = a = acceleration(at(t[n], "right"), t[n], state, "right")
         states.append(state)
         true.append(now)
-    return collect(scene, t, states, true, before)
-
-
-def march(scene: Scene, times: Sequence[float] | Array, start: State, scheme: Newmark | None = None) -> History:
-    """Newmark's march over the instants `times` (S,) from `start`, which holds just after times[0] (no impulse there).
-
-    Predictors u* = q + h q' + (1/2 - beta) h^2 q'', v* = q' + (1 - gamma) h q''; then
-    (M + gamma h C + beta h^2 K) q''_new = f - C v* - K u* with matrices just before the new instant. At an event the
-    impulse is added and q'' computed anew with the matrices just after it.
-    """
-    beta, gamma = scheme or Newmark()
-    t, inner = snapped(scene, times)
-    states, accelerations, before = [start], [acceleration(scene, t[0], start, "right")], []
-    for n in range(1, len(t)):
-        h, (q, v), a = t[n] - t[n - 1], states[-1], accelerations[-1]
-        u_star = q + h * v + (0.5 - beta) * h**2 * a
-        v_star = v + (1.0 - gamma) * h * a
-        m, c, k, f = system(scene, t[n], "left")
-        a = np.linalg.solve(m + gamma * h * c + beta * h**2 * k, f - c @ v_star - k @ u_star)
-        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
-        if n in inner:
-            before.append(Event(n, t[n], state.v, a, contact_forces(scene, t[n], state, a, "left")))
-            state = State(state.q, state.v + impulse(scene, t[n], state))
-            a = acceleration(scene, t[n], state, "right")
-        states.append(state)
-        accelerations.append(a)
-    return collect(scene, t, states, accelerations, before)
+    return collect(scene, t, states, true, before, at)

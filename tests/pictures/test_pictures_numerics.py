@@ -16,14 +16,12 @@ from results_schema.status import Fidelity
 from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from results_schema.variables import axes as coordinates
 from results_schema.variables import declarations
-from studies.commands.console import show_outcome
-from studies.findings.numerics_used import NAMES, told_choices
+from studies.findings.numerics_used import told_choices
 from studies.pictures.common import estimates, figures
 from studies.pictures.common import numerics_used as choice
 from studies.pictures.common.figures import BLUE, MUTED, Figure
 from studies.reporting.report import write_report
 from studies.results.results import Results
-from studies.runs.runner import Outcome
 from tests.pictures.test_figures import sweeps
 from tests.pictures.test_report import check_standing_alone
 from tests.studies import at_rest, scenes
@@ -115,24 +113,6 @@ def test_sentences_count_models_with_what_they_took(plane: xr.Dataset) -> None:
     assert told_choices(Results.of(cheap))[1].endswith("; half of them marched nothing.")
 
 
-def test_sentences_of_failures_and_single_scenes(plane: xr.Dataset) -> None:
-    bare = put(plane, modes_used=np.full((3, 2), 12), steps_used=[[400, 800]] * 3)
-    assert told_choices(Results.of(bare)) == ["All 6 variants: moving mass, 12 modes, 400 to 800 steps."]
-    failed = scenes.with_failures(bare, 2)
-    assert told_choices(Results.of(failed)) == ["All 3 variants with values: moving mass, 12 modes, 800 steps."]
-    assert told_choices(Results.of(scenes.with_failures(bare, 1))) == []
-    some = told_choices(Results.of(scenes.with_failures(put(plane, **KNOWN), 2)))[0]
-    assert some.startswith("1 of 3 variants with values: moving force, 4 modes, 400 steps, ")
-    one = put(scenes.run("passage"), fidelity_used=0, error_estimate=4e-4)
-    assert told_choices(Results.of(one)) == ["Computed as statics, estimated error at most 4e-4."]
-    assert drawn(one) == {}
-
-
-def test_every_model_has_a_name_and_a_colour() -> None:
-    assert set(NAMES) == set(choice.COLOURS) == set(Fidelity)
-    assert len(set(NAMES.values())) == len(set(choice.COLOURS.values())) == len(Fidelity)
-
-
 @pytest.mark.parametrize("kind", at_rest.KINDS)
 def test_kinds_that_do_not_march_say_nothing_of_it(kind: str) -> None:
     dataset = at_rest.run(kind)
@@ -179,22 +159,6 @@ def test_what_is_the_same_everywhere_is_told_and_not_drawn(plane: xr.Dataset) ->
     assert figure.caption == "Steps of every variant shown. All: moving mass and 12 modes."
     alike = put(plane, modes_used=np.full((3, 2), 12), steps_used=np.full((3, 2), 400), work=np.full((3, 2), 4800))
     assert drawn(alike) == {}
-
-
-def test_variants_without_values_are_left_white(plane: xr.Dataset) -> None:
-    figure = drawn(scenes.with_failures(put(plane, **KNOWN), 2))["choice"]
-    shown = cells(figure.drawing.axes[0])
-    assert sorted(place for places in shown.values() for place in places) == [(2.0, 20.0), (4.0, 20.0), (6.0, 20.0)]
-    assert "3 diverged (left out)" in figure.caption
-
-
-def test_the_axis_along_which_the_choice_changes_is_shown() -> None:
-    dataset = scenes.run("passage", f"{MASSES}\n{DAMPING}\n{SPEEDS}")
-    modes = np.broadcast_to(np.array([2, 4])[:, None, None], (2, 2, 3))
-    for axis, varied in (("mass", modes), ("zeta", modes.swapaxes(0, 1))):
-        seen = choice.chosen_view(Results.of(put(dataset, modes_used=varied, steps_used=np.full((2, 2, 3), 400))))
-        assert seen.x is not None and seen.x.name == "pace"
-        assert seen.y is not None and seen.y.name == axis
 
 
 def test_one_axis_is_drawn_as_steps_in_order() -> None:
@@ -252,16 +216,6 @@ def test_the_title_says_what_may_be_missed(plane: xr.Dataset) -> None:
     assert "estimates" not in drawn(put_errors(plane, {"a": 1e-3}, np.full((3, 2, 1), np.nan)))
 
 
-def test_variants_without_values_have_no_errors_and_many_results_are_cut(plane: xr.Dataset) -> None:
-    tolerances = {f"r{place}": 1e-3 for place in range(30)}
-    errors = np.full((3, 2, 30), 1e-4)
-    errors[0, 0] = 1.0
-    dataset = scenes.with_failures(put_errors(plane, tolerances, errors), 2)
-    figure = drawn(dataset)["estimates"]
-    assert len(rows_of(figure)) == estimates.MOST_RESULTS
-    assert all(largest == pytest.approx(1e-4) for _, (*_, largest), _ in rows_of(figure).values())
-
-
 def group(told: Any, observed: Any, tolerances: dict[str, float]) -> xr.Dataset:
     """An audit of some variants; told, observed (variants, results)."""
     count = len(told)
@@ -302,17 +256,6 @@ def test_told_against_observed_is_honest_about_what_has_no_place() -> None:
     np.testing.assert_allclose(lines["tolerance"].get_ydata(), 1e-3)
 
 
-def test_told_against_observed_needs_two_of_both() -> None:
-    nan = np.nan
-    assert estimates.compared(None) == []
-    assert estimates.compared(group([[1e-4, nan, 1e-4]], [[1e-4, 1e-4, nan]], {"a": 1e-3, "b": 1e-3, "c": 1e-3})) == []
-    (figure,) = estimates.compared(group([[1e-4], [3e-4]], [[1e-4], [2e-4]], {"a": 1e-3}))
-    assert (
-        figure.title == "Of 2 audited numbers 100 % are no further off than estimated" and "Worst" not in figure.caption
-    )
-    assert estimates.compared(group([[0.0], [0.0]], [[0.0], [0.0]], {"a": nan}))
-
-
 def test_the_report_has_them_all(plane: xr.Dataset, tmp_path: Path) -> None:
     attributes = {"Conventions": "CF-1.11", "history": "made by a test", "schema_version": SCHEMA_VERSION}
     dataset = put(plane, **KNOWN).assign_attrs(attributes)
@@ -332,10 +275,3 @@ def test_the_report_has_them_all(plane: xr.Dataset, tmp_path: Path) -> None:
         assert len(list(page.parent.glob(f"*-{figure.name}.png"))) == 1
     for sentence in told_choices(Results.of(dataset)):
         assert sentence in reader.text
-
-
-def test_a_run_says_it(plane: xr.Dataset, capsys: pytest.CaptureFixture[str]) -> None:
-    dataset = put(plane, **KNOWN)
-    show_outcome(Outcome(Path("study.nc"), dataset, 0, False, 1.0))
-    told = capsys.readouterr().out.splitlines()
-    assert set(told_choices(Results.of(dataset))) < set(told)

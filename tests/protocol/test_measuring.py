@@ -14,18 +14,15 @@ import xarray as xr
 
 import engine
 import studies
-from engine.march.stepper import Halted
 from engine.study_file.spec import Spec
 from results_schema.errors import ArchiveBusy, BadInput, Interrupted, OutputFailed
 from results_schema.store import files
 from results_schema.store.archive import open_archive
 from results_schema.store.pieces import PieceStore, pieces_so_far
 from studies.commands.cli import main
-from studies.protocol.measuring import MeasuringKind, Piece, Work, measure, question_of, usual
+from studies.protocol.measuring import MeasuringKind, Piece, Work, measure, question_of
 from studies.protocol.options import RunOptions
 from studies.protocol.stopping import Stop
-from studies.reporting import summary
-from studies.results.results import Results
 from studies.runs.runner import run_to_archive
 from tests.schema.samples import FailNth
 from tests.studies import precision, scenes
@@ -59,21 +56,6 @@ def test_pieces_are_computed_in_their_order_and_handed_over() -> None:
     assert float(found["b"].x[0]) == 2.0
 
 
-def test_finished_pieces_are_not_computed_again() -> None:
-    done = {"b": numbers(7.0)}
-    kept: list[str] = []
-    found = measure([piece("b"), piece("a")], Work(), done=done, keep=lambda name, _: kept.append(name))
-    assert kept == ["a"] and found["b"] is done["b"]
-
-
-def test_what_a_piece_raises_is_raised() -> None:
-    def fail(work: Work) -> xr.Dataset:
-        raise ZeroDivisionError("here")
-
-    with pytest.raises(ZeroDivisionError, match="here"):
-        measure([Piece("a", "", fail)], Work())
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_between_pieces_keeps_the_finished_ones(number: signal.Signals) -> None:
     stop, kept = Stop(), list[str]()
@@ -98,19 +80,6 @@ def test_a_piece_that_never_looks_does_not_hold_up_a_stop() -> None:
     with pytest.raises(Interrupted):
         measure([Piece("a", "", endless)], Work(stop=stop))
     forever.set()
-
-
-def test_a_piece_that_looks_ends_by_itself() -> None:
-    stop, ended = Stop(), threading.Event()
-
-    def looks(work: Work) -> xr.Dataset:
-        stop.ask()
-        ended.set()
-        raise Halted if work.halted() else AssertionError
-
-    with pytest.raises(Interrupted):
-        measure([Piece("a", "", looks)], Work(stop=stop))
-    assert ended.is_set()
 
 
 # ---- pieces on the disk ----
@@ -186,12 +155,6 @@ def test_bad_options_are_refused_with_their_key(question: dict[str, object], wor
         question_of(engine.Study(kind="passage", question=question), Asked)
 
 
-def test_options_are_no_numbers_of_the_model() -> None:
-    study = engine.Study(kind="passage", question={"modes": 5})
-    assert question_of(study, Asked) == Asked(modes=5)
-    assert not any(key.startswith("question") for key in study.numbers())
-
-
 @pytest.mark.parametrize("kind", scenes.MOTIONS)
 def test_kinds_without_options_refuse_them(kind: str) -> None:
     with pytest.raises(BadInput, match=r"question: studies of the kind .* have no options.*modes"):
@@ -208,12 +171,6 @@ def test_measuring_kinds_are_such_and_some_refuse_a_sweep(kind: str) -> None:
     text = scenes.text_of("passage", scenes.pace("passage")).replace('"passage"', f'"{kind}"')
     with pytest.raises(BadInput, match=rf"sweep: a study of the kind {kind} takes no sweep.*pace"):
         studies.run(engine.load(text))
-
-
-def test_what_every_kind_has() -> None:
-    found = xr.Dataset(usual((), status=0, fidelity=3, modes=1, steps=2))
-    assert found.status.dtype == np.int8 and found.steps_used.dtype == np.int32
-    assert "flag_values" in found.status.attrs
 
 
 # ---- the commands ----
@@ -284,13 +241,3 @@ def test_a_full_disk_keeps_the_finished_pieces(here: Path, monkeypatch: pytest.M
     with pytest.raises(OutputFailed):
         run_to_archive(study, Path("small.nc"), RunOptions())
     assert 1 <= pieces_so_far("small.nc") < 6 and not Path("small.nc").exists()
-
-
-def test_every_result_has_its_range_and_place() -> None:
-    dataset = precision.small()
-    found = {one.name: one for one in summary.ranges(Results.of(dataset))}
-    assert {"error", "seconds_per_variant", "fitted_order", "total_error"} <= set(found)
-    largest = found["error"].largest
-    at = {name: value for name, (value, _) in largest.variant.items()}
-    assert float(dataset.error.sel(at)) == largest.value and set(at) == set(dataset.error.dims)
-    assert "scene" in largest.where and summary.noun(dataset) == "point"

@@ -194,9 +194,3 @@ def characteristic_values(left: End, right: End, count: int) -> list[float]:
             found.append(float(brentq(characteristic_determinant, b, b + step, args=(left, right), xtol=1e-14)))
         b, below = b + step, above
     return found
-
-
-def energy(omega: Array, q: Array, v: Array) -> Array:
-    """Energy of the body alone, 1/2 q'.q' + 1/2 q.omega^2 q, for q and v of shape (S, N); shape (S,)."""
-    total: Array = 0.5 * (v**2).sum(axis=1) + 0.5 * (omega**2 * q**2).sum(axis=1)
-    return total

@@ -154,13 +154,6 @@ def test_what_the_archive_marks_itself_is_told_apart() -> None:
     assert np.isnan(Verdict.of(marked).worst) and as_json(marked, Results.of(dataset))["marked"] == 6
 
 
-def test_one_scene_without_a_sweep(tmp_path: Path) -> None:
-    found = outcome(crossing(RICH, FINE, sweep={}), tmp_path)
-    assert group_of(found)["sample"].values.tolist() == [0]
-    told = told_audit(found.audit, Results.of(found.results))
-    assert "audit of 1 variant found at most" in told[0] and ", worst (midspan" in told[0]
-
-
 def test_the_command_says_it_and_ends_with_3(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -179,22 +172,8 @@ def test_the_command_says_it_and_ends_with_3(
     assert list((tmp_path / "small-report").glob("*-audit.svg"))
 
 
-def test_without_an_audit_nothing_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path, SMALL.replace('steps = "auto"', 'steps = "auto"\naudit = 0'))
-    assert main(["run", "small.toml", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["audit"] is None
-    assert GROUP not in open_archive("small.nc").groups
-
-
-def test_it_is_said_that_no_audit_was_worth_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("engine.batch.audit.MOST_TIME", 0.0)
-    monkeypatch.setattr("engine.batch.audit.FREE_SECONDS", 0.0)
-    found = outcome(crossing(RICH, {}), tmp_path)
-    assert found.audit is None and exit_code(found) == 0
-    assert told_audit(found.audit, Results.of(found.results)) == [NONE_AUDITED]
+def test_it_is_said_that_no_audit_was_worth_its_time() -> None:
+    assert told_audit(None, Results.of(studies.run(crossing(RICH, {})))) == [NONE_AUDITED]
 
 
 def test_what_marches_nothing_refuses_it() -> None:

@@ -84,8 +84,8 @@ def reduced(folder: Path) -> dict[str, object]:
         (imported.matrices, "stiffness.mtx", stiffen, "passage"),
         (imported.matrices, "nodes.csv", lift, "influence"),
         (imported.matrices, "stiffness.mtx", stiffen, "eigenfrequencies"),
-        (imported.nastran, "matrices.pch", remark, "passage"),
-        (imported.nastran, "grids.bdf", remark, "trajectory"),
+        pytest.param(imported.nastran, "matrices.pch", remark, "passage", marks=pytest.mark.extras),
+        pytest.param(imported.nastran, "grids.bdf", remark, "trajectory", marks=pytest.mark.extras),
         (imported.matrices, "nodes.csv", lift, "stability"),
         (reduced, "bed.nc", soften, "passage"),
     ],
@@ -114,6 +114,7 @@ def test_fault_41_a_changed_file_of_the_model_is_another_study(
     assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
 
 
+@pytest.mark.extras
 def test_fault_41_a_study_that_measures_names_its_files(here: Path) -> None:
     """Fault 41: the key of a study in pieces, and what its archive says, hold the files too."""
     path = imported.write(here, imported.nastran(here), "work-precision")

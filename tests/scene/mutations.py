@@ -1,6 +1,6 @@
 """Every key of a study, dropped, misspelt, retyped and made NaN: each is refused, or still means something.
 
-Use: `@pytest.mark.parametrize("mutation", distinct(text), ids=str)` and `survives(mutation, read)`.
+Use: `@pytest.mark.parametrize("how", HOW)` and `accepted(how, distinct(text), read)`.
 """
 
 from __future__ import annotations
@@ -8,12 +8,13 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 
 How = Literal["drop", "misspell", "retype", "text", "nan"]
+HOW: tuple[How, ...] = get_args(How)
 # tables whose keys are the user's own names
 OWN_NAMES = (("body",), ("carriage",), ("sensor",), ("envelope",), ("sweep",), ("question", "scenes"))
 OWN_NAMES_OF_FRAMES = ("node", "section", "member", "point", "point_mass", "spring")
@@ -58,6 +59,13 @@ def distinct(*texts: str) -> list[Mutation]:
         for mutation in mutations(text):
             found.setdefault((mutation.how, *_meaning(data, mutation.path)), mutation)
     return list(found.values())
+
+
+def accepted(how: How, tried: list[Mutation], read: Callable[[str], object]) -> list[Mutation]:
+    """Those of one sort that mean something; all others are refused with the place."""
+    chosen = [mutation for mutation in tried if mutation.how == how]
+    assert chosen
+    return [mutation for mutation in chosen if survives(mutation, read)]
 
 
 def survives(mutation: Mutation, read: Callable[[str], object]) -> bool:

@@ -8,7 +8,7 @@ import pytest
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed
 from results_schema.store import files
 from results_schema.store.parts import PartStore, Rows
-from tests.schema.samples import FailNth, in_child
+from tests.schema.samples import FailNth
 
 
 def chunk(variants):
@@ -104,44 +104,28 @@ def test_arrays_that_do_not_fit_are_refused(path, variants, arrays):
         assert store.finished().size == 0
 
 
-def damage_truncated(part):
-    os.truncate(part, part.stat().st_size // 2)
-
-
-def damage_empty(part):
-    os.truncate(part, 0)
-
-
-def damage_flipped(part):
+def flip(part):
     content = bytearray(part.read_bytes())
     content[len(content) * 3 // 4] ^= 4
     part.write_bytes(content)
 
 
-def damage_without_sidecar(part):
-    files.sidecar(part).unlink()
-
-
-def damage_only_sidecar(part):
-    part.unlink()
-
-
-def damage_renamed_text(part):
+def write_text(part):
     part.write_text("not netCDF")
     files.write_sidecar(part)
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        damage_truncated,
-        damage_empty,
-        damage_flipped,
-        damage_without_sidecar,
-        damage_only_sidecar,
-        damage_renamed_text,
-    ],
-)
+DAMAGE = {
+    "truncated": lambda part: os.truncate(part, part.stat().st_size // 2),
+    "empty": lambda part: os.truncate(part, 0),
+    "flipped": flip,
+    "without sidecar": lambda part: files.sidecar(part).unlink(),
+    "only sidecar": lambda part: part.unlink(),
+    "text": write_text,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=list(DAMAGE))
 def test_damaged_parts_are_found_and_computed_again(path, damage):
     with PartStore(path, "key") as store:
         store.write(*chunk([0, 1]))
@@ -160,7 +144,7 @@ def test_damage_while_assembling_names_the_part_and_deletes_it(path):
     with PartStore(path, "key") as store:
         part = store.write(np.arange(5000), {"x": np.random.default_rng(0).random(5000)})
         store.finished()
-        damage_flipped(part)
+        flip(part)
         with pytest.raises(ArchiveError, match=part.name) as caught:
             store.assemble(5000)
         assert caught.value.exit_code == 4
@@ -248,23 +232,3 @@ def test_a_full_disk_at_any_operation_keeps_finished_chunks_whole(path, monkeypa
             assert number > 20
             return
     raise AssertionError("no clean run")
-
-
-def test_a_failed_chunk_leaves_its_neighbours(path, monkeypatch):
-    with PartStore(path, "key") as store:
-        store.write(*chunk([0, 1]))
-        monkeypatch.setattr(files, "FAULTS", FailNth(3))
-        with pytest.raises(OutputFailed):
-            store.write(*chunk([2, 3]))
-        np.testing.assert_array_equal(store.finished(), [0, 1])
-
-
-def test_forked_children_see_the_lock(path):
-    with PartStore(path, "key"):
-
-        def second():
-            with PartStore(path, "key"):
-                pass
-
-        assert in_child(second) == 1
-    assert in_child(second) == 0
