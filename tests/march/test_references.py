@@ -48,6 +48,14 @@ def test_smallest_contact_force_of_a_moving_mass(row: values.MovingMass) -> None
     assert int(ds.status) == (1 if row.smallest_force < 0.0 else 0)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("row", values.MOVING_MASS)
+def test_average_acceleration_reaches_the_same_numbers(row: values.MovingMass) -> None:
+    """2e-6 at 40000 steps."""
+    ds = run(passing(row.mu, row.alpha, solver={"scheme": "average-acceleration", "steps": 40000}))
+    assert float(ds.midspan_max) == pytest.approx(row.largest, abs=2e-6)
+
+
 @pytest.mark.parametrize("row", values.MOVING_MASS_DAMPED_2_PERCENT)
 def test_moving_mass_with_damping(row: values.LargestMidspan) -> None:
     ds = run(passing(row.mu, row.alpha, zeta=0.02))
