@@ -64,7 +64,7 @@ class SceneGrid:
     @property
     def _free_unit(self) -> int:
         """Steps of the grid per first period of free vibration: as in the mean passage."""
-        scale = self.values.time_scale(self.scene.carriages[0].name)
+        scale = self.values.scene_time_scale
         if self.fixed:
             free, pairs = free_steps(self.scene), self.scene.scheme.stride
             return free if pairs == 1 else max(-(-free // pairs), self.unit)  # whose whole histories come closer
@@ -145,7 +145,7 @@ def fixed_steps(values: VariantValues) -> bool:
 
 def unit_steps(scene: SceneModel) -> int:
     """Steps of the grid over one passage or cycle."""
-    return PASSAGE_STEPS if scene.carriages[0].rider.motion.period is None else CYCLE_STEPS
+    return PASSAGE_STEPS if scene.clock.period is None else CYCLE_STEPS
 
 
 def swift_scheme_fits(scene: SceneModel) -> bool:

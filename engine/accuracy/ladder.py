@@ -233,7 +233,7 @@ class Climb:
         """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
         if column not in self._rules:
             model = self._model(column)
-            periods = self.values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
+            periods = self.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
             self._rules[column] = least_steps(model, self.values) / self._unit(column), periods
         return self._rules[column]
 

@@ -233,7 +233,7 @@ def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> C
     wanted = np.full(values.size, unit_steps(grid.scene) * 4.0**level)
     own = MARGIN * least_steps(model, values) * 2.0**alike  # no two levels are the same march
     if not np.isfinite(model.scheme.stability_limit):
-        periods = values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * np.pi)
+        periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
         own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)
     return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(wanted, own) / grid.unit).clip(0.0) - 1e-9)), dtype=np.int64)
 

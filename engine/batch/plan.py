@@ -128,7 +128,7 @@ class Plan:
         values = VariantValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
         numerics = ladder.columns[column]
         by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
-        pace = values.time_scale(grid.scene.carriages[0].name)
+        pace = values.scene_time_scale
         for part in split(np.arange(variants.size), by):
             lanes = part[np.argsort(pace[part], kind="stable")]
             yield MarchGroup(grid, variants[lanes], numerics, int(by[part[0]]))

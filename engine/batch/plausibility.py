@@ -90,7 +90,7 @@ def _thin(plan: Plan) -> Iterator[str]:
 
 def _time_scale(grid: SceneGrid) -> Array:
     """(V,) s per unit of scene time."""
-    return grid.values.time_scale(grid.scene.carriages[0].name)
+    return grid.values.scene_time_scale
 
 
 def _speed_ratio(grid: SceneGrid) -> Array:

@@ -35,7 +35,7 @@ def reduced(
         phase=(tau - tau[0]) / (tau[-1] - tau[0]),
         position=tables.timeline.positions(0, counts.astype(np.float64)),
         history=history,
-        motion=tables.model.carriages[0].rider.motion,
+        motion=tables.model.clock,
         find_static=static,
         find_slope=lambda: tables.static_slope_at(counts)[:, :, None] * loads[0],
     )

@@ -292,7 +292,7 @@ def histories(
 ) -> dict[str, Array]:
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
     marched = march_scheme(tables, values.padded, counts, values.size, halted)
-    time_scale = values.time_scale(tables.model.carriages[0].name)
+    time_scale = values.scene_time_scale
     arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):
         arrays[sensor.name] = marched.history[:, j].T

@@ -53,7 +53,7 @@ def quasistatic_extremes(
         statistics[:, :, part] = _statistics(np.einsum("sjl,lv->sjv", unit, distinct[:, part]), counted, at)
     statistics = statistics[:, :, inverse.reshape(-1)]
     sensors = len(tables.sensors)
-    time_scale = values.time_scale(model.carriages[0].name)[:size]
+    time_scale = values.scene_time_scale[:size]
     statistics[:sensors, SQUARES], statistics[:sensors, SECONDS] = _squares(tables, loads, time_scale)
     unrecorded = np.full((len(signals) - sensors, STATISTICS, size), -1.0)
     shown = sensors if sampled is None else sampled

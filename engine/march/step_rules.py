@@ -40,7 +40,7 @@ ALIAS_CELL = 0.01  # of a time scale: the alias rule is solved once for variants
 def least_steps(model: SceneModel, values: VariantValues) -> Array:
     """(V,) the fewest steps per unit of scene time that a march may take whatever its accuracy: inside the scheme's
     stability limit, by the alias rule, and none longer than a period of a contact on its spring."""
-    scale = values.time_scale(model.carriages[0].name)
+    scale = values.scene_time_scale
     found = limit_steps(model, float(model.omega.max()), scale)
     found = np.maximum(found, LEAST_MARGIN * _alias(model, scale))
     if model.springs:
@@ -160,7 +160,7 @@ def check_even_steps(model: SceneModel, steps: Counts) -> None:
 
 def check_slowest(model: SceneModel, values: VariantValues) -> None:
     """Refuse variants so slow that no march could resolve them. Raises BadInput."""
-    periods = values.time_scale(model.carriages[0].name) * model.first_omega / (2.0 * math.pi)
+    periods = values.scene_time_scale * model.first_omega / (2.0 * math.pi)
     check_most_steps(model, SLOWEST * periods)
 
 
@@ -184,7 +184,7 @@ def contact_omega(model: SceneModel, values: VariantValues) -> Array:
 def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie) -> Array:
     if spring.rigid:
         return np.zeros(values.size)
-    body = model.bodies[model.carriages[spring.carriage].body].modal
+    body = model.bodies[spring.body].modal
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
     stiffness = values.stiffness(spring)
     if spring.held is not None:
@@ -196,7 +196,7 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
 
 def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
     """Refuse fixed steps (V,) that cannot be right. Raises BadInput with limit and suggestion."""
-    time_scale = values.time_scale(model.carriages[0].name)
+    time_scale = values.scene_time_scale
     check_fixed_steps(model, time_scale, steps)
     if not model.springs:
         return
@@ -228,7 +228,7 @@ def check_free_vibration(model: SceneModel) -> None:
 def limit_with_springs(model: SceneModel, values: VariantValues) -> Array:
     """(V,) steps at which the coupled scene reaches the scheme's limit, at most."""
     highest = np.sqrt(float(model.omega.max()) ** 2 + contact_omega(model, values) ** 2)
-    return np.asarray(highest * values.time_scale(model.carriages[0].name) / model.scheme.stability_limit)
+    return np.asarray(highest * values.scene_time_scale / model.scheme.stability_limit)
 
 
 def _refuse(model: SceneModel, least: Array, steps: Counts, what: str) -> None:

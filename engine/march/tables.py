@@ -249,7 +249,7 @@ class SceneTables:
         """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
         apart, which it reaches with all its contacts."""
         riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
-        own = {0, *(rider for rider, _ in self.model.carriages[0].loads)}
+        own = {0, *(load.rider for load in self.model.carriages[0].loads)}
         lowest = np.minimum.reduce([along[r].s for r in own])
         highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
         before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)

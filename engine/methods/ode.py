@@ -63,7 +63,7 @@ class ModalEquations:
     @cached_property
     def time_scale(self) -> float:
         """Seconds per unit of scene time."""
-        return float(self._values.time_scale(self.model.carriages[0].name)[0])
+        return float(self._values.scene_time_scale[0])
 
     @cached_property
     def mass(self) -> float:

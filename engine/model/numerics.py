@@ -42,6 +42,6 @@ class Numerics(NamedTuple):
 
 def open_bodies(study: Study) -> tuple[str, ...]:
     """Bodies whose number of modes is left open: those that carry loads, ride on nothing, and name none."""
-    ridden = {carriage.on for carriage in study.carriage.values()}
+    ridden = {name for carriage in study.carriage.values() for name in carriage.ridden}
     riding = {carriage.riding_body for carriage in study.carriage.values()}
     return tuple(name for name, body in study.body.items() if name in ridden - riding and body.modes_are_open)

@@ -18,9 +18,10 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.kernels.schemes import Scheme
 from engine.model.numerics import Numerics
 from engine.model.support_reactions import Place, SupportReactions, stand
-from engine.model.ties import Attachment, CarriageTie, DamperTie, Inertia, SpringTie
+from engine.model.ties import Attachment, CarriageTie, DamperTie, Inertia, Load, SpringTie
 from engine.model.timeline import Rider
 from engine.scene.carriages import Suspension
+from engine.scene.motion_base import Motion
 from engine.scene.settings import SPRUNG
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -109,6 +110,11 @@ class SceneModel:
         return (*(carriage.rider for carriage in self.carriages), *self.contacts)
 
     @property
+    def clock(self) -> Motion:
+        """The motion whose passage or cycle is the unit of scene time."""
+        return self.study.carriage[self.study.clock].motion
+
+    @property
     def timing(self) -> tuple[dict[str, float], dict[str, float]]:
         """Paces and delays of all carriages by name, as `build_model` takes them."""
         riders = {carriage.name: carriage.rider for carriage in self.carriages}
@@ -122,8 +128,8 @@ class SceneModel:
     @cached_property
     def attachments(self) -> tuple[tuple[Attachment, ...], ...]:
         """Where every tie acts on the bodies."""
-        springs = (spring.attachments(self.carriages[spring.carriage].body) for spring in self.springs)
-        return (*(c.attachments for c in self.carriages), *(d.attachments for d in self.dampers), *springs)
+        ties: tuple[CarriageTie | DamperTie | SpringTie, ...] = (*self.carriages, *self.dampers, *self.springs)
+        return tuple(tie.attachments for tie in ties)
 
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
@@ -136,7 +142,7 @@ class SceneModel:
         if tie.rides is None:
             return {}
         contacts = self.study.carriage[tie.name].riding_contacts
-        return {rider: name for (rider, _), name in zip(tie.loads, contacts, strict=True)}
+        return {load.rider: name for load, name in zip(tie.loads, contacts, strict=True)}
 
     def reacts(self, carriage: int) -> bool:
         """Whether the contact force of a carriage depends on how its body moves."""
@@ -187,7 +193,9 @@ def build_model(
     for number, (name, carriage) in enumerate(study.carriage.items()):
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
-        carriages.append(CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), ((number, 1.0),)))
+        carriages.append(
+            CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), (Load(number, 1.0, body),))
+        )
     dampers = [
         DamperTie(number, at, f"body.{name}.{key}")
         for number, name in enumerate(used)
@@ -197,7 +205,7 @@ def build_model(
     support_reactions = _standing(study, numerics, carriages, parts, swept)
     contacts = tuple(rider for stands in support_reactions.values() for rider in stands.riders)
     on_contacts = tuple(spring for stands in support_reactions.values() for spring in stands.springs)
-    springs = (*_springs(study, numerics, first, swept), *on_contacts)
+    springs = (*_springs(study, numerics, carriages, first, swept), *on_contacts)
     carried = tuple(
         support_reactions[n].carried(tie) if n in support_reactions else tie for n, tie in enumerate(carriages)
     )
@@ -243,15 +251,17 @@ def _suspension(study: Study, numerics: Numerics, name: str) -> Suspension | Non
     return study.carriage[name].suspension if numerics.fidelity in SPRUNG else None
 
 
-def _springs(study: Study, numerics: Numerics, first: int, swept: Collection[str]) -> tuple[SpringTie, ...]:
+def _springs(
+    study: Study, numerics: Numerics, carriages: list[CarriageTie], first: int, swept: Collection[str]
+) -> tuple[SpringTie, ...]:
     """The springs of all sprung masses, whose modes are counted from ``first``."""
     found: list[SpringTie] = []
-    for number, name in enumerate(study.carriage):
-        suspension = _suspension(study, numerics, name)
+    for number, tie in enumerate(carriages):
+        suspension = _suspension(study, numerics, tie.name)
         if suspension is not None:
-            key = f"carriage.{name}"
+            key = f"carriage.{tie.name}"
             damped = suspension.damping > 0.0 or f"{key}.damping" in swept
-            found.append(SpringTie(number, number, key, None, first + len(found), damped))
+            found.append(SpringTie(number, number, tie.body, key, None, first + len(found), damped))
     return tuple(found)
 
 
@@ -260,13 +270,13 @@ def _standing(
 ) -> dict[int, SupportReactions]:
     """The bodies that ride, by the number of their carriage."""
     found: dict[int, SupportReactions] = {}
-    names, first = [part.name for part in parts], len(carriages)
+    names, first, modals = [part.name for part in parts], len(carriages), tuple(part.modal for part in parts)
     for number, tie in enumerate(carriages):
         carriage = study.carriage[tie.name]
         if carriage.riding_body is not None:
             rides = names.index(carriage.riding_body)
-            place = Place(number, tie, parts[tie.body].modal, rides, first)
-            found[number] = stand(study, numerics, place, parts[rides].modal, swept)
+            place = Place(number, tie, tuple(map(names.index, carriage.ridden)), rides, modals, first)
+            found[number] = stand(study, numerics, place, swept)
             first += len(carriage.riding_contacts)
     return found
 

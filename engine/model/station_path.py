@@ -67,7 +67,7 @@ def frozen(model: SceneModel, places: Array) -> tuple[StationPath, ...]:
     where it starts; whoever is off the body does not touch it."""
     starts = [np.full_like(places, float(c.rider.motion.path(0.0).S)) for c in model.carriages]
     along = [places, *starts[1:]]
-    owners = {rider: number for number, carriage in enumerate(model.carriages) for rider, _ in carriage.loads}
+    owners = {load.rider: number for number, carriage in enumerate(model.carriages) for load in carriage.loads}
     still, found = np.zeros_like(places), []
     for number, rider in enumerate(model.riders):
         place = along[number if number < len(along) else owners[number]] + rider.offset

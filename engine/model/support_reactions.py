@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.numerics import Numerics
-from engine.model.ties import Attachment, CarriageTie, SpringTie
+from engine.model.ties import Attachment, CarriageTie, Load, SpringTie
 from engine.model.timeline import AT_END, Rider
 from engine.scene.carriages import Carriage
 from engine.scene.settings import SPRUNG
@@ -26,54 +27,58 @@ HELD = 1e-6  # part of a body's mass that its elastic modes may take of a unifor
 
 
 class Place(NamedTuple):
-    """Whose contacts: the carriage's number and tie, what it rides on, the number of the body that rides, and of its
-    first contact among all riders."""
+    """Whose contacts: the carriage's number and tie, the numbers of the bodies below its contacts and of the one that
+    rides, all bodies, and the number of its first contact among all riders."""
 
     number: int
     tie: CarriageTie
-    below: ModalBody
+    below: tuple[int, ...]
     rides: int
+    bodies: tuple[ModalBody, ...]
     first: int
 
 
 @dataclass(frozen=True, eq=False)
 class SupportReactions:
-    """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and the shares of its
-    weight that they carry."""
+    """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and what they carry of
+    its weight."""
 
     rides: int
     mass: float
     reference: float
-    first: int
     riders: tuple[Rider, ...]
     springs: tuple[SpringTie, ...]
-    shares: tuple[float, ...]
+    loads: tuple[Load, ...]
 
     def carried(self, tie: CarriageTie) -> CarriageTie:
         """The carriage with its weight on the contacts."""
-        loads = tuple((self.first + number, share) for number, share in enumerate(self.shares))
-        return replace(tie, loads=loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
+        return replace(tie, loads=self.loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
 
 
-def stand(study: Study, numerics: Numerics, place: Place, modal: ModalBody, swept: Collection[str]) -> SupportReactions:
+def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]) -> SupportReactions:
     """Put the body of a carriage on its contacts. Raises BadInput where it cannot stand or leaves what it rides."""
-    name = place.tie.name
+    name, modal = place.tie.name, place.bodies[place.rides]
     carriage = study.carriage[name]
     _check_fidelity(study, name)
+    _check_directions(study, name, place)
     _check_points(study, name, carriage, modal)
-    riders = tuple(replace(place.tie.rider, offset=offset) for offset in carriage.contact_offsets(modal.length))
+    riders = tuple(
+        replace(place.tie.rider, length=place.bodies[below].length, offset=offset)
+        for below, offset in zip(place.below, carriage.contact_offsets(modal.length), strict=True)
+    )
     _check_ways(study, name, carriage, riders)
-    _check_joints(study, name, _joints(carriage, riders, place.below, modal))
+    _check_joints(study, name, _joints(carriage, riders, place))
     shares = _shares(study, numerics, name, modal)
+    loads = tuple(Load(*load) for load in zip(itertools.count(place.first), shares, place.below))
     springs = []
-    for number, (word, contact) in enumerate(carriage.riding_contacts.items()):
+    for load, (word, contact) in zip(loads, carriage.riding_contacts.items(), strict=True):
         key = f"carriage.{name}.contacts.{word}"
         held = Attachment(-1.0, place.rides, None, contact.place)
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
-        springs.append(SpringTie(place.number, place.first + number, key, held, None, damped, contact.is_rigid))
+        springs.append(SpringTie(place.number, load.rider, load.body, key, held, None, damped, contact.is_rigid))
     acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
     reference = carriage.reference_on(modal.length)
-    return SupportReactions(place.rides, modal.mass, reference, place.first, riders, acting, shares)
+    return SupportReactions(place.rides, modal.mass, reference, riders, acting, loads)
 
 
 def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tuple[float, ...]:
@@ -152,6 +157,18 @@ def _check_fidelity(study: Study, name: str) -> None:
         )
 
 
+def _check_directions(study: Study, name: str, place: Place) -> None:
+    """The weight acts in one direction on all that carries it."""
+    along = [place.bodies[body].gravity_share for body in (place.tie.body, *place.below)]
+    if max(along) - min(along) > 1e-9:
+        raise BadInput(
+            "the bodies under these contacts deflect in different directions",
+            where=study.source.where(f"carriage.{name}.contacts"),
+            expected="tracks whose loads act equally along gravity",
+            received=", ".join(f"{share:.3g} of gravity" for share in along[1:]),
+        )
+
+
 def _check_points(study: Study, name: str, carriage: Carriage, modal: ModalBody) -> None:
     known = (
         [] if modal.points is None else [p.partition(".")[2] for p in modal.points.numbers if p.startswith("point.")]
@@ -192,23 +209,25 @@ def _check_ways(study: Study, name: str, carriage: Carriage, riders: tuple[Rider
             )
 
 
-def _joints(carriage: Carriage, riders: tuple[Rider, ...], below: ModalBody, above: ModalBody) -> Array:
-    """(J, N) rows of the rigid contacts over the modes of both bodies, in the middle of the way."""
-    joints = [(r, c) for r, c in zip(riders, carriage.riding_contacts.values(), strict=True) if c.is_rigid]
-    middle, rows = 0.5 * sum(carriage.motion.range()), []
-    for rider, contact in joints:
-        under = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0]
-        held = Attachment(1.0, 0, None, contact.place).fixed_row(above)
-        rows.append(np.concatenate([under * np.sqrt(below.mass), held * np.sqrt(above.mass)]))
+def _joints(carriage: Carriage, riders: tuple[Rider, ...], place: Place) -> Array:
+    """(J, N) rows of the rigid contacts over the modes of all bodies, in the middle of the way."""
+    contacts, middle, rows = carriage.riding_contacts.values(), 0.5 * sum(carriage.motion.range()), []
+    for rider, contact, number in zip(riders, contacts, place.below, strict=True):
+        if contact.is_rigid:
+            parts = [np.zeros(body.omega.size) for body in place.bodies]
+            below, above = place.bodies[number], place.bodies[place.rides]
+            parts[number] = below.shape([min(max(middle + rider.offset, 0.0), rider.length)])[0] * np.sqrt(below.mass)
+            parts[place.rides] = Attachment(1.0, 0, None, contact.place).fixed_row(above) * np.sqrt(above.mass)
+            rows.append(np.concatenate(parts))
     return np.array(rows)
 
 
 def _check_joints(study: Study, name: str, rows: Array) -> None:
-    """Refuse more rigid contacts than the kept modes of both bodies can meet."""
+    """Refuse more rigid contacts than the kept modes of all bodies can meet."""
     met = int(np.linalg.matrix_rank(rows, tol=CLASH * len(rows))) if rows.size else 0
     if met < len(rows):
         raise BadInput(
-            "the kept modes of both bodies cannot meet so many rigid contacts",
+            "the kept modes of these bodies cannot meet so many rigid contacts",
             where=study.source.where(f"carriage.{name}.contacts"),
             expected=f"at most {met} of them rigid, at different places",
             received=str(len(rows)),

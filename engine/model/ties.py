@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +39,20 @@ class Attachment:
         return np.asarray(modal.shape_at(self.at)[0])
 
 
+class Load(NamedTuple):
+    """A part of a carriage's weight on level ground: the number of the rider that carries it, and of its body."""
+
+    rider: int
+    share: float
+    body: int
+
+
 @dataclass(frozen=True, eq=False)
 class CarriageTie:
-    """A carriage as the march sees it: its body's number, its way, and which inertia terms act at its contact.
+    """A carriage as the march sees it: the number of the body along which it moves, its way, and which inertia terms
+    act at its contact.
 
-    loads: riders that carry its weight on level ground, with their shares of it; itself but for a body on its contacts.
+    loads: what carries its weight on level ground: itself but for a body on its contacts.
     rides: number of the body that rides, with its mass (kg) and the place of its own track that the motion moves (m).
     """
 
@@ -51,7 +60,7 @@ class CarriageTie:
     body: int
     rider: Rider
     inertia: Inertia
-    loads: tuple[tuple[int, float], ...]
+    loads: tuple[Load, ...]
     rides: int | None = None
     own_mass: float = 0.0
     reference: float = 0.0
@@ -59,7 +68,7 @@ class CarriageTie:
     @property
     def attachments(self) -> tuple[Attachment, ...]:
         """Where its weight acts."""
-        return tuple(Attachment(share, self.body, rider) for rider, share in self.loads)
+        return tuple(Attachment(load.share, load.body, load.rider) for load in self.loads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +78,24 @@ class SpringTie:
     What rides counts from where its springs carry it on level rigid ground, so the tie's force is what the spring has
     beyond that, which stays with the carriage; off the body it stands on such ground.
 
-    carriage, rider: numbers. key: dotted key of the table with its stiffness and damping. held: of the body that rides,
-    where it holds it; None for a sprung mass, whose mode is ``mode``. damped: whether there is a damper. rigid: whether
-    it is a rigid joint instead.
+    carriage, rider: numbers. body: that of the body which it stands on. key: dotted key of the table with its stiffness
+    and damping. held: where it holds the body that rides; None for a sprung mass, whose mode is ``mode``.
+    damped: whether there is a damper. rigid: whether it is a rigid joint instead.
     """
 
     carriage: int
     rider: int
+    body: int
     key: str
     held: Attachment | None
     mode: int | None
     damped: bool
     rigid: bool = False
 
-    def attachments(self, body: int) -> tuple[Attachment, ...]:
-        """Where its force acts; ``body`` is ridden."""
-        below = Attachment(1.0, body, self.rider)
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """Where its force acts, what it stands on first."""
+        below = Attachment(1.0, self.body, self.rider)
         return (below,) if self.held is None else (below, self.held)
 
 

@@ -104,6 +104,11 @@ class VariantValues:
         key = f"carriage.{carriage}.motion.{motion.pace}"
         return float(motion.time_scale * self.study.value(key)) / self._of(key)
 
+    @property
+    def scene_time_scale(self) -> Array:
+        """(V,) seconds per unit of scene time."""
+        return self.time_scale(self.study.clock)
+
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""
         spec = self.study.carriage[carriage]
@@ -112,8 +117,8 @@ class VariantValues:
         return self._of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
 
     def timing(self) -> dict[str, tuple[Array, Array]]:
-        """Per carriage pace and delay (V,) relative to the first one's time scale, rounded so that they group."""
-        first = self.time_scale(next(iter(self.study.carriage)))
+        """Per carriage pace and delay (V,) relative to the scene's time scale, rounded so that they group."""
+        first = self.scene_time_scale
         return {
             name: (rounded(first / self.time_scale(name)), rounded(self.start_time(name) / first))
             for name in self.study.carriage
@@ -236,7 +241,7 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
         weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs])),
         damper=to_blocks(np.stack(carriages + coefficients)),
         spring=to_blocks(np.stack(carriages + dampers + stiffness)),
-        time_scale=to_blocks(values.time_scale(model.carriages[0].name)),
+        time_scale=to_blocks(values.scene_time_scale),
         gravity=to_blocks(values.gravity),
     )
 

@@ -47,9 +47,10 @@ class ContactForce:
     def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         rider = self.rides(model)
-        way, body = along[rider], model.carriages[self.carriage].body
+        way = along[rider]
         if not way.active:
             return np.zeros(way.s.size, dtype=np.bool_)
+        body = next(load.body for load in model.carriages[self.carriage].loads if load.rider == rider)
         low, high = span_counted(model, model.riders[rider], body)
         return np.asarray((way.s >= low) & (way.s <= high))
 
@@ -93,7 +94,7 @@ def contact_row(model: SceneModel, carriage: int, contact: int | None = None) ->
     if contact is None:
         found[[carriage, *springs]] = 1.0
     else:
-        found[carriage] = dict(model.carriages[carriage].loads)[contact]
+        found[carriage] = next(load.share for load in model.carriages[carriage].loads if load.rider == contact)
         found[[r for r, spring in springs.items() if spring.rider == contact]] = 1.0
     return found
 
@@ -102,7 +103,7 @@ def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
     """The contact force of every carriage; of a body that rides, that of every contact."""
     found: list[ContactForce] = []
     for number, carriage in enumerate(model.carriages):
-        contacts = [None] if carriage.rides is None else [rider for rider, _ in carriage.loads]
+        contacts = [None] if carriage.rides is None else [load.rider for load in carriage.loads]
         found += [ContactForce(number, contact) for contact in contacts]
     return tuple(found)
 

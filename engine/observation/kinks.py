@@ -38,8 +38,9 @@ def passes(model: SceneModel, sensor: Sensor) -> Iterator[float]:
     """Scene times at which a load passes a sensor whose influence line has a kink there, in no order."""
     if sensor.under is None and sensor.reads.has_kinks:
         for carriage in model.carriages:
-            for rider, _ in carriage.loads if carriage.body == sensor.body else ():
-                yield from model.riders[rider].passes(sensor.at)
+            for load in carriage.loads:
+                if load.body == sensor.body:
+                    yield from model.riders[load.rider].passes(sensor.at)
 
 
 def stops(model: SceneModel, sensors: Iterable[Sensor]) -> Iterator[float]:

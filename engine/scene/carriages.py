@@ -75,9 +75,19 @@ class Carriage(Spec):
         return {}
 
     @property
+    def ridden(self) -> tuple[str, ...]:
+        """Names of the bodies under its contacts in their order, or under itself where it has none."""
+        return tuple(contact.on or self.on for contact in self.riding_contacts.values()) or (self.on,)
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies that it stands on or brings."""
-        return (self.on,)
+        return (*self.ridden, *([] if self.riding_body is None else [self.riding_body]))
+
+    @property
+    def lies_across(self) -> bool:
+        """Whether the track of the body that rides lies across the way."""
+        return any(contact.at is not None and contact.offset is not None for contact in self.riding_contacts.values())
 
     def reference_on(self, track: float) -> float:
         """m, the place of the riding body's own track, of a length (m), that the motion moves."""
@@ -161,10 +171,12 @@ ContactStiffness = Annotated[
 class Contact(Spec):
     """A shoe or wheel under a body: a spring (N/m, or "rigid") and a damper (N s/m) between the body and what it rides.
 
-    at: m along the track of the body that rides. point: instead, one of that body's points by name, `offset` m ahead
-    of the carriage's reference (negative: behind).
+    on: name of the body that it stands on, that of the carriage if not given. at: m along the track of the body that
+    rides. point: instead, one of that body's points by name. offset: m along the way ahead of the carriage's position
+    (negative: behind); of a place `at` that from the reference to it if not given, as the track lies along the way.
     """
 
+    on: str | None = None
     at: Length | None = Field(default=None, ge=0)
     point: str | None = None
     offset: Length | None = None
@@ -175,8 +187,8 @@ class Contact(Spec):
     def _one_place(self) -> Contact:
         if (self.at is None) == (self.point is None):
             raise fault("a contact has exactly one place", expected='at = metres, or point = "a point" with an offset')
-        if (self.point is None) != (self.offset is None):
-            raise fault("offset and point belong together", expected='point = "a point" and offset = metres')
+        if self.point is not None and self.offset is None:
+            raise fault("a point needs an offset", expected='point = "a point" and offset = metres along the way')
         if self.stiffness == "rigid" and self.damping > 0.0:
             raise fault("a rigid contact has no damper", expected="damping = 0, or a stiffness in N/m")
         return self
@@ -198,20 +210,35 @@ class Contact(Spec):
 
     def ahead(self, reference: float) -> float:
         """m by which it is ahead of the carriage's position, which moves the place ``reference`` of the own track."""
-        return float(self.offset or 0.0) if self.at is None else self.at - reference
+        if self.offset is not None:
+            return self.offset
+        return 0.0 if self.at is None else self.at - reference
 
 
 class BodyCarriage(Carriage):
     """Another body of the study, which nothing else holds, on shoes or wheels; its weight acts.
 
     reference: m along its own track, the place that the motion moves; the middle of its track if not given. Its track
-    points the way of the track that it rides. contacts: by name.
+    points the way of the track that it rides, or lies across it where contacts have a place `at` and an offset.
+    contacts: by name; they may stand on several bodies, along whose tracks places count alike.
     """
 
     kind: Literal["body"]
     body: str
     reference: Length | None = None
     contacts: dict[str, Contact] = Field(min_length=1, max_length=MAX_CONTACTS)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> BodyCarriage:
+        if self.on not in self.ridden:
+            raise fault(
+                f"no contact stands on {self.on}, along which the carriage moves",
+                expected=f'on = "{self.on}" of a contact',
+            )
+        if len({contact.offset is None for contact in self.contacts.values() if contact.at is not None}) > 1:
+            expected = "an offset for all of them, or for none"
+            raise fault("the track of the body that rides lies along the way or across it", expected=expected)
+        return self
 
     @property
     def inertial(self) -> bool:
@@ -224,10 +251,6 @@ class BodyCarriage(Carriage):
     @property
     def riding_contacts(self) -> Mapping[str, Contact]:
         return self.contacts
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.on, self.body)
 
     def reference_on(self, track: float) -> float:
         return 0.5 * track if self.reference is None else self.reference

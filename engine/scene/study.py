@@ -103,6 +103,11 @@ class Study(Scene):
             return self.initial
         return "rest" if all(c.motion.passes for c in self.carriage.values()) else "equilibrium"
 
+    @property
+    def clock(self) -> str:
+        """Name of the carriage whose passage or cycle is the unit of scene time: the first one."""
+        return next(iter(self.carriage))
+
     def body_of(self, sensor: str) -> str:
         """Name of the body that a sensor reads."""
         place = self.sensor[sensor]
@@ -291,6 +296,8 @@ def _check_references(study: Study) -> None:
     """Every name that is mentioned exists, and sensors suit their bodies."""
     for name, carriage in study.carriage.items():
         _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
+        for word, contact in carriage.riding_contacts.items():
+            _must_exist(study, f"carriage.{name}.contacts.{word}.on", contact.on or carriage.on, "body")
         if carriage.riding_body is not None:
             _check_rider(study, name, carriage.riding_body)
     for name, sensor in study.sensor.items():
@@ -357,12 +364,14 @@ def _check_rider(study: Study, name: str, body: str) -> None:
     """A body that rides is another one, and rides once."""
     here = f"carriage.{name}.body"
     _must_exist(study, here, body, "body")
-    riding = [(c.riding_body, c.on) for c in study.carriage.values() if c.riding_body is not None]
-    below, on = [body], dict(riding)
-    while below[-1] in on and below.count(below[-1]) == 1:
-        below.append(on[below[-1]])
+    riding = [(c.riding_body, c.ridden) for c in study.carriage.values()]
+    below, on = set[str](), dict(riding)
+    reached = set(on[body])
+    while reached - below:
+        below |= reached
+        reached = {name for rider in below for name in on.get(rider, ())}
     alone = [rider for rider, _ in riding].count(body) == 1
-    if body in below[1:] or not alone:
+    if body in below or not alone:
         what = "a body cannot ride on itself" if alone else "this body rides twice"
         raise BadInput(what, where=study.source.where(here), received=shortened(body), remedy="another body")
 

@@ -104,7 +104,7 @@ def _level(model: SceneModel, along: Along) -> Array:
     for place, spring in enumerate(model.springs):
         way = along[spring.rider]
         if way.active:
-            sag = model.sag(model.carriages[spring.carriage].body, way.s, 0)
+            sag = model.sag(spring.body, way.s, 0)
             found[:, place] = sag if way.here is None else np.where(way.here, sag, 0.0)
     return found
 

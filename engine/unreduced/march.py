@@ -67,9 +67,8 @@ class Unfolded(NamedTuple):
 
 def course_of(model: Unreduced, steps: int) -> Course:
     """The whole way of a study's carriages in so many steps per passage or cycle; no free vibration afterwards."""
-    first = next(iter(model.study.carriage.values()))
     timeline = build_timeline(model.riders, steps, "whole")
-    return Course(timeline, first.motion.time_scale)
+    return Course(timeline, model.study.carriage[model.study.clock].motion.time_scale)
 
 
 def march_unreduced(

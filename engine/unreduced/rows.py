@@ -71,7 +71,7 @@ def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
 
 def softness(model: Unreduced, along: Along) -> Array:
     """(S, T, T) m/N: what the elements' own bending between their ends adds under each tie per unit force of another,
-    on the body that is ridden and on that which rides."""
+    on the body that is ridden, on that which rides, and on one that does both."""
     count = len(model.ties)
     found = np.zeros((len(along.s), count, count))
     for i, j in _together(model):
@@ -84,6 +84,11 @@ def softness(model: Unreduced, along: Along) -> Array:
             if one.rides and one.rides == other.rides and one.at is not None and other.at is not None:
                 track = model.bodies[one.rides].track
                 found[:, i, j] += track.within(np.array([one.at]), np.array([other.at]))
+            if one.rides and one.rides == other.body and one.at is not None:
+                s = along.s[:, other.rider]
+                between = model.bodies[other.body].track.within(np.full_like(s, one.at), s)
+                found[:, i, j] -= np.where(along.on[:, other.rider], between, 0.0)
+                found[:, j, i] = found[:, i, j]
     return found
 
 

@@ -180,7 +180,7 @@ def unreduced_model(
 def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
     """Weights act along the track."""
     for name, carriage in study.carriage.items():
-        share = bodies[carriage.on].gravity_share
+        share = min(bodies[body].gravity_share for body in carriage.ridden)
         if carriage.inertial and abs(share - 1.0) > 1e-9 and study.gravity != 0.0:
             raise BadInput(
                 "the weight of this carriage does not act in the direction of its track",
@@ -203,8 +203,9 @@ def _riders(
         yield alone[name]
     for name, carriage in study.carriage.items():
         if carriage.riding_body is not None:
-            for offset in carriage.contact_offsets(bodies[carriage.riding_body].length):
-                yield replace(alone[name], offset=offset)
+            offsets = carriage.contact_offsets(bodies[carriage.riding_body].length)
+            for below, offset in zip(carriage.ridden, offsets, strict=True):
+                yield replace(alone[name], length=bodies[below].length, offset=offset)
 
 
 def contacts_of(study: Study) -> Iterator[tuple[str, str, Contact]]:
@@ -261,7 +262,7 @@ class _Scene:
             carriage=name,
             link="rigid" if contact.is_rigid else "spring",
             rider=rider,
-            body=carriage.on,
+            body=contact.on or carriage.on,
             other=row,
             stiffness=contact.spring,
             damping=contact.damping,

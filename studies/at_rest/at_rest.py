@@ -145,7 +145,7 @@ def _evaluated(kind: AtRest, model: SceneModel, values: VariantValues, places: P
 
     along = frozen(model, places.all)
     found = dict(kind.variants(model, values, along))
-    own = [along[rider].here for rider in {0, *(rider for rider, _ in model.carriages[0].loads)}]
+    own = [along[rider].here for rider in {0, *(load.rider for load in model.carriages[0].loads)}]
     gone = ~np.all([here for here in own if here is not None], axis=0)
     opened = found.pop("opened", np.zeros((values.size, places.all.size), dtype=np.bool_)) & ~gone
     for array in found.values():

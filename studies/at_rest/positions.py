@@ -83,10 +83,10 @@ def way_of(study: Study) -> tuple[float, float]:
     """Ends of the first carriage's way, as far as it stands on its body with all its contacts, m. For a list of
     positions that is all that its body allows. Raises BadInput where there is no such part."""
     name, carriage = first_carriage(study)
-    length = float(study.value(f"body.{carriage.on}.length"))
-    rides = carriage.riding_body
+    rides, lengths = carriage.riding_body, [float(study.value(f"body.{body}.length")) for body in carriage.ridden]
     ahead = carriage.contact_offsets(0.0 if rides is None else float(study.value(f"body.{rides}.length")))
-    low, high = -min(ahead), length - max(ahead)
+    low, high = -min(ahead), min(length - offset for length, offset in zip(lengths, ahead, strict=True))
+    free = f"{low:.6g} to {high:.6g} m"
     if not isinstance(study.question.get("positions"), list | tuple):
         first, last = carriage.motion.range()
         low, high = max(low, first), min(high, last)
@@ -94,7 +94,7 @@ def way_of(study: Study) -> tuple[float, float]:
         raise BadInput(
             "the carriage never stands on its body with all its contacts",
             where=study.source.where(f"carriage.{name}.motion"),
-            expected=f"a way with a part within {-min(ahead):.6g} to {length - max(ahead):.6g} m",
+            expected=f"a way with a part within {free}",
         )
     return low, high
 

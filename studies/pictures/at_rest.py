@@ -44,7 +44,7 @@ def places(results: Results) -> list[Places]:
     for name in map(str, results.dataset["on_body"].values):
         along = part * float(results.study.value(f"body.{name}.length"))
         rider = next((c for c in results.study.carriage.values() if c.riding_body == name), None)
-        if rider is not None:
+        if rider is not None and not rider.lies_across:
             along = along - rider.reference_on(along[-1])
             first = rider is results.carriage
             found.append(Places(name, along if first else along + float(rider.motion.path(0.0).S), first))

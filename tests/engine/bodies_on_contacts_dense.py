@@ -1,16 +1,18 @@
 """Bodies on contacts once more, as dense saddle systems in SI units: nothing of the engine's ties, rows or kernels.
 
-Modes come from the modal bodies and stations from the timeline, which have tests of their own. Every step solves
+Any number of bodies, carried by any others. Modes come from the modal bodies and stations from the timeline, which have
+tests of their own. With the places p of what each tie presses and holds, the unknowns of every step are the
+accelerations and the ties' forces together:
 
-    M x'' + C x' + K x = f + P F,    F = P0 - k (P^T x + level + R (F - P0)) - c (P^T x' + s' P_s^T x + level')
-
-for the accelerations and the contact forces together, with P0 what the contact carries at rest on level ground.
+    M x'' + C x' + K x = f + P F
+    contact:  F + k (P^T x + level + R (F, P0)) + c d/dt (P^T x + level) = 0, beyond P0, its load on level ground
+    mass:     F + m D^2(p^T x + level) = m g
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,167 +22,253 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.scene.study import Study
 
 Array = NDArray[np.float64]
+Place = float | str
 
 EDGE = 1e-13  # m, by which a station at an event belongs to its own side
 
 
-@dataclass
-class Contact:
-    """A contact: its place ahead of the reference, its row on the body that rides, and spring and damper."""
+class Hold(NamedTuple):
+    """A place of a body where a force acts with a factor."""
 
+    body: str
+    place: Place
+    factor: float
+
+
+@dataclass
+class Tie:
+    """A contact, or a mass or force on the track: what it presses, `ahead` m of its carriage, and what it carries at
+    rest on level ground (N), of a mass or force all that it weighs."""
+
+    carriage: str
+    below: str
     ahead: float
-    row: Array
-    place: Array | str
-    stiffness: float
-    damping: float
+    rides: str = ""
+    place: Place = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    mass: float = 0.0
+    at_rest: float = 0.0
+
+
+@dataclass
+class Way:
+    """Places of a carriage and their derivatives by time at some instants, and whether it is there."""
+
+    s: Array
+    ds: Array
+    dds: Array
+    present: bool
+
+
+Where = dict[str, tuple[float, float, float, bool]]  # by carriage: s, s', s'' and whether it is there
+
+
+class Law(NamedTuple):
+    """A x'' + B x' + K x + E F = b of the ties, their loads P (N, T), and constant loads f (N,)."""
+
+    a: Array
+    v: Array
+    x: Array
+    own: Array
+    right: Array
+    loads: Array
+    dead: Array
 
 
 class Twin:
-    """One body that rides on one bed."""
+    """A scene of bodies, bodies that ride on contacts, masses and forces."""
 
     def __init__(self, study: Study) -> None:
-        (self.name, carriage), *_ = study.carriage.items()
-        spec: Any = carriage
-        self.study, self.motion = study, spec.motion
-        self.bed, self.table = (build_body(study.body[name]) for name in (spec.on, spec.body))
-        self.own_weight = study.body[spec.on].own_weight
-        reference = 0.5 * self.table.length if spec.reference is None else spec.reference
-        self.contacts = []
+        self.study, self.residual = study, study.solver.static_correction
+        used = {name for carriage in study.carriage.values() for name in carriage.bodies}
+        self.body: dict[str, ModalBody] = {n: build_body(b) for n, b in study.body.items() if n in used}
+        self.part: dict[str, slice] = {}
+        first = 0
+        for name, body in self.body.items():
+            self.part[name] = slice(first, first + body.omega.size)
+            first += body.omega.size
+        self.omega = np.concatenate([body.omega for body in self.body.values()])
+        ratios = [np.full(body.omega.size, study.body[n].damping_ratio) for n, body in self.body.items()]
+        self.rates = 2.0 * np.concatenate(ratios) * self.omega
+        self._between: dict[tuple[str, Place, Place], float] = {}
+        self.ties = [tie for name, spec in study.carriage.items() for tie in self._ties(name, spec)]
+        self.dead = np.array([tie.at_rest if tie.rides else 0.0 for tie in self.ties])
+
+    def _ties(self, name: str, spec: Any) -> list[Tie]:
+        if spec.kind != "body":
+            mass = getattr(spec, "mass", 0.0)
+            return [Tie(name, spec.on, 0.0, mass=mass, at_rest=getattr(spec, "force", mass * self.study.gravity))]
+        rides = self.body[spec.body]
+        reference = 0.5 * rides.length if spec.reference is None else spec.reference
+        found = []
         for contact in spec.contacts.values():
-            if contact.at is None:
-                place: Array | str = f"point.{contact.point}"
-                row, ahead = self.table.points.row(place), contact.offset  # type: ignore[union-attr]
-            else:
-                place = np.array([contact.at])
-                row, ahead = self.table.shape(place)[0], contact.at - reference
-            self.contacts.append(Contact(ahead, row, place, contact.stiffness, contact.damping))
-        self.residual = study.solver.static_correction
-        self.nb, self.nt = self.bed.omega.size, self.table.omega.size
-        self.at_rest = self._at_rest()
-
-    @property
-    def weight(self) -> float:
-        return float(self.table.mass * self.study.gravity)
-
-    def _table_flexibility(self) -> Array:
-        soft = np.divide(1.0, self.table.omega**2, out=np.zeros(self.nt), where=self.table.omega > 0.0)
-        if not self.residual:
-            return np.array([[np.sum(a.row * soft * b.row) for b in self.contacts] for a in self.contacts])
-        return np.array([[_between(self.table, a.place, b.place) for b in self.contacts] for a in self.contacts])
-
-    def _at_rest(self) -> Array:
-        """Forces at rest on level ground: springs against all motions of the table, the free ones kept by a whisper."""
-        count = len(self.contacts)
-        rigid = self.table.omega == 0.0
-        free = np.array([c.row[rigid] for c in self.contacts])
-        soft = self._table_flexibility() + np.diag([1.0 / c.stiffness for c in self.contacts])
+            ahead = contact.at - reference if contact.offset is None else contact.offset
+            place = f"point.{contact.point}" if contact.at is None else contact.at
+            below = spec.on if contact.on is None else contact.on
+            found.append(Tie(name, below, ahead, spec.body, place, contact.stiffness, contact.damping))
+        rigid = rides.omega == 0.0
+        free = np.array([self._fixed(spec.body, tie.place)[rigid] for tie in found])
+        holds = [Hold(spec.body, tie.place, 1.0) for tie in found]
+        soft = self._flexibility(holds, rest=False) + np.diag([1.0 / tie.stiffness for tie in found])
         whole = np.block([[soft, -free], [free.T, np.zeros((free.shape[1],) * 2)]])
-        right = np.concatenate([np.zeros(count), self.table.participation[rigid] * self.study.gravity])
-        return np.linalg.lstsq(whole, right, rcond=None)[0][:count]
+        right = np.concatenate([np.zeros(len(found)), rides.participation[rigid] * self.study.gravity])
+        for tie, force in zip(found, np.linalg.lstsq(whole, right, rcond=1e-13)[0], strict=False):
+            tie.at_rest = float(force)
+        return found
 
-    def rows(self, s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """P (N, R), P by s, level, level by s, and residual flexibility (R, R), the reference at s."""
-        n, count = self.nb + self.nt, len(self.contacts)
-        shape, slope = np.zeros((n, count)), np.zeros((n, count))
-        level, tilt, missed = np.zeros(count), np.zeros(count), np.zeros((count, count))
-        places = np.array([s + c.ahead for c in self.contacts])
-        on = (places >= 0.0) & (places <= self.bed.length)
-        for r, contact in enumerate(self.contacts):
-            shape[self.nb :, r] = -contact.row
-            if on[r]:
-                at = np.clip(places[r : r + 1], 0.0, self.bed.length)
-                shape[: self.nb, r] = self.bed.shape(at)[0]
-                slope[: self.nb, r] = self.bed.shape(at, 1)[0]
-                if self.own_weight:
-                    level[r] = self.study.gravity * self.bed.own_weight_deflection(at)[0]
-                    tilt[r] = self.study.gravity * self.bed.own_weight_deflection(at, 1)[0]
-        if self.residual:
-            kept = (shape[: self.nb].T / self.bed.omega**2) @ shape[: self.nb]
-            held = np.clip(places, 0.0, self.bed.length)
-            whole = np.where(np.outer(on, on), self.bed.influence(held, held), 0.0)
-            soft = np.divide(1.0, self.table.omega**2, out=np.zeros(self.nt), where=self.table.omega > 0.0)
-            rest = np.array([[np.sum(a.row * soft * b.row) for b in self.contacts] for a in self.contacts])
-            missed = whole - kept + self._table_flexibility() - rest
-        return shape, slope, level, tilt, missed
+    def _fixed(self, body: str, place: Place) -> Array:
+        modal = self.body[body]
+        return np.asarray(modal.points.row(place) if isinstance(place, str) else modal.shape([place])[0])  # type: ignore[union-attr]
 
-    def _system(self, s: float, speed: float) -> tuple[Array, ...]:
-        """P, and the law F = a - B x - D x' of the contact forces at rest and beyond."""
-        shape, slope, level, tilt, missed = self.rows(s)
-        k = np.array([c.stiffness for c in self.contacts])
-        c = np.array([c.damping for c in self.contacts])
-        # dead loads bend the bed too, but the table's own rest already has what they do to it
-        bed_missed = missed - self._missed_of_table()
-        series = np.eye(k.size) + k[:, None] * missed
-        right = -k * level - c * speed * tilt - k * (bed_missed @ self.at_rest)
-        beyond = np.linalg.solve(series, right)
-        on_x = np.linalg.solve(series, (k[:, None] * shape.T) + c[:, None] * speed * slope.T)
-        on_v = np.linalg.solve(series, c[:, None] * shape.T)
-        return shape, beyond, on_x, on_v
+    def _flexibility(self, holds: list[Hold], rest: bool) -> Array:
+        """(H, H) m/N between places, or what the kept modes miss of it."""
+        found, rows = np.zeros((len(holds), len(holds))), [self._fixed(hold.body, hold.place) for hold in holds]
+        for i, one in enumerate(holds):
+            for j, other in enumerate(holds[: i + 1]):
+                if one.body != other.body or (rest and not self.residual):
+                    continue
+                omega = self.body[one.body].omega
+                soft = np.divide(1.0, omega**2, out=np.zeros(omega.size), where=omega > 0.0)
+                kept = np.sum(rows[i] * soft * rows[j])
+                whole = self._whole(one.body, one.place, other.place) if self.residual else kept
+                found[i, j] = found[j, i] = one.factor * other.factor * (whole - kept if rest else whole)
+        return found
 
-    def _missed_of_table(self) -> Array:
-        if not self.residual:
-            return np.zeros((len(self.contacts),) * 2)
-        soft = np.divide(1.0, self.table.omega**2, out=np.zeros(self.nt), where=self.table.omega > 0.0)
-        rest = np.array([[np.sum(a.row * soft * b.row) for b in self.contacts] for a in self.contacts])
-        return self._table_flexibility() - rest
+    def _whole(self, body: str, one: Place, other: Place) -> float:
+        key = (body, *sorted((one, other), key=str))
+        if key not in self._between:
+            self._between[key] = _between(self.body[body], key[1], key[2])
+        return self._between[key]
 
-    def march(self, segments: Any, time_scale: float) -> tuple[Array, Array, Array]:
-        """Coordinates (T, N), contact forces (T, R) and places at all stations of some segments, from the start."""
-        omega = np.concatenate([self.bed.omega, self.table.omega])
-        zeta = np.concatenate([np.full(self.nb, self._ratio(0)), np.full(self.nt, self._ratio(1))])
-        n = omega.size
-        x, v = self._start(float(self.motion.path(0.0).S)), np.zeros(n)
-        found, forces, places = [], [], []
+    def level(self, body: str, place: float, derivative: int) -> float:
+        """The own sag of a body."""
+        if not self.study.body[body].own_weight:
+            return 0.0
+        return float(self.study.gravity * self.body[body].own_weight_deflection([place], derivative)[0])
+
+    def law(self, where: Where) -> Law:
+        """What the ties say with every carriage at s, s', s''."""
+        n, count = self.omega.size, len(self.ties)
+        a, v, x, own, right = np.zeros((count, n)), np.zeros((count, n)), np.zeros((count, n)), np.eye(count), []
+        loads, dead = np.zeros((n, count)), np.zeros(n)
+        pressed, ridden = self.holds(where)
+        missed = self._flexibility([*pressed, *ridden], rest=True)
+        on_force = missed[:count, :count] + missed[count:, count:] + missed[:count, count:] + missed[count:, :count]
+        on_rest = (missed[:count, :count] + missed[count:, :count]) @ self.dead
+        for t, tie in enumerate(self.ties):
+            s, ds, dds, _ = where[tie.carriage]
+            on, place = pressed[t].factor, min(max(s + tie.ahead, 0.0), self.body[tie.below].length)
+            p0, p1, p2 = np.zeros((3, n))
+            for order, row in enumerate((p0, p1, p2)):
+                row[self.part[tie.below]] = on * self.body[tie.below].shape([place], order)[0]
+            sag, tilt, curve = (on * self.level(tie.below, place, order) for order in range(3))
+            if tie.rides:
+                dead += p0 * tie.at_rest
+                wide = p0.copy()
+                wide[self.part[tie.rides]] -= self._fixed(tie.rides, tie.place)
+                k, c = tie.stiffness, tie.damping
+                v[t], x[t], loads[:, t] = c * wide, k * wide + c * ds * p1, wide
+                own[t] += k * on_force[t]
+                right.append(-k * (sag + on_rest[t]) - c * ds * tilt)
+            else:
+                m = tie.mass
+                a[t], v[t], x[t], loads[:, t] = m * p0, 2.0 * m * ds * p1, m * (ds**2 * p2 + dds * p1), p0
+                right.append(on * tie.at_rest - m * (ds**2 * curve + dds * tilt))
+        return Law(a, v, x, own, np.array(right), loads, dead)
+
+    def holds(self, where: Where) -> tuple[list[Hold], list[Hold]]:
+        """Where every tie presses the body below, with factor 0 off it, and where it lifts the body that rides."""
+        pressed, ridden = [], []
+        for tie in self.ties:
+            s, _, _, present = where[tie.carriage]
+            place, length = s + tie.ahead, self.body[tie.below].length
+            on = float(present and 0.0 <= place <= length)
+            pressed.append(Hold(tie.below, min(max(place, 0.0), length), on))
+            ridden.append(Hold(tie.rides or tie.below, tie.place if tie.rides else 0.0, -1.0 if tie.rides else 0.0))
+        return pressed, ridden
+
+    def static(self, places: dict[str, float] | float) -> tuple[Array, Array]:
+        """Coordinates, and the forces of all ties at rest."""
+        first = next(iter(self.study.carriage))
+        given = places if isinstance(places, dict) else {first: places}
+        law = self.law({name: (s, 0.0, 0.0, True) for name, s in given.items()})
+        back = np.linalg.solve(law.own, np.column_stack([law.right, law.x]))
+        stiff = np.diag(self.omega**2) + law.loads @ back[:, 1:]
+        x = np.linalg.lstsq(stiff, law.dead + law.loads @ back[:, 0], rcond=1e-14)[0]
+        return x, self._total(back[:, 0] - back[:, 1:] @ x)
+
+    def _total(self, force: Array) -> Array:
+        return force + self.dead
+
+    def march(self, segments: Any, time_scale: float) -> tuple[Array, Array, list[Where]]:
+        """Coordinates (H, N), forces of all ties (H, T) and places at all stations of some segments, from the start."""
+        n, count = self.omega.size, len(self.ties)
+        starts = {name: float(spec.motion.path(0.0).S) for name, spec in self.study.carriage.items()}
+        x = self.static(starts)[0] if self.study.start == "equilibrium" else np.zeros(n)
+        v, found, forces, wheres = np.zeros(n), [], [], []
         for segment in segments:
-            taus = np.linspace(segment.start, segment.end, segment.steps + 1)
-            h = (taus[1] - taus[0]) * time_scale
-            # the events lie between segments: the law at an end is that of its own side
-            path = self.motion.path_on(np.clip(taus, 0, None), segment.start, segment.end)
-            a = np.zeros(n)
-            for j, (s, rate) in enumerate(zip(path.S, path.dS / time_scale, strict=True)):
-                inner = s if 0 < j < segment.steps else s + (EDGE if j == 0 else -EDGE) * np.sign(path.dS[j])
-                shape, beyond, on_x, on_v = self._system(inner, rate)
-                dead = shape.copy()
-                dead[self.nb :] = 0.0
-                step = 0.0 if j == 0 else h
-                u = x + step * v + 0.25 * step**2 * a
-                w = v + 0.5 * step * a
-                stiff = np.diag(omega**2) + shape @ on_x
-                damp = np.diag(2.0 * zeta * omega) + shape @ on_v
-                matrix = np.eye(n) + 0.25 * step**2 * stiff + 0.5 * step * damp
-                a = np.linalg.solve(matrix, dead @ self.at_rest + shape @ beyond - stiff @ u - damp @ w)
+            ways = {name: self._way(name, segment, time_scale) for name in self.study.carriage}
+            h, a = time_scale * (segment.end - segment.start) / segment.steps, np.zeros(n)
+            for j in range(segment.steps + 1):
+                where = {name: _at(way, j, segment.steps) for name, way in ways.items()}
+                law, step = self.law(where), h if j else 0.0
+                u, w = x + step * v + 0.25 * step**2 * a, v + 0.5 * step * a
+                matrix = np.zeros((n + count, n + count))
+                matrix[:n, :n] = np.diag(1.0 + 0.5 * step * self.rates + 0.25 * step**2 * self.omega**2)
+                matrix[:n, n:] = -law.loads
+                matrix[n:, :n] = law.a + 0.5 * step * law.v + 0.25 * step**2 * law.x
+                matrix[n:, n:] = law.own
+                right = np.concatenate(
+                    [law.dead - self.rates * w - self.omega**2 * u, law.right - law.v @ w - law.x @ u]
+                )
+                solved = np.linalg.solve(matrix, right)
+                a = solved[:n]
                 x, v = u + 0.25 * step**2 * a, w + 0.5 * step * a
                 found.append(x)
-                forces.append(self.at_rest + beyond - on_x @ x - on_v @ v)
-                places.append(s)
-        return np.array(found), np.array(forces), np.array(places)
+                forces.append(self._total(solved[n:]))
+                wheres.append(where)
+        return np.array(found), np.array(forces), wheres
 
-    def _ratio(self, which: int) -> float:
-        carriage: Any = next(iter(self.study.carriage.values()))
-        return float(self.study.body[(carriage.on, carriage.body)[which]].damping_ratio)  # type: ignore[arg-type]
+    def _way(self, name: str, segment: Any, time_scale: float) -> Way:
+        """A carriage at the stations of a segment."""
+        spec: Any = self.study.carriage[name]
+        motion, scale = spec.motion, spec.motion.time_scale
+        first, last = (
+            _event(motion, (time_scale * tau - spec.start_time) / scale) for tau in (segment.start, segment.end)
+        )
+        if not 0.0 < 0.5 * (first + last) < motion.duration:
+            s = float(motion.path(np.clip(first, 0.0, motion.duration)).S)
+            still = np.zeros(segment.steps + 1)
+            return Way(still + s, still, still, motion.kind != "cruise")
+        path = motion.path_on(np.linspace(first, last, segment.steps + 1), first, last)
+        return Way(path.S, path.dS / scale, path.ddS / scale**2, True)
 
-    def static(self, s: float) -> tuple[Array, Array]:
-        """Coordinates and contact forces at rest, the reference at s."""
-        shape, beyond, on_x, _ = self._system(s, 0.0)
-        omega = np.concatenate([self.bed.omega, self.table.omega])
-        dead = shape.copy()
-        dead[self.nb :] = 0.0
-        stiff = np.diag(omega**2) + shape @ on_x
-        x = np.linalg.lstsq(stiff, dead @ self.at_rest + shape @ beyond, rcond=1e-14)[0]
-        return x, self.at_rest + beyond - on_x @ x
-
-    def _start(self, s: float) -> Array:
-        if self.study.start == "rest":
-            return np.zeros(self.nb + self.nt)
-        return self.static(s)[0]
+    def displacement(self, body: str, at: float, x: Array, forces: Array, where: Where) -> float:
+        """m at a place of a body at one station, with what the kept modes miss, from the body's own sag or rest."""
+        pressed, ridden = self.holds(where)
+        missed = self._flexibility([Hold(body, at, 1.0), *pressed, *ridden], rest=True)[0, 1:]
+        kept = self._fixed(body, at) @ x[self.part[body]]
+        return float(kept + missed @ np.concatenate([forces, forces - self.dead]) + self.level(body, at, 0))
 
 
-def _between(body: ModalBody, one: Array | str, other: Array | str) -> float:
+def _at(way: Way, j: int, steps: int) -> tuple[float, float, float, bool]:
+    edge = EDGE if j == 0 else -EDGE if j == steps else 0.0
+    return float(way.s[j] + edge * np.sign(way.ds[j])), float(way.ds[j]), float(way.dds[j]), way.present
+
+
+def _event(motion: Any, tau: float) -> float:
+    """A motion's own time; exactly that of an event where it is one but for rounding."""
+    events = [0.0, *motion.breaks(), motion.duration]
+    return next((float(event) for event in events if abs(event - tau) < 1e-9), tau)
+
+
+def _between(body: ModalBody, one: Place, other: Place) -> float:
     """m/N between two places of a body."""
     if isinstance(one, str) and isinstance(other, str):
         return body.points.between(one, other)  # type: ignore[union-attr]
     if isinstance(one, str):
-        return float(body.points.influence(one, other)[0])  # type: ignore[union-attr]
+        return float(body.points.influence(one, [other])[0])  # type: ignore[union-attr]
     if isinstance(other, str):
-        return float(body.points.influence(other, one)[0])  # type: ignore[union-attr]
-    return float(body.influence(one, other)[0, 0])
+        return float(body.points.influence(other, [one])[0])  # type: ignore[union-attr]
+    return float(body.influence([one], [other])[0, 0])

@@ -16,13 +16,13 @@ from engine.march.step_rules import contact_omega
 from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
-from tests.engine.bodies_on_contacts_dense import Twin
+from tests.engine.bodies_on_contacts_dense import Twin, Where
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
 
 Array = NDArray[np.float64]
 
 
-def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, Array], NDArray[np.bool_]]:
+def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, list[Where]], NDArray[np.bool_]]:
     """The engine's sensors by name at all stations, the twin and its march, and which stations lie within segments."""
     plan = make_plan(case)
     (group,) = plan.groups
@@ -31,16 +31,16 @@ def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, 
     counts = np.arange(segments[-1].first + segments[-1].steps + 1)
     found = march(tables, values, counts, 1).history[:, :, 0]
     twin = Twin(case)
-    marched = twin.march(segments, float(values.time_scale("car")[0]))
+    x, force, where = twin.march(segments, float(values.scene_time_scale[0]))
     kept, inner, first = [], [], 0
     for number, segment in enumerate(segments):
         stations = list(range(first, first + segment.steps + 1))[0 if number == 0 else 1 :]
         kept += stations
         inner += [True] * (len(stations) - 1) + [number + 1 == len(segments)]
         first += segment.steps + 1
-    x, force, place = (part[kept] for part in marched)
     names = [sensor.name for sensor in tables.sensors]
-    return {n: found[:, names.index(n)] for n in names}, twin, (x, force, place), np.array(inner)
+    marched = x[kept], force[kept], [where[station] for station in kept]
+    return {n: found[:, names.index(n)] for n in names}, twin, marched, np.array(inner)
 
 
 PLAIN: Table = {"steps": 200, "static_correction": False}
@@ -64,19 +64,18 @@ def _moved(case: Study) -> Study:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_engine_agrees_with_the_dense_twin(name: str) -> None:
-    found, twin, (x, force, _), inner = histories(SCENES[name]())
+    found, twin, (x, force, where), inner = histories(SCENES[name]())
     assert inner.sum() >= 190
-    for r, contact in enumerate(twin.study.carriage["car"].contacts):  # type: ignore[attr-defined]
+    contacts = list(twin.study.carriage["car"].riding_contacts)
+    for contact, pressed in zip([*contacts, "total"], [*force.T, force.sum(axis=1)], strict=True):
         seen = inner & np.isfinite(found[contact])
         assert seen.sum() > 30
-        assert np.abs(found[contact] - force[:, r])[seen].max() <= 1e-9 * np.abs(force).max()
-    seen = inner & np.isfinite(found["total"])
-    assert np.abs(found["total"] - force.sum(axis=1))[seen].max() <= 1e-9 * np.abs(force).max()
-    if not twin.residual:
-        tip = x[:, twin.nb :] @ twin.table.shape([0.1])[0]
-        place = x[:, : twin.nb] @ twin.bed.shape([0.61])[0]
-        assert np.abs(found["tip"] - tip).max() <= 1e-9 * np.abs(tip).max()
-        assert np.abs(found["place"] - place).max() <= 1e-9 * np.abs(place).max()
+        assert np.abs(found[contact] - pressed)[seen].max() <= 1e-9 * np.abs(force).max()
+    for sensor in ("tip", "place"):
+        spec = twin.study.sensor[sensor]
+        seen = np.flatnonzero(inner)[::10]
+        read = [twin.displacement(str(spec.body), float(spec.at or 0.0), x[h], force[h], where[h]) for h in seen]
+        assert np.abs(found[sensor][seen] - read).max() <= 1e-9 * np.abs(found[sensor]).max()
 
 
 def test_lanes_agree_with_single_variants() -> None:

@@ -35,7 +35,7 @@ WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
         ("carriage.car.contacts.front.stiffness", "rigid", r"a rigid contact has no damper"),
         ("carriage.car.contacts.front.point", "toe", r"exactly one place"),
         ("carriage.car.contacts.front", {"point": "toe", "offset": 0.1, "stiffness": 1.0}, r"no such point"),
-        ("carriage.car.contacts.front", {"point": "toe", "stiffness": 1.0}, r"belong together"),
+        ("carriage.car.contacts.front", {"point": "toe", "stiffness": 1.0}, r"a point needs an offset"),
         ("carriage.car.motion.end", 0.9, r"contacts\.front: this contact leaves the body"),
         ("carriage.car.reference", 0.6, r"carriage\.car\.reference: a place off the track"),
         ("solver.fidelity", "mass", r"solver\.fidelity: .*has no meaning"),
