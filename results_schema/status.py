@@ -68,6 +68,7 @@ class SchemeUsed(IntEnum):
     HHT_ALPHA = 5
     GENERALIZED_ALPHA = 6
     RICHARDSON = 7
+    OTHER = 8  # of another package
 
 
 def flag_values(flags: type[IntEnum]) -> list[int]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -201,24 +201,46 @@ def generalized_alpha(rho_inf: float) -> AlphaScheme:
     return AlphaScheme("generalized-alpha", (2.0 * rho_inf - 1.0) / (rho_inf + 1.0), rho_inf / (rho_inf + 1.0))
 
 
-def _newmark(name: str, beta: float) -> Callable[[Mapping[str, float]], Scheme]:
-    return lambda prescribed: NewmarkScheme(name, beta, 0.5)
+@dataclass(frozen=True)
+class SchemeRow:
+    """A scheme by its name in the study file, made of the parameters that stand there.
+
+    parameters: the keys of [solver] that it takes, with what to write.
+    """
+
+    name: str
+    make: Callable[[Mapping[str, float]], Scheme]
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+    def __call__(self, given: Mapping[str, float]) -> Scheme:
+        """The scheme with these parameters."""
+        return self.make(given)
+
+
+def _newmark(name: str, beta: float) -> SchemeRow:
+    return SchemeRow(name, lambda given: NewmarkScheme(name, beta, 0.5))
 
 
 #: The scheme where the study names none and nothing speaks for another.
 USUAL_SCHEME = "average-acceleration"
 
-#: Every scheme of the march by its name in the study file, made of the parameters that stand there.
-SCHEMES: Mapping[str, Callable[[Mapping[str, float]], Scheme]] = {
-    "average-acceleration": _newmark("average-acceleration", 1 / 4),
-    "linear-acceleration": _newmark("linear-acceleration", 1 / 6),
-    "fox-goodwin": _newmark("fox-goodwin", 1 / 12),
-    "central-difference": _newmark("central-difference", 0.0),
-    "newmark": lambda prescribed: NewmarkScheme(
-        "newmark", prescribed["beta"], prescribed["gamma"], 2 if prescribed["gamma"] == 0.5 else 1
+_ROWS = (
+    _newmark("average-acceleration", 1 / 4),
+    _newmark("linear-acceleration", 1 / 6),
+    _newmark("fox-goodwin", 1 / 12),
+    _newmark("central-difference", 0.0),
+    SchemeRow(
+        "newmark",
+        lambda given: NewmarkScheme("newmark", given["beta"], given["gamma"], 2 if given["gamma"] == 0.5 else 1),
+        {"beta": "0.3025, say, from 0 to 1", "gamma": "0.6, say, from 0.5 to 1.5"},
     ),
-    "hht-alpha": lambda prescribed: hht_alpha(prescribed["alpha"]),
-    "generalized-alpha": lambda prescribed: generalized_alpha(prescribed["rho_inf"]),
+    SchemeRow("hht-alpha", lambda given: hht_alpha(given["alpha"]), {"alpha": "-0.05, say, from -1/3 to 0"}),
+    SchemeRow(
+        "generalized-alpha", lambda given: generalized_alpha(given["rho_inf"]), {"rho_inf": "0.8, say, from 0 to 1"}
+    ),
     # average acceleration with h and 2h: the march is the same, `engine.march.richardson` makes the pair
-    "richardson": lambda prescribed: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2),
-}
+    SchemeRow("richardson", lambda given: NewmarkScheme("richardson", 1 / 4, 1 / 2, 4, 2)),
+)
+
+#: Every scheme of the program by its name.
+SCHEMES: Mapping[str, SchemeRow] = {row.name: row for row in _ROWS}

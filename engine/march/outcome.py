@@ -143,7 +143,7 @@ def used(tables: SceneTables, size: int) -> Flat:
 
 def number_of(scheme: Scheme) -> SchemeUsed:
     """A scheme as archives number it."""
-    return SchemeUsed[scheme.name.upper().replace("-", "_")]
+    return SchemeUsed.__members__.get(scheme.name.upper().replace("-", "_"), SchemeUsed.OTHER)
 
 
 def _knows_all(tables: SceneTables) -> bool:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from engine.scene.motions import AnyMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import NUMBER, WORD, KindOf, Spec, form_of_amount
+from engine.study_file.spec import NUMBER, WORD, KindOf, Spec, form_of_amount, kinds
 from engine.study_file.units import Damping, Force, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
@@ -35,6 +35,11 @@ class Carriage(Spec):
     masses: ClassVar[tuple[str, ...]] = ()
     touching: ClassVar[tuple[str, ...]] = ()
     forces: ClassVar[tuple[str, ...]] = ()
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
 
     on: str
     motion: AnyMotion
@@ -266,10 +271,7 @@ class BodyCarriage(Carriage):
         return f'body = "{self.body}" and at = metres along its track read the body that rides'
 
 
-CARRIAGES: Mapping[str, type[Spec]] = {
-    "force": ForceCarriage,
-    "mass": MassCarriage,
-    "oscillator": OscillatorCarriage,
-    "body": BodyCarriage,
-}
+CARRIAGES = kinds(
+    "carriage", "wanderlast.carriages", Carriage, ForceCarriage, MassCarriage, OscillatorCarriage, BodyCarriage
+)
 AnyCarriage = Annotated[Carriage, KindOf("carriage", CARRIAGES)]

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
 
-from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme
+from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme, SchemeRow
 from engine.study_file.document import shortened
 from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
 from engine.study_file.units import Dimensionless, fault
+from results_schema.pieces import Pieces, no_row_of
 
-#: Parameters that a scheme takes from the study file, with what to write; the others take none.
-PARAMETERS: Mapping[str, Mapping[str, str]] = {
-    "newmark": {"beta": "0.3025, say, from 0 to 1", "gamma": "0.6, say, from 0.5 to 1.5"},
-    "hht-alpha": {"alpha": "-0.05, say, from -1/3 to 0"},
-    "generalized-alpha": {"rho_inf": "0.8, say, from 0 to 1"},
-}
+#: The program's schemes and those of other packages.
+ALL_SCHEMES = Pieces(
+    group="wanderlast.schemes",
+    noun="scheme",
+    own=SCHEMES,
+    wanted="a SchemeRow of engine.kernels.schemes",
+    missing=no_row_of(SchemeRow),
+)
 FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "full")
 SPRUNG = ("auto", "static", "full")  # those that know the springs of carriages
 MAX_STEPS = 100_000_000
 
-SchemeName = Annotated[str, AfterValidator(one_of("auto", *SCHEMES))]
+
+def _scheme_name(word: str) -> str:
+    return word if word in ALL_SCHEMES else one_of("auto", *ALL_SCHEMES)(word)
+
+
+SchemeName = Annotated[str, AfterValidator(_scheme_name)]
 Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES))]
 
 
@@ -52,17 +59,20 @@ class Solver(Spec):
     @property
     def integration(self) -> Scheme:
         """The scheme with its parameters; the usual one where it is left open."""
-        name = USUAL_SCHEME if self.scheme == "auto" else self.scheme
-        return SCHEMES[name]({name: getattr(self, name) for name in PARAMETERS.get(self.scheme, {})})
+        return self._row({name: getattr(self, name) for name in self._row.parameters})
+
+    @property
+    def _row(self) -> SchemeRow:
+        return ALL_SCHEMES[USUAL_SCHEME if self.scheme == "auto" else self.scheme]
 
     @model_validator(mode="after")
     def _fitting_keys(self) -> Solver:
-        for scheme, parameters in PARAMETERS.items():
-            given = [name for name in parameters if getattr(self, name) is not None]
-            if scheme != self.scheme and given:
+        wanted = self._row.parameters
+        for scheme, row in SCHEMES.items():
+            given = [name for name in row.parameters if name not in wanted and getattr(self, name) is not None]
+            if given:
                 expected, received = f'scheme = "{scheme}"', f'scheme = "{self.scheme}"'
                 raise fault(f"{' and '.join(given)}: not for this scheme", expected=expected, received=received)
-        wanted = PARAMETERS.get(self.scheme, {})
         if any(getattr(self, name) is None for name in wanted):
             named, shown = " and ".join(wanted), "; ".join(f"{name} = {text}" for name, text in wanted.items())
             raise fault(f'the scheme "{self.scheme}" needs {named}', expected=shown)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from engine.batch.execution import execute, march_seconds, warm_up
 from engine.batch.plan import make_plan
-from engine.kernels.schemes import SCHEMES
 from engine.march.step_rules import allow_any_steps
+from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 
@@ -85,10 +85,10 @@ class Scene:
 
     def least_speed(self) -> float:
         """m/s; raises BadInput for an unknown scheme, and where none is slow enough for the scheme's limit."""
-        if self.scheme not in SCHEMES:
-            expected = f"one of {', '.join(SCHEMES)}"
+        if self.scheme not in ALL_SCHEMES:
+            expected = f"one of {', '.join(ALL_SCHEMES)}"
             raise BadInput("no such scheme", where="--scheme", expected=expected, received=self.scheme)
-        limit = SCHEMES[self.scheme](self.parameters).stability_limit
+        limit = ALL_SCHEMES[self.scheme](self.parameters).stability_limit
         highest = (self.modes * np.pi / LENGTH) ** 2 * FLEXURAL_SPEED
         least = max(LEAST_SPEED, INSIDE * highest * LENGTH / (self.steps * limit))
         if least >= MOST_SPEED:

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any, cast
 
 from results_schema.errors import BadInput
-from studies.protocol.study import foreign_kinds, kind_named
+from studies.protocol.study import KINDS
 
 LIBRARY = Path(__file__).parents[1] / "library"
 STARTS = Path(__file__).parents[1] / "starts"
@@ -73,15 +74,14 @@ def start_text(kind: str) -> str:
         return known[kind].read_text(encoding="utf-8") + shared
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
-    start = getattr(kind_named(kind), "start", "") if kind in foreign_kinds() else ""
-    if not start:
+    if kind not in KINDS.foreign:
         raise BadInput(
             "no such kind of study, or none with a file to start from",
             where=kind,
-            expected=f"one of {', '.join([*known, *foreign_kinds()])}",
+            expected=f"one of {', '.join([*known, *KINDS.foreign])}",
             remedy=_nearest(kind, known),
         )
-    return str(start) + shared
+    return str(cast(Any, KINDS[kind]).start) + shared
 
 
 def _files(folder: Path) -> Mapping[str, Path]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from functools import cached_property
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from results_schema.errors import BadInput
+from results_schema.pieces import Pieces, lacks
 from studies.protocol.measuring import MeasuringKind, Work, check_measurable, measure
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from studies.results.results import Results
 
 KINDS_FOLDER = Path(__file__).parents[1] / "kinds"
-GROUP = "wanderlast.kinds"  # of the entry points by which other packages bring kinds of study
 
 
 class Kind(Protocol):
@@ -53,60 +53,56 @@ class Kind(Protocol):
         """The figures of the report, the most important first."""
 
 
-def kind_names() -> tuple[str, ...]:
-    """The kinds of study that there are; a new one is one new file in the folder of kinds, or an entry point of another
-    package."""
-    return tuple(sorted({*_own_names(), *foreign_kinds()}))
-
-
-def foreign_kinds() -> Mapping[str, EntryPoint]:
-    """The entry points of kinds that other packages bring, by name; those of the program's own names count for
-    nothing."""
-    return {point.name: point for point in entry_points(group=GROUP) if point.name not in _own_names()}
-
-
-def _own_names() -> set[str]:
-    return {module.name.replace("_", "-") for module in pkgutil.iter_modules([str(KINDS_FOLDER)])}
-
-
-def _foreign(point: EntryPoint) -> AnyKind:
-    """The kind that an entry point names. Raises BadInput where it cannot be had."""
-    try:
-        kind = point.load()
-    except Exception as error:
-        raise BadInput(
-            f"the kind of study {point.name} of another package cannot be imported",
-            where=f"entry point {point.name} = {point.value}",
-            received=f"{type(error).__name__}: {error}"[:200],
-            remedy="mend or remove that package",
-        ) from None
-    missing = [name for name in KIND_HAS if not hasattr(kind, name)]
-    if missing or kind.name != point.name:
-        raise BadInput(
-            f"{point.value} is no kind of study",
-            where=f"entry point {point.name} = {point.value}",
-            expected=f'an object with {", ".join(KIND_HAS)}, whose name is "{point.name}"',
-            received=f"without {', '.join(missing)}" if missing else f'the name "{kind.name}"',
-        )
-    return cast(AnyKind, kind)
-
-
 AnyKind = Kind | MeasuringKind
 KIND_HAS = ("name", "summary", "question", "check", "findings", "figures")
 
 
+class _OwnKinds(Mapping[str, AnyKind]):
+    """The kinds of the folder of kinds, each imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> AnyKind:
+        if name not in self._names:
+            raise KeyError(name)
+        return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    @cached_property
+    def _names(self) -> list[str]:
+        return sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules([str(KINDS_FOLDER)]))
+
+
+#: The kinds of study that there are; a new one is one new file in the folder of kinds, or an entry point.
+KINDS: Pieces[AnyKind] = Pieces(
+    group="wanderlast.kinds",
+    noun="kind of study",
+    own=_OwnKinds(),
+    wanted=f"an object with {', '.join(KIND_HAS)} and start",
+    missing=lacks(*KIND_HAS, "start"),
+)
+
+
+def kind_names() -> tuple[str, ...]:
+    """The kinds of study that there are."""
+    return tuple(sorted(KINDS))
+
+
 def kind_named(name: str, where: str = "kind") -> AnyKind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
-    known = kind_names()
-    if name not in known:
+    if name not in KINDS:
+        known = kind_names()
         near = get_close_matches(name, known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else ""
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
-    foreign = foreign_kinds()
-    if name in foreign:
-        return _foreign(foreign[name])
-    return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
+    return KINDS[name]
 
 
 def is_measuring(name: str) -> bool:

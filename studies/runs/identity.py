@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from results_schema.errors import BadInput
-from studies.protocol.study import foreign_kinds, kind_named
+from studies.protocol.study import KINDS
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -45,7 +44,7 @@ def run_key(study: Study, names: Sequence[str] = ()) -> str:
     from engine.kernels.jit import kernel_hash
 
     texts = [study.source.sha256, *files_of(study).values(), *names, kernel_hash(), sources_hash(sources())]
-    texts += [path.read_text(encoding="utf-8") for path in foreign_sources(study.kind)]
+    texts += [path.read_text(encoding="utf-8") for path in foreign_sources(study)]
     texts += [f"{library} {version(library)}" for library in LIBRARIES]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()
 
@@ -56,12 +55,11 @@ def sources() -> list[Path]:
     return sorted(path for path in found if not path.is_relative_to(DRAWING))
 
 
-def foreign_sources(kind: str) -> list[Path]:
-    """The file of a kind of study that another package brings."""
-    if kind not in foreign_kinds():
-        return []
-    found = inspect.getsourcefile(type(kind_named(kind)))
-    return [Path(found)] if found else []
+def foreign_sources(study: Study) -> list[Path]:
+    """The files of all pieces of a study that other packages bring."""
+    from engine.scene.pieces import used
+
+    return sorted({path for table, name in ((KINDS, study.kind), *used(study)) for path in table.sources(name)})
 
 
 def sources_hash(paths: Sequence[Path]) -> str:

@@ -18,7 +18,7 @@ PAGE = ROOT / "docs" / "extending.md"
 OTHER = """\
 class K:
     name = "other"
-    summary = question = ""
+    summary = question = start = ""
     check = findings = figures = None
 KIND = K()
 """
