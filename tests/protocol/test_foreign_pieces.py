@@ -1,0 +1,193 @@
+"""Pieces that other packages bring: the documentation's examples, installed and run."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+from engine.bodies import BODIES
+from engine.scene.carriages import CARRIAGES
+from engine.scene.motions import MOTIONS
+from engine.scene.settings import ALL_SCHEMES
+from results_schema.errors import BadInput
+from results_schema.pieces import Pieces
+from results_schema.quantities import QUANTITIES
+from studies.protocol.study import KINDS
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+(DECLARED,) = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
+POINTS = tomllib.loads(DECLARED)["project"]["entry-points"]
+FILES = dict(re.findall(r"`(\w+\.py)`:\n\n```python\n(.*?)```", PAGE, re.S))
+TABLES = {table.group: table for table in (BODIES, CARRIAGES, MOTIONS, QUANTITIES, ALL_SCHEMES, KINDS)}
+
+STUDY = """\
+schema_version = 1
+title = "A magnet glides over a slab"
+kind = "static-share"
+
+[body.floor]
+kind = "slab"
+length = 6.0
+width = 1.0
+thickness = 0.2
+youngs_modulus = "30 GPa"
+density = 2500.0
+damping_ratio = 0.02
+modes = 6
+
+[carriage.cart]
+on = "floor"
+kind = "magnet"
+mass = 200.0
+pull = 500.0
+motion = { kind = "glide", start = 0.5, end = 5.5, speed = 5.0 }
+
+[sensor.middle]
+body = "floor"
+at = 3.0
+
+[sensor.tilt]
+body = "floor"
+at = 0.0
+quantity = "slope"
+
+[solver]
+scheme = "damped"
+steps = 400
+audit = 0
+"""
+
+
+def install(home: Path, points: dict[str, dict[str, str]], files: dict[str, str]) -> Path:
+    """A folder with a package as it is installed."""
+    info = home / "toys-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toys\nVersion: 1.0\n")
+    sections = (f"[{group}]\n" + "\n".join(f"{k} = {v}" for k, v in one.items()) for group, one in points.items())
+    (info / "entry_points.txt").write_text("\n\n".join(sections) + "\n")
+    for name, text in files.items():
+        (home / name).write_text(text)
+    return home
+
+
+@pytest.fixture
+def packages(tmp_path: Path) -> Path:
+    """The examples, installed."""
+    return install(tmp_path / "packages", POINTS, FILES)
+
+
+def python(packages: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([str(packages), str(ROOT)])
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=packages.parent,
+        env=os.environ | {"PYTHONPATH": path, "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def wanderlast(packages: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return python(packages, "-m", "studies", *arguments)
+
+
+def test_every_sort_has_an_example() -> None:
+    assert set(POINTS) == set(TABLES)
+    assert {f"{value.partition(':')[0]}.py" for one in POINTS.values() for value in one.values()} == set(FILES)
+
+
+def test_the_commands_know_the_kind(packages: Path) -> None:
+    assert "static-share" in wanderlast(packages, "list").stdout
+    assert wanderlast(packages, "init", "static-share", "mine.toml").returncode == 0
+    assert wanderlast(packages, "check", "mine.toml").returncode == 0
+
+
+def test_a_study_of_them_all_is_run(packages: Path) -> None:
+    (packages.parent / "all.toml").write_text(STUDY)
+    check = wanderlast(packages, "check", "all.toml")
+    assert check.returncode == 0, check.stderr
+    run = wanderlast(packages, "run", "all.toml")
+    assert run.returncode == 0, run.stderr
+    with xr.open_dataset(packages.parent / "all.nc") as found:
+        share, tilt = found["static_share"].values, float(found["tilt_max"])
+        # of a load at the middle of a pinned beam: F L^2/(16 E I), a part of which stands at rest
+        most = (200.0 * 9.80665 + 500.0) * 6.0**2 / (16 * 30e9 * 0.2**3 / 12)
+        assert found["tilt_max"].attrs["units"] == "1" and found["scheme_used"] == 8
+    assert ((share > 0.3) & (share <= 1.01)).all()
+    assert most < tilt < 1.5 * most
+    report = wanderlast(packages, "report", "all.nc")
+    assert report.returncode == 0, report.stderr
+    page = (packages.parent / "all-report" / "report.html").read_text(encoding="utf-8")
+    assert "of the largest reading is static" in page
+
+
+def test_another_text_of_any_is_another_run(packages: Path) -> None:
+    (packages.parent / "all.toml").write_text(STUDY)
+    keys = """
+import sys, pathlib, engine
+from studies.runs.identity import run_key
+print(run_key(engine.load("all.toml")))
+for name in sys.argv[1:]:
+    file = pathlib.Path("packages", name)
+    file.write_text(file.read_text() + "# mended")
+    print(run_key(engine.load("all.toml")))
+"""
+    done = python(packages, "-c", keys, *FILES)
+    assert done.returncode == 0, done.stderr
+    assert len(set(done.stdout.split())) == 1 + len(FILES)
+
+
+def table_with(group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> Pieces[Any]:
+    """The table of a sort with one more piece, called `toy`."""
+    module = f"toy_{group.partition('.')[2]}"
+    home = install(tmp_path / "packages", {group: {"toy": f"{module}:TOY"}}, {f"{module}.py": text})
+    monkeypatch.syspath_prepend(str(home))
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    return replace(TABLES[group])
+
+
+@pytest.mark.parametrize("group", TABLES)
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("raise RuntimeError('broken')\n", "cannot be imported.*broken"), ("TOY = 3\n", "toy_.*:TOY is no .*without")],
+)
+def test_what_is_none_is_refused(
+    group: str, text: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = table_with(group, tmp_path, monkeypatch, text)
+    assert "toy" in table
+    with pytest.raises(BadInput, match=f"entry point toy = .*{says}"):
+        table["toy"]
+
+
+@pytest.mark.parametrize("group", TABLES)
+def test_another_name_is_refused(group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ((name, value),) = POINTS[group].items()
+    module, _, piece = value.partition(":")
+    text = FILES[f"{module}.py"].replace('declare("static-share"', 'declare("toy"')
+    table = table_with(group, tmp_path, monkeypatch, f"{text}\nTOY = {piece}\n")
+    with pytest.raises(BadInput, match=f'expected .*"toy", received the name "{name}"'):
+        table["toy"]
+
+
+def test_an_unfinished_class_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = FILES["glide.py"].replace("def law(", "def other(") + "\nTOY = Glide\n"
+    with pytest.raises(BadInput, match="without law"):
+        table_with("wanderlast.motions", tmp_path, monkeypatch, text)["toy"]
+
+
+def test_names_of_the_program_stay_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    home = install(tmp_path / "packages", {"wanderlast.motions": {"cruise": "nowhere:TOY"}}, {})
+    monkeypatch.syspath_prepend(str(home))
+    assert replace(MOTIONS)["cruise"] is MOTIONS["cruise"] and "cruise" not in replace(MOTIONS).foreign
