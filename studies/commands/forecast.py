@@ -47,15 +47,15 @@ class Looked(NamedTuple):
 
 
 @one_thread()
-def forecast(plan: Plan, threads: int) -> Forecast:
+def forecast(plan: Plan, threads: int, seconds: float = SECONDS, rounds: Sequence[int] = ROUNDS) -> Forecast:
     """What is measured within about a second: how some variants converge, then as many pilots as there is time for."""
     warm_up(plan)
-    end = time.perf_counter() + SECONDS
+    end = time.perf_counter() + seconds
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     looked = _converge(plan, groups, partial(_past, end))
     if plan.converges:
         return _of_convergence(plan, looked, threads)
-    found = _choose(plan, threads, looked, end)
+    found = _choose(plan, threads, looked, end, rounds)
     return _without_pilots(plan, looked) if found is None else found
 
 
@@ -96,10 +96,10 @@ def _without_pilots(plan: Plan, looked: Looked) -> Forecast:
     return Forecast(plan, title, chosen.rows(looked.parts), climbs * looked.seconds, less)
 
 
-def _choose(plan: Plan, threads: int, looked: Looked, end: float) -> Forecast | None:
+def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast | None:
     """More and more pilots, as many as there is time for; None where there is none."""
     found, took = None, CLIMB * looked.seconds / LONGER
-    for pilots in ROUNDS:
+    for pilots in rounds:
         trial, started = replace(plan), time.perf_counter()
         if not looked.parts or started + LONGER * took > end:
             break

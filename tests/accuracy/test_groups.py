@@ -15,7 +15,7 @@ from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import make_plan
 from results_schema.status import Fidelity, Status
-from tests.accuracy.chosen import STUDIES, chosen_plan, few_at_most, run_of
+from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import OPEN, passages
 from tests.engine.build import beam, cruise, fixed, mass
 
@@ -135,11 +135,10 @@ def test_statics_take_no_steps() -> None:
 @pytest.mark.parametrize("many", [False, True])
 def test_variants_that_are_done_are_left_out(many: bool) -> None:
     """And the others come out as they would with them."""
-    with few_at_most():
-        plans = [chosen_plan(STUDIES["passages"]) if many else make_plan(passages(4, 4)) for _ in range(2)]
-        plan, (whole, rest) = plans[0], (Collector(part.size) for part in plans)
-        execute(plan, whole.add)
-        execute(plans[1], rest.add, done=np.arange(0, plan.size, 3), chunk=11)
+    plans = [chosen_plan(STUDIES["passages"]) if many else make_plan(passages(4, 4)) for _ in range(2)]
+    plan, (whole, rest) = plans[0], (Collector(part.size) for part in plans)
+    execute(plan, whole.add)
+    execute(plans[1], rest.add, done=np.arange(0, plan.size, 3), chunk=11)
     left = np.setdiff1d(np.arange(plan.size), np.arange(0, plan.size, 3))
     for name, array in whole.arrays.items():
         assert rest.arrays[name][left].tobytes() == array[left].tobytes(), name

@@ -177,15 +177,6 @@ def test_springs_at_one_place_act_as_one() -> None:
     np.testing.assert_allclose(apart.omega, together.omega, rtol=1e-13)
 
 
-def test_a_row_does_not_depend_on_the_other_stations() -> None:
-    body = on_springs(((0.0, 50.0, 0.0), (0.6, 20.0, 3.0)), 13)
-    s = np.random.default_rng(3).random(700)
-    for j in range(4):
-        whole = body.shape(s, j)
-        parts = np.vstack([body.shape(s[:1], j), body.shape(s[1:300], j), body.shape(s[300:], j)])
-        assert np.array_equal(whole, parts)
-
-
 def test_jumps_are_taken_from_the_right_and_at_the_end_from_the_left() -> None:
     body = on_springs(((0.4, 80.0, 5.0), (1.0, 60.0, 0.0)), 5)
     before, at, after = (body.shape([0.4 + step], 2)[0] for step in (-1e-9, 0.0, 1e-9))

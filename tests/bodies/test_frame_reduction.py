@@ -105,15 +105,6 @@ def _without_up(table: dict[str, Any]) -> dict[str, Any]:
     return {name: {k: v for k, v in member.items() if k != "up"} for name, member in table["member"].items()}
 
 
-def test_frames_linked_by_a_spring_slide_on_it() -> None:
-    """Two beams, the second on one spring of the first: five motions without strain, and no more."""
-    table = straight(CLAMPED_FREE, elements=3, modes=8)
-    table["node"] |= {"c": [LENGTH, 0.0, 0.0], "d": [LENGTH + 5.0, 0.0, 0.0]}
-    table["member"]["other"] = table["member"]["span"] | {"nodes": ["c", "d"]}
-    table["spring"] = {"link": {"node": "b", "to": "c", "stiffness": [0.0, 0.0, 1e5]}}
-    assert body(table).rigid_modes == 5
-
-
 def test_points_at_the_track_are_places_of_it() -> None:
     """A point where a node of the track is, in the load's direction: rows, influence and own weight are the track's."""
     table = straight({"a": "clamped"}, elements=4, track_offset=[0.0, 0.3, 0.0], modes=6)

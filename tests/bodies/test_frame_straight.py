@@ -182,18 +182,6 @@ def test_load_beside_the_axis_twists() -> None:
     assert worst(frame.own_weight_deflection(X), beam(("clamped", "free"), 1).own_weight_deflection(X)) < 1e-9
 
 
-def test_twist_bends_shapes_smoothly() -> None:
-    """Torsional mode sin(pi s/(2 L)) of a cantilever, seen beside its axis: its second derivative is -k^2 phi."""
-    stiff = {"second_moment": 1.0, "second_moment_lateral": 1.0, "area": 1.0}
-    frame = body(straight(CLAMPED_FREE, elements=12, modes=1, track_offset=[0.0, 0.5, 0.0], section=stiff))
-    k = np.pi / (2.0 * LENGTH)
-    scale = frame.shape([LENGTH])[0, 0]
-    for j in range(4):
-        expected = scale * k**j * np.sin(k * X + 0.5 * np.pi * j)
-        assert worst(frame.shape(X, j)[:, 0], expected) < (1e-4, 1e-4, 2e-3, 0.1)[j]
-    np.testing.assert_allclose(frame.wave_number, k, rtol=1e-3)
-
-
 def test_lateral_loads_bend_the_other_way() -> None:
     frame = body(straight(CLAMPED_FREE, elements=3, track_direction=[0.0, 1.0, 0.0]))
     assert frame.influence_at([LENGTH], [LENGTH])[0] == pytest.approx(LENGTH**3 / (3.0 * MODULUS * 3.0e-6), rel=1e-9)

@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +15,10 @@ import xarray as xr
 import engine
 from results_schema.errors import Interrupted, OutputFailed
 from results_schema.store.archive import open_archive
-from results_schema.store.parts import PartStore, Rows
+from results_schema.store.parts import Rows
 from studies.commands.cli import main
 from studies.protocol.options import RunOptions
 from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
-from studies.runs import part_writer as gathering
 from studies.runs.part_writer import Gatherer
 from studies.runs.provenance import OF_TIME_AND_MACHINE
 from studies.runs.runner import run_to_archive
@@ -27,26 +27,24 @@ from tests.studies.small import LONG, SCENES, start, write
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, and a part for every chunk."""
+    """A working folder with a study."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
     write(tmp_path, SCENES)
     return tmp_path
 
 
 def after_parts(monkeypatch: pytest.MonkeyPatch, number: int, number_of_signal: int) -> None:
-    """Let a signal arrive when so many parts are written."""
-    written = []
-    write_part = PartStore.write
+    """Write a part for every chunk, and let a signal arrive after so many."""
+    written, add = [], Gatherer.add
 
-    def write_and_signal(self: PartStore, variants: np.ndarray, *rest: object) -> Path:
-        path = write_part(self, variants, *rest)  # type: ignore[arg-type]
-        written.append(path)
+    def add_and_signal(self: Gatherer, variants: np.ndarray, *rest: Any) -> None:
+        add(self, variants, *rest)
+        self.flush()
+        written.append(variants)
         if len(written) == number:
             os.kill(os.getpid(), number_of_signal)
-        return path
 
-    monkeypatch.setattr(PartStore, "write", write_and_signal)
+    monkeypatch.setattr(Gatherer, "add", add_and_signal)
 
 
 def assert_same_results(first: xr.Dataset, second: xr.Dataset) -> None:
@@ -152,40 +150,36 @@ def test_stop_carries_the_code_of_its_signal() -> None:
 
 
 class Written:
-    """Remembers what would have been written."""
+    """Remembers the variants of what would have been written, and those that are kept."""
 
     def __init__(self) -> None:
-        self.parts: list[tuple[list[int], list[float], list[int]]] = []
+        self.parts: list[tuple[list[int], list[int]]] = []
 
-    def __call__(self, variants: np.ndarray, arrays: object, selected: Rows | None) -> None:
-        kept = [] if selected is None else selected.variants.tolist()
-        self.parts.append((variants.tolist(), arrays["x"].tolist(), kept))  # type: ignore[index]
+    def __call__(self, variants: np.ndarray, arrays: Any, selected: Rows | None) -> None:
+        assert (arrays["x"][:, 0] == variants + 0.5).all()
+        self.parts.append((variants.tolist(), [] if selected is None else selected.variants.tolist()))
 
 
 def chunk(*variants: int) -> tuple[np.ndarray, dict[str, np.ndarray], Rows]:
-    """A chunk whose results are its variants' numbers, one of which is kept."""
-    numbers = np.array(variants)
-    return numbers, {"x": numbers + 0.5}, Rows(numbers[:1], {"h": np.zeros((1, 3))})
+    """A chunk of 8 MiB for every variant, one of which is kept."""
+    numbers, x = np.array(variants), np.zeros((len(variants), 2**20))
+    x[:, 0] = numbers + 0.5
+    return numbers, {"x": x}, Rows(numbers[:1], {"h": np.zeros((1, 3))})
 
 
-def test_chunks_share_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 100.0)
+def test_chunks_share_a_part_of_32_mib() -> None:
     written = Written()
     with Gatherer(written) as parts:
         parts.add(*chunk(4, 5))
         parts.add(*chunk(1))
         assert written.parts == []
-        monkeypatch.setattr(gathering, "BYTES_PER_PART", 1)
         parts.add(*chunk(2))
-        parts.add(np.array([7]), {"x": np.array([7.5])}, None)
-    assert written.parts == [([4, 5, 1, 2], [4.5, 5.5, 1.5, 2.5], [4, 1, 2]), ([7], [7.5], [])]
+        parts.add(*chunk(7)[:2], None)
+    assert written.parts == [([4, 5, 1, 2], [4, 1, 2]), ([7], [])]
 
 
 @pytest.mark.parametrize(("error", "kept"), [(KeyboardInterrupt(), 1), (OutputFailed("full"), 0)], ids=str)
-def test_what_has_gathered_is_kept_unless_the_disk_failed(
-    error: BaseException, kept: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 100.0)
+def test_what_has_gathered_is_kept_unless_the_disk_failed(error: BaseException, kept: int) -> None:
     written = Written()
     with pytest.raises(type(error)), Gatherer(written) as parts:
         parts.add(*chunk(3))

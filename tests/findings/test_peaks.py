@@ -132,14 +132,6 @@ def test_ends_of_a_cycle_that_does_not_close_are_no_peaks() -> None:
     assert np.all(np.nan_to_num(found.phase[:, 0], nan=0.2) < 0.9)
 
 
-@pytest.mark.parametrize("stations", [100, 400, 6400])
-def test_a_small_gap_takes_no_peak_away_however_many_stations_see_it(stations: int) -> None:
-    """A peak where the cycle begins again, which has all but settled: it ends 1 % of its range higher."""
-    phase = np.linspace(0.0, 1.0, stations + 1)
-    found = evenly_spaced((np.cos(4.0 * np.pi * phase) + 0.02 * phase)[:, None])
-    assert found.number.tolist() == [2.0]
-
-
 def test_a_peak_where_a_cycle_nearly_closes_is_no_guess_of_stations() -> None:
     """The cycle ends 1.5 % of its range higher than it begins, on its way up: the end is the peak's value."""
     for stations in (401, 3201):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels.layout import LANES
-from engine.kernels.shapes import Span, beam_shapes, combined_rows
+from engine.kernels.shapes import Span, beam_shapes
 from engine.kernels.sines import decay, sin_cos
 
 Array = NDArray[np.float64]
@@ -64,19 +63,3 @@ def test_derivatives_follow_each_other(kind: str, order: int) -> None:
     turned = wave({"sine": "cosine", "cosine": "sine"}.get(kind, kind) if order % 2 else kind, turns, x)
     sign = {"sine": 1 - 2 * (order // 2), "cosine": -1 if order in (1, 2) else 1, "near": (-1) ** order, "far": 1}[kind]
     np.testing.assert_allclose(wave(kind, turns, x, order), sign * 2.0**order * turned, rtol=1e-15)
-
-
-def test_a_value_does_not_depend_on_its_neighbours() -> None:
-    x, turns = np.random.default_rng(4).uniform(-1.0, 1.0, 3 * LANES + 5), np.array([0.7, 12.3])
-    for kind in AMPLITUDES:
-        whole = wave(kind, turns, x)
-        assert np.array_equal(whole, np.concatenate([wave(kind, turns, one) for one in x]))
-        assert np.array_equal(whole[:, 1:], wave(kind, turns[1:], x))
-
-
-def test_combined_rows() -> None:
-    draw = np.random.default_rng(5)
-    numbers, weights = draw.integers(0, 7, (11, 3)), draw.normal(size=(2, 11, 3))
-    table, found = draw.normal(size=(7, 5)), np.empty((2, 11, 5))
-    combined_rows(numbers, weights, table, found)
-    np.testing.assert_allclose(found, np.einsum("jsi,sik->jsk", weights, table[numbers]), atol=1e-14)

@@ -62,14 +62,6 @@ def test_variants_are_what_they_are_alone(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_zipped_sweeps(kind: str) -> None:
-    own = 'own = { of = "body.bed.density", values = [7000.0, 7850.0] }'
-    found = small.run(kind, sweep=f"zip = true\n{MASS}\n{own}")
-    assert found.status.dims == ("variant",) and found.mass.dims == ("variant",)
-    assert answers.findings(found) and answers.figures(found)
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_positions_where_a_variant_is_off_its_body_have_no_values(kind: str) -> None:
     found = small.run(
         kind, sweep='length = { of = "body.bed.length", values = [3.0, 4.0] }', question="positions = [1.0, 3.5]"
@@ -127,13 +119,6 @@ def test_readings_agree_with_the_unreduced_model(carriage: str) -> None:
     assert "with static correction from 3 modes of every body on" in text
 
 
-def test_without_the_unreduced_model_the_most_modes_are_the_reference() -> None:
-    found = Results.of(small.run("eigenfrequencies", "positions = [2.0]\nmode_counts = [4, 8]\nunreduced = 0"))
-    error, against = frequency_errors(found)
-    assert against == "the largest number of modes" and error.shape == (2, 2, 1) and error[0, -1, 0] == 0.0
-    assert "frequency_unreduced" not in found.dataset
-
-
 @pytest.mark.parametrize(("count", "places"), [(1, [2.0]), (2, [2.0, 3.0]), (3, [1.0, 2.0, 3.0])])
 def test_positions_of_the_unreduced_model(count: int, places: list[float]) -> None:
     found = small.run("influence", f"positions = 5\nunreduced = {count}")
@@ -177,11 +162,6 @@ def test_the_machine_bed_agrees_with_its_full_model() -> None:
 def test_bad_questions_are_refused(kind: str, question: str, words: str) -> None:
     with pytest.raises(BadInput, match=words):
         studies.run(small.study(kind, question))
-
-
-def test_a_list_of_positions_may_use_the_whole_body() -> None:
-    found = small.run("influence", 'positions = [0.0, "50 cm", 4.0]')
-    assert found.position.values.tolist() == [0.0, 0.5, 4.0]
 
 
 AWAY = {"kind": "cruise", "start": 3.7, "end": 4.5, "speed": 1.0}

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.groups import MarchGroup
 from engine.batch.execution import run
-from engine.batch.plan import CHUNK_BYTES, make_plan
 from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared
-from engine.observation.histories import counts_reduced
 from studies.findings.indices import harmonics
 from studies.findings.peaks import peaks
-from studies.kinds.double_peak import KIND, SAME_PEAK, STATIONS, DoublePeakReduction
+from studies.kinds.double_peak import KIND, SAME_PEAK, DoublePeakReduction
 from tests.engine.build import beam, mass, study, swing
 
 Array = NDArray[np.float64]
@@ -103,20 +100,6 @@ def test_every_step_of_a_cycle_that_rings_is_seen() -> None:
     assert highest == pytest.approx(
         float(found.midspan_max), abs=6e-3 * static
     )  # 32 stations per period: 1 - cos(pi/32)
-
-
-def test_histories_of_a_chunk_fit_their_memory_whatever_the_steps() -> None:
-    for steps in (400, 6400, 102400, 120354):
-        sweep = {"m": {"of": "carriage.car.mass", "from": 0.01, "to": 0.2, "count": 4096}}
-        given = study(
-            beam(modes=1), mass(0.1, swing(0.5, 0.4, 0.2, 1)), kind="double-peak", sweep=sweep, solver={"steps": steps}
-        )
-        plan = make_plan(given, reduction=KIND.reduction(given))
-        (group,) = plan.groups
-        assert isinstance(group, MarchGroup)
-        stations = counts_reduced(group.tables.timeline, STATIONS).size
-        assert stations == steps + 1 if steps <= 8192 else 8192 < stations <= 16384
-        assert 8 * stations * plan.lanes_per_chunk(group) <= 1.01 * CHUNK_BYTES
 
 
 def test_peaks_are_told_no_less_than_half_of_what_histories_differ_by() -> None:

@@ -15,11 +15,8 @@ from engine.accuracy.choice import pilots_of
 from engine.batch.chunk import run_chunk
 from engine.batch.execution import run_jobs
 from engine.batch.plan import make_plan
-from engine.kernels.layout import LANES
-from engine.march.march import march
 from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
-from engine.model.variant_values import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.pictures.common import figures
@@ -78,24 +75,6 @@ def test_the_reference_solves_the_equations_of_the_naive_twin() -> None:
     counted = np.arange(41) / 40 <= 0.98
     np.testing.assert_array_equal(np.isfinite(found[:, -1]), counted)
     np.testing.assert_allclose(found[counted, -1], force[counted], rtol=1e-7)
-
-
-@pytest.mark.parametrize("start", ["rest", "equilibrium"])
-def test_the_reference_agrees_with_a_fine_march_of_a_shuttle(start: str) -> None:
-    ends = [{"at": 0.5, "stiffness": 4e5}, {"at": 9.5, "stiffness": 3e5}]
-    swing = {"kind": "sinusoidal", "centre": 5.0, "amplitude": 3.0, "frequency": 0.4, "cycles": 2}
-    changes = {"body.bed.supports": ends, "carriage.table.motion": swing, "initial": start}
-    study = engine.load(precision.TEXT).with_values(changes)
-    model = measured.scene_model(study, {})
-    equations = ModalEquations(model)
-    tables = SceneTables(measured.with_scheme(model, "fox-goodwin"), 20_000, "whole")
-    counts = np.arange(0, 40_001, 500)
-    marched = march(tables, VariantValues(study, {}, LANES), counts, 1, sampled=3).history[:, :, 0]
-    found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11).states(counts / 20_000))
-    for column, scale in zip(range(3), (*measured.static_scale(model)[0], equations.weight), strict=True):
-        known = np.isfinite(marched[:, column])
-        assert known.sum() > 70
-        np.testing.assert_allclose(found[known, column], marched[known, column], atol=1e-6 * scale)
 
 
 def test_errors_are_those_of_the_naive_twin() -> None:
@@ -198,18 +177,6 @@ def test_jax_marches_the_same() -> None:
     assert float(by_jax["error"][0]) == pytest.approx(float(own["error"][0, 0, 0]), rel=1e-6)
 
 
-def test_without_jax_the_archive_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from studies.precision import jax_march
-
-    monkeypatch.setattr(jax_march, "find_spec", lambda name: None)
-    study = engine.load(precision.TEXT)
-    kind = studies.kind_named("work-precision")
-    assert not any(piece.name.startswith("jax") for piece in kind.pieces(study))
-    if "jax_error" not in precision.small():
-        assert "not installed" in precision.small().attrs["jax"]
-        assert "jax is not installed" in "\n".join(answers.findings(precision.small()))
-
-
 # ---- fits and fronts ----
 
 
@@ -236,17 +203,6 @@ def test_no_order_is_invented() -> None:
     ):
         for formal in (1, 2, 4):
             assert np.isnan(trade.fitted_order(steps, errors, 1e-9, formal)), errors
-
-
-def test_a_plateau_is_no_order_and_another_straight_line_is_one() -> None:
-    """Errors of modes that the steps do not resolve fall by and by; so did those of a girder with 100 to 400 steps."""
-    steps = np.array([100, 200, 400, 800, 1600])
-    for slope in (0.18, 0.54, 0.7):
-        assert np.isnan(trade.fitted_order(steps, 4e-3 * (100 / steps) ** slope, 1e-9, 2)), slope
-    third = 4e-3 * (100 / steps) ** 3.0
-    assert trade.fitted_order(steps, third, 1e-9, 4) == pytest.approx(3.0, abs=1e-9)
-    assert np.isnan(trade.fitted_order(steps[:4], third[:4], 1e-9, 4))
-    assert trade.fitted_order(steps[:3], 4e-3 * (100 / steps[:3]) ** 1.8, 1e-9, 2) == pytest.approx(1.8, abs=1e-9)
 
 
 def test_the_front_is_what_no_other_point_beats() -> None:

@@ -14,8 +14,6 @@ import engine
 from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, SECONDS, SQUARES
 from engine.march.march import march
-from engine.march.tables import SceneTables
-from engine.model.scene_model import build_model
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, under
@@ -79,17 +77,6 @@ def test_free_vibration_has_steps_of_its_own() -> None:
     assert float(engine.run(crossing(sweep=paces, solver={"steps": 800})).midspan_rms[1]) == pytest.approx(
         exact(), rel=3e-4
     )
-
-
-def test_parts_with_other_steps_weigh_what_they_last() -> None:
-    """Boundaries where a force passes kinks of moments, between which steps differ; slices of a long march go on."""
-    moments = {f"moment{i}": fixed(0.0731 + 0.1317 * i, "bending_moment") for i in range(6)}
-    given = crossing(sensor={"place": fixed(0.5)} | moments)
-    tables = SceneTables(build_model(given, {}, {}), 100, "whole", stops="kinks")
-    assert np.ptp([segment.step for segment in tables.timeline.segments if not segment.free]) > 2e-4
-    marks = march(tables, VariantValues(given, {}, LANES), np.zeros(0, np.int64), 1).statistics[0, :, 0]
-    assert math.sqrt(marks[SQUARES] / marks[SECONDS]) == pytest.approx(exact(), rel=1e-3)
-    assert float(engine.run(crossing(solver={"steps": 9000})).midspan_rms) == pytest.approx(exact(), rel=1e-4)
 
 
 def test_under_a_carriage_only_its_own_time_counts() -> None:

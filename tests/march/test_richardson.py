@@ -11,17 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.batch.dataset import Collector
-from engine.batch.execution import execute, run
+from engine.batch.execution import run
 from engine.batch.plan import make_plan
-from engine.kernels.layout import LANES, LARGEST, LARGEST_AT, STATISTICS
-from engine.kernels.stepping.richardson_pairs import survey
 from engine.march.richardson import march_pair
 from engine.model.variant_values import padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
 from results_schema.status import Status
-from tests.batch.test_determinism import digest, mixed
 from tests.engine.build import beam, cruise, fixed, mass, shuttle, study, swing, under
 from tests.engine.kept_cycles import Kept
 from tests.engine.reading import Reading
@@ -171,23 +167,6 @@ def test_extremes_are_those_of_the_history(steps: int) -> None:
     assert float(ds.midspan_rms) == pytest.approx(math.sqrt(squares / (3 * steps)), rel=1e-9)
 
 
-def test_a_peak_where_segments_meet_is_found() -> None:
-    """A sine cut at the station of its peak and marched on without an event, and with one."""
-    x = np.broadcast_to(np.sin(0.1 + 0.1 * np.arange(31))[None, :, None, None], (1, 31, 1, LANES)).copy()
-    counted = np.ones((31, 1), dtype=np.bool_)
-
-    def largest(*pieces: tuple[int, int, bool]) -> tuple[float, float]:
-        marks, carry = np.zeros((1, 1, STATISTICS, LANES)), np.zeros((1, 1, 3, LANES))
-        for first, last, joined in pieces:
-            survey(np.ascontiguousarray(x[:, first : last + 1]), counted[first : last + 1], marks, carry, joined, first)
-        return float(marks[0, 0, LARGEST, 0]), float(marks[0, 0, LARGEST_AT, 0])
-
-    whole = largest((0, 30, False))
-    assert whole == pytest.approx((1.0, 5.0 * math.pi - 1.0), abs=2e-3)
-    assert largest((0, 14, False), (14, 30, True)) == largest((0, 15, False), (15, 30, True)) == whole
-    assert largest((0, 15, False), (15, 30, False)) == (x.max(), 15.0)
-
-
 def test_reduction_gets_the_extrapolated_cycle() -> None:
     """The last of three cycles, the contact force judged in those before too."""
     given = study(beam(modes=3, damping_ratio=0.05), mass(0.5, swing(0.5, 0.3, 0.4, 3)), solver=PAIR | {"steps": 400})
@@ -202,16 +181,3 @@ def test_reduction_gets_the_extrapolated_cycle() -> None:
     assert float(reduced.midspan_max) >= last.max()
     told = [ds.estimated_error.sel(result="midspan_max").item() for ds in (reduced, whole)]
     assert told[0] <= told[1]
-
-
-def pairs_of_mixed() -> Study:
-    data = dict(mixed().data)
-    return Study(**(data | {"solver": PAIR | {"steps": 600, "tolerance": 0.1}}))
-
-
-def test_same_bits_for_any_chunks_and_threads() -> None:
-    plan = make_plan(pairs_of_mixed())
-    collector = Collector(plan.size)
-    execute(plan, collector.add)
-    assert set(collector.arrays["status"].tolist()) == {Status.OK, Status.SEPARATED}
-    assert len({digest(plan, chunk, threads) for chunk, threads in ((13, 2), (64, 1), (None, 2))}) == 1

@@ -93,17 +93,6 @@ def test_unsorted_axes_are_drawn_in_order() -> None:
     assert curve.y.tolist() == [float(by_mass.sel(mass=mass)) for mass in (50, 100, 200)]
 
 
-def test_a_view_says_what_it_holds() -> None:
-    results = Results.of(scenes.run("passage", f"{MASS}\n{scenes.pace('passage')}\n{DAMPING}"))
-    seen = views.view(results)
-    assert seen.x is not None and seen.y is not None
-    assert (seen.x.name, seen.y.name) == ("pace", "zeta")
-    assert seen.words == "Held at mass 50 kg."
-    assert seen.plane(results.of_sensor("dynamic_amplification", "midspan")).shape == (4, 2)
-    only = views.view(Results.of(scenes.run("passage")))
-    assert only.x is None and only.words == ""
-
-
 def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
     dataset = scenes.run("passage", scenes.pace("passage"))
     found = answers.figures(dataset)
@@ -135,11 +124,3 @@ def test_no_text_is_mathematics() -> None:
     assert len(figures.png(figure)) > 1000
     for label in figure.drawing.axes[0].get_yticklabels():
         assert "$" not in label.get_text()
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [([1, 5, 9, 13], False), ([1, 10, 100], True), ([0, 1, 10, 100], False), ([1, 2], False), ([1, 2, 4, 8, 16], True)],
-)
-def test_which_axes_are_logarithmic(values: list[float], expected: bool) -> None:
-    assert figures.is_logarithmic(np.array(values, dtype=float)) is expected

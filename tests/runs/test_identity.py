@@ -31,7 +31,6 @@ from studies.commands.cli import main
 from studies.protocol.options import RunOptions
 from studies.protocol.study import KINDS_FOLDER
 from studies.runs import identity
-from studies.runs import part_writer as gathering
 from studies.runs.identity import PROGRAM, run_key, sources, sources_hash
 from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
@@ -46,9 +45,8 @@ Captured = pytest.CaptureFixture[str]
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, and a part for every chunk."""
+    """An empty working folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(gathering, "SECONDS_PER_PART", 0.0)
     return tmp_path
 
 

@@ -12,8 +12,8 @@ from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
-from engine.statics.static_response import StaticReadings, contact_names, static_shapes, static_values
-from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, TWO, UNEVEN, riding
+from engine.statics.static_response import StaticReadings, contact_names, static_values
+from tests.engine.bodies_on_contacts import TWO, UNEVEN, riding
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
 
 Array = NDArray[np.float64]
@@ -79,17 +79,3 @@ def test_contacts_of_a_table_carry_by_levers() -> None:
     found = readings(riding(cruise(0.3, 0.7, 1.0), TWO, UNEVEN), [0.3, 0.5, 0.7])
     assert found.contacts[0] == pytest.approx(0.5 * G * np.array([[0.22, 0.08]] * 3) / 0.3)
     assert contact_names(base_scene(riding(cruise(0.3, 0.7, 1.0), TWO, UNEVEN))) == ["car.rear", "car.front"]
-
-
-def test_shapes_are_what_sensors_read() -> None:
-    case = riding(cruise(0.3, 0.7, 1.0), THREE, FLEXIBLE, beam(modes=4, own_weight=True))
-    model, places = base_scene(case), np.array([0.3, 0.6])
-    values, along = VariantValues(model.study, {}, 1), frozen(model, places)
-    found, names = readings(case, places).sensors[0], list(case.sensor)
-    bed, table = (
-        static_shapes(model, values, along, body, np.array([0.1, 0.61]) * (1.0, 0.5)[body])[0] for body in (0, 1)
-    )
-    assert bed[:, 1] == pytest.approx(found[:, names.index("place")], rel=1e-12)
-    tip = static_shapes(model, values, along, 1, np.array([0.1]))[0, :, 0]
-    assert tip == pytest.approx(found[:, names.index("tip")], rel=1e-12)
-    assert table.shape == (2, 2)

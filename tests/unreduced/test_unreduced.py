@@ -195,21 +195,6 @@ def test_a_rigid_table_stands_by_the_lever_rule() -> None:
     np.testing.assert_allclose(sensors[0, 3], aboard, rtol=1e-10)
 
 
-def test_three_shoes_share_by_stiffness() -> None:
-    """A statically indeterminate table against its dense equations of equilibrium, by hand."""
-    shoes = {
-        f"c{i}": {"at": x, "stiffness": k} for i, (x, k) in enumerate([(0.05, 200.0), (0.2, 150.0), (0.35, 250.0)])
-    }
-    model = unreduced_model(with_table(RIGID, swing(0.5, 0.2, 0.5, 1), READ, contacts=shoes))
-    _, forces = unreduced_statics(model, [0.4])
-    at = 0.4 + np.array([-0.15, 0.0, 0.15])
-    soft = build_body(model.study.body["bed"]).influence(at, at) + np.diag(1.0 / np.array([200.0, 150.0, 250.0]))
-    motion = np.array([[1.0, x - 0.23] for x in (0.05, 0.2, 0.35)])
-    matrix = np.block([[soft, -motion], [motion.T, np.zeros((2, 2))]])
-    expected = np.linalg.solve(matrix, [0.0, 0.0, 0.0, RIGID["mass"] * GRAVITY, 0.0])[:3]
-    np.testing.assert_allclose(forces[0], expected, rtol=1e-9)
-
-
 def test_frequencies_of_a_rigid_table_on_a_beam() -> None:
     """Against all exact modes of the beam, coupled with heave and pitch."""
     given = scene(beam(), {"car": riding(swing(0.5, 0.2, 0.5, 1))}, body={"bed": beam(), "table": RIGID}, sensor=READ)
