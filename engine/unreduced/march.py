@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.bodies.modal.flexibility import symmetric_lu
 from engine.kernels.layout import DIVERGED, SOUND
 from engine.march.stepper import Codes, go
 from engine.model.timeline import Impact, Segment, Timeline, build_timeline
@@ -172,10 +173,9 @@ class _Factor:
 
     def __init__(self, model: Unreduced, h: float, others: Array) -> None:
         from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
 
         matrix = model.mass + GAMMA * h * model.viscous + BETA * h**2 * model.stiffness
-        self._lu = splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=_SYMMETRIC)
+        self._lu = symmetric_lu(csc_array(matrix))
         self._loads = model.modal_loads if h > 0.0 else model.modal_loads[:, :0]
         self._soft = self._lu.solve(self._loads) if self._loads.shape[1] else self._loads
         small = self._loads.T @ self._soft
@@ -190,9 +190,6 @@ class _Factor:
         if self._loads.shape[1]:
             found -= self._soft @ (self._small @ (self._loads.T @ found))
         return np.asarray(found)
-
-
-_SYMMETRIC = {"SymmetricMode": True}
 
 
 class _Table(NamedTuple):

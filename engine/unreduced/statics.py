@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from engine.bodies.modal.flexibility import of_unit_mass
 from engine.unreduced.rows import Along, at_positions, nowhere, readings, softness, tie_rows
-from engine.unreduced.scene import Tie, Unreduced
+from engine.unreduced.scene import Unreduced
 from engine.unreduced.track import Rows
 from results_schema.errors import BadInput
 
@@ -214,16 +215,12 @@ def _given(model: Unreduced, along: Along) -> Array:
     return found
 
 
-def _touches(tie: Tie, along: Along) -> bool:
-    return bool(along.on[0, tie.rider])
-
-
 def _frequencies(model: Unreduced, solver: StaticSolver, along: Along, count: int) -> Array:
     """(count,) at one station, by the flexibility of the whole scene: G_c M x = x/omega^2."""
     mass = _mass_with_carriages(model, along)
     held, free = solver.held
     forms = solver.forms(along)
-    free = _of_unit_mass(free, mass)
+    free = of_unit_mass(free, mass)
 
     def flexibility(loads: Array) -> Array:
         balanced = loads - mass @ (free @ (free.T @ loads))
@@ -246,17 +243,10 @@ def _mass_with_carriages(model: Unreduced, along: Along) -> Any:
     found = model.mass
     rows = tie_rows(model, along)
     for j, tie in enumerate(model.ties):
-        if tie.link == "mass" and _touches(tie, along):
+        if tie.link == "mass" and along.on[0, tie.rider]:
             row = csc_array(Rows(rows.freedoms[:, j], rows.values[:, j]).columns(model.size))
             found = found + tie.mass * (row @ row.T)
     return csc_array(found)
-
-
-def _of_unit_mass(motions: Array, mass: Any) -> Array:
-    if not motions.shape[1]:
-        return motions
-    gram = motions.T @ (mass @ motions)
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), motions.T).T)
 
 
 def _largest(flexibility: Any, mass: Any, count: int) -> Array:

@@ -38,11 +38,6 @@ class Rows(NamedTuple):
         """One row, at so many stations."""
         return Rows(np.repeat(self.freedoms, count, axis=0), np.repeat(self.values, count, axis=0))
 
-    def of(self, state: Array) -> Array:
-        """(S,) products with states (n,), or with one state per row (S, n)."""
-        taken = state[self.freedoms] if state.ndim == 1 else np.take_along_axis(state, self.freedoms, axis=1)
-        return np.asarray(np.sum(self.values * taken, axis=1))
-
     def columns(self, size: int) -> Array:
         """(size, S) the same as dense columns."""
         found = np.zeros((size, len(self.freedoms)))

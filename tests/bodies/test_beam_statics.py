@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
-from engine.bodies.beam.statics import BeamStatics, beam_statics
 from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.waves import Support, hermite_model
@@ -32,9 +31,8 @@ def unit_beam(modes: int = 1, **how: Any) -> ModalBody:
     return uniform_beam(BeamProperties(1.0, 1.0, 1.0, 1.0, 1.0, **how), modes)
 
 
-def on_springs(*supports: Support) -> BeamStatics:
-    springs = tuple(Spring(at, k, k_r) for at, k, k_r in supports)
-    return beam_statics(1.0, 1.0, 1.0, BeamProperties(1.0, 1.0, 1.0, 1.0, 1.0, supports=springs).restraints)
+def on_springs(*supports: Support) -> ModalBody:
+    return unit_beam(supports=tuple(Spring(at, k, k_r) for at, k, k_r in supports))
 
 
 def modal_sum(body: ModalBody, x: Array, s: Array, derivative: int = 0) -> Array:

@@ -26,7 +26,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine.bodies.modal.modal_body import Array
+from engine.bodies.modal.modal_body import Array, refuse_loose
 from engine.kernels.influence import Functionals, functionals, influence
 from results_schema.errors import BadInput
 
@@ -186,13 +186,9 @@ class BeamStatics:
     rigid: Array
     inverse: Array
 
-    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
-        return self.influence_at(np.atleast_1d(x)[:, None], np.atleast_1d(s)[None, :], derivative)
-
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """The same for pairs, `x` and `s` broadcast against each other; summed in a fixed order, so that a value never
-        depends on its neighbours."""
+        """d^j/dx^j of the deflection at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast against each
+        other; summed in a fixed order, so that a value never depends on its neighbours."""
         left, right = stations(x, self.length, derivative), stations(s, self.length, 0)
         shape = np.broadcast_shapes(left.shape, right.shape)
         pairs = (
@@ -209,14 +205,7 @@ class BeamStatics:
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under the beam's own weight per unit gravity, m^(1-j)/(m/s^2)."""
-        if len(self.rigid):
-            raise BadInput(
-                "own weight of a body that is free to move as a rigid one",
-                where="supports",
-                expected="supports that hold the body",
-                received=f"{len(self.rigid)} rigid-body mode(s)",
-                remedy="pin it at two places, clamp it, or set it on two springs",
-            )
+        refuse_loose(len(self.rigid))
         place = stations(x, self.length, derivative)
         of = self._functionals
         load = [*(_even_load(one.at, one.order)[0] for one in self.restraints), -1.0, -0.5]

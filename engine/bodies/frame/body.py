@@ -19,10 +19,8 @@ from engine.bodies.frame.statics import TrackStatics, track_statics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Spots
-from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, without_rounding
+from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, solving, without_rounding
 from engine.bodies.modal.modal_body import Array, ModalBody, Shapes
-from engine.linear_algebra import one_thread
-from engine.study_file.document import shortened
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -41,23 +39,12 @@ def frame_body(frame: Frame, spots: Spots = ()) -> ModalBody:
 
 @lru_cache(maxsize=8)
 def _frame_body(content: Content, spots: Spots) -> ModalBody:
-    import scipy.linalg  # noqa: F401, its library is to be held too
-
-    try:
-        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
-            found = _reduced(content.frame, spots)
-            probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
-    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
-        raise _unsolvable(str(error)) from error
-    if not all(np.isfinite(part).all() for part in (found.omega, found.participation, probe, found.wave_number)):
-        raise _unsolvable("a result that is not finite")
-    return found
-
-
-def _unsolvable(reason: str) -> BadInput:
-    """The refusal of a frame whose numbers floats cannot hold together."""
     what = "the stiffnesses, masses or lengths of this frame differ too much to be solved"
-    return BadInput(what, where="section", expected="numbers of one scale", received=shortened(reason))
+    with solving(what, "section", "numbers of one scale") as demand_finite:
+        found = _reduced(content.frame, spots)
+        probe = found.influence_at([0.5 * found.length], [0.5 * found.length])
+        demand_finite(found.omega, found.participation, probe, found.wave_number)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,7 +119,7 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
         row=place.mode_row(read.omega, read.shapes),
         along=partial(_along, statics, response, place),
         points={name: float(loads[:, number] @ moved[:, 0]) for name, number in names.items()},
-        own_weight=partial(held_weight, statics.refuse_loose, weight),
+        own_weight=partial(held_weight, statics.rigid, weight),
     )
 
 

@@ -17,7 +17,7 @@ from engine.bodies.frame.elements import deflection_shapes, stiffness
 from engine.bodies.frame.shapes import FORCES, ModeForces
 from engine.bodies.frame.statics import TrackStatics, is_every_pair
 from engine.bodies.frame.track import TrackBeams, track_places
-from engine.bodies.modal.modal_body import Array
+from engine.bodies.modal.modal_body import Array, refuse_loose
 from results_schema.errors import BadInput
 
 Counts = NDArray[np.int64]
@@ -73,7 +73,7 @@ class TrackSections:
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
         """The same at `x` under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
-        self.statics.refuse_loose()
+        refuse_loose(self.statics.rigid)
         track = self.statics.track
         element, at = track.at(track_places(x, self.statics.length))
         spread = spread_forces(track, element, at, self.statics.spread[element])

@@ -57,7 +57,7 @@ class TrackShapes:
         x = np.clip((place - self.places[element]) / length, 0.0, 1.0)
         weights = np.empty((len(orders), len(place), SOURCES))
         for j, order in enumerate(orders):
-            weights[j] = (_quintic(x, order) * length ** (np.arange(SOURCES)[:, None] % 3 - order)).T
+            weights[j] = end_weights(_QUINTIC, x, length, order)
         found = np.empty((len(orders), len(place), self.values.shape[1]))
         combined_rows(SOURCES * element[:, None] + np.arange(SOURCES), weights, self._sources, found)
         return found
@@ -70,17 +70,16 @@ class TrackShapes:
         return np.stack([*left, *right], axis=1).reshape(-1, self.values.shape[1])
 
 
-def _quintic(x: Array, derivative: int) -> Array:
-    """(6, S) d^j/dx^j of the six shapes at x in [0, 1]."""
-    powers = np.arange(6)
-    table = _QUINTIC
+def end_weights(table: Array, x: Array, length: Array, derivative: int) -> Array:
+    """(S, n) d^j/ds^j at x (S,) in [0, 1] of elements of length (S,), per unit of the values and derivatives at one end,
+    then at the other; table (n, n): these as polynomials."""
+    powers, count = np.arange(len(table)), np.arange(len(table))
     for _ in range(derivative):
-        table = (table * powers)[:, 1:]
-        powers = powers[:-1]
-    found = np.zeros((6, len(x)))
+        table, powers = (table * powers)[:, 1:], powers[:-1]
+    found = np.zeros((len(count), len(x)))
     for coefficients in table.T[::-1]:
         found = found * x + coefficients[:, None]
-    return found
+    return (found * length ** (count[:, None] % (len(count) // 2) - derivative)).T
 
 
 @dataclass(frozen=True, eq=False)

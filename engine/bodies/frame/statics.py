@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from engine.bodies.frame.assembly import Assembly
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_places
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
-from engine.bodies.modal.modal_body import Array
-from results_schema.errors import BadInput
+from engine.bodies.modal.modal_body import Array, refuse_loose
 
 Counts = NDArray[np.int64]
 _ENDS = 32  # ends of elements whose loads are solved at a time
@@ -45,20 +44,23 @@ class TrackStatics:
         """Of the track, m."""
         return float(self.track.places[-1])
 
-    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
-        left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
-        place, load = np.broadcast_arrays(left[:, None], right)
-        return self._broadcast(place, load, derivative)
-
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """The same for pairs, `x` and `s` broadcast against each other; (X, 1) and (S,) are fast."""
+        """d^j/dx^j of the deflection at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast against each
+        other; (X, 1) and (S,) are fast."""
         left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
-        return self._broadcast(left, right, derivative)
+        if is_every_pair(left, right):
+            place = left.reshape(-1)
+            element, _ = self.track.at(place)
+            whole = self.lines(element, self.track.to_ends(place, derivative), right)
+            i, j = np.nonzero(element[:, None] == self.track.at(right)[0])
+            whole[i, j] += self.track.within(place[i], right[j], derivative)
+            return whole.reshape(np.broadcast_shapes(left.shape, right.shape))
+        place, load = np.broadcast_arrays(left, right)
+        return self._deflection(place.reshape(-1), load.reshape(-1), derivative).reshape(place.shape)
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under own weight per unit gravity, m^(1-j)/(m/s^2)."""
-        self.refuse_loose()
+        refuse_loose(self.rigid)
         place = track_places(x, self.length, derivative)
         found = self.under_response(self.weight, place, derivative)
         return np.asarray(found + self.track.under_spread_load(place, self.spread, derivative))
@@ -70,16 +72,6 @@ class TrackStatics:
         element, _ = self.track.at(place)
         moved = np.concatenate([ends[element], ends[element + 1]], axis=1)
         return np.asarray(np.sum(self.track.to_ends(place, derivative) * moved, axis=1))
-
-    def refuse_loose(self) -> None:
-        """Raise BadInput for a body that no static state can carry."""
-        if self.rigid:
-            raise BadInput(
-                "own weight of a body that is free to move as a rigid one",
-                where="supports",
-                expected="supports that hold the body",
-                received=f"{self.rigid} rigid-body mode(s)",
-            )
 
     def moved(self, element: Counts, s: Array) -> Array:
         """(S, 12) displacements and rotations of an element's ends under a unit load at s, pair by pair."""
@@ -109,17 +101,6 @@ class TrackStatics:
             for number, pattern in enumerate(self.patterns):
                 found += flexible[:, count * (other + end) + number] * np.sum(ends[:, end] * pattern, axis=1)
         return found
-
-    def _broadcast(self, x: Array, s: Array, derivative: int) -> Array:
-        if is_every_pair(x, s):
-            place = x.reshape(-1)
-            element, _ = self.track.at(place)
-            whole = self.lines(element, self.track.to_ends(place, derivative), s)
-            i, j = np.nonzero(element[:, None] == self.track.at(s)[0])
-            whole[i, j] += self.track.within(place[i], s[j], derivative)
-            return whole.reshape(np.broadcast_shapes(x.shape, s.shape))
-        place, load = np.broadcast_arrays(x, s)
-        return self._deflection(place.reshape(-1), load.reshape(-1), derivative).reshape(place.shape)
 
     def _deflection(self, x: Array, s: Array, derivative: int) -> Array:
         """Pair by pair, summed in a fixed order so that a value never depends on its neighbours."""

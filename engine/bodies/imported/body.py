@@ -11,14 +11,12 @@ import numpy as np
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.checks import findings
-from engine.bodies.imported.line import LinePoints, LineShapes, LineStatics, LineStress, NoSections
+from engine.bodies.imported.line import LineShapes, LineStatics, LineStress, NoSections
 from engine.bodies.imported.model import HeldModel, held_model
 from engine.bodies.imported.rows import node_rows, track_rows
 from engine.bodies.modal.description import AUTO_MODES, Spots
-from engine.bodies.modal.flexibility import Flexibility
-from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, held_weight
-from engine.linear_algebra import one_thread
-from engine.study_file.document import shortened
+from engine.bodies.modal.flexibility import Flexibility, solving
+from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, held_weight
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -51,27 +49,14 @@ def imported_body(body: Imported, spots: Spots = ()) -> ModalBody:
 
 @lru_cache(maxsize=8)
 def _imported_body(content: _Content, spots: Spots) -> ModalBody:
-    import scipy.linalg  # noqa: F401, its library is to be held too
-
-    try:
-        with one_thread(), np.errstate(all="ignore"):  # what is not finite is refused below
-            found = _modal_body(content.body, spots)
-    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
-        raise _unsolvable(str(error)) from error
-    statics = found.statics
-    assert isinstance(statics, LineStatics)
-    for part in (found.omega, found.participation, found.wave_number, statics.flexibility, statics.weight):
-        if not np.isfinite(part).all():
-            raise _unsolvable("a result that is not finite")
+    what = "the stiffnesses and masses of this model cannot be solved"
+    with solving(what, "supports", "a model that is held, of one scale") as demand_finite:
+        found, statics = _modal_body(content.body, spots)
+        demand_finite(found.omega, found.participation, found.wave_number, statics.flexibility, statics.weight)
     return found
 
 
-def _unsolvable(reason: str) -> BadInput:
-    what = "the stiffnesses and masses of this model cannot be solved"
-    return BadInput(what, where="supports", expected="a model that is held, of one scale", received=shortened(reason))
-
-
-def _modal_body(body: Imported, spots: Spots) -> ModalBody:
+def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
     held = held_model(body)
     rows, slopes = track_rows(body, held)
     omega, shapes = _modes(body, held)
@@ -90,9 +75,10 @@ def _modal_body(body: Imported, spots: Spots) -> ModalBody:
     )
     along = LineShapes(places, np.ascontiguousarray(ends))
     names, loads = _point_loads(body, held)
-    sections = _sections(body, held, statics, (shapes, rows, slopes, pull, loads))
+    parts = shapes, rows, slopes, pull, loads
+    sections, stresses = _sections(body, held, statics, parts)
     read = [(name, _node_load(body, held, spot.node, spot.direction)) for name, spot in spots]
-    return ModalBody(
+    found = ModalBody(
         length=body.length,
         mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
         omega=omega,
@@ -104,10 +90,11 @@ def _modal_body(body: Imported, spots: Spots) -> ModalBody:
         statics=statics,
         gravity_share=float(unit(body.direction) @ gravity),
         sections=sections,
-        points=_points(names, held, statics, sections, (shapes, rows, slopes, pull, loads)) if names else None,
-        gauges={name: _gauge(held, statics, load, (shapes, rows, slopes, pull, loads), names) for name, load in read},
+        points=_points(names, held, (statics, sections, stresses), parts) if names else None,
+        gauges={name: _gauge(held, statics, load, parts, names) for name, load in read},
         checks=findings(body, held, along),
     )
+    return found, statics
 
 
 def _modes(body: Imported, held: HeldModel) -> tuple[Array, Array]:
@@ -181,39 +168,40 @@ def _gauge(held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, na
     response = slopes @ (rows.T @ moved)
     return Gauge(
         row=load @ shapes,
-        along=partial(statics.under, response, derivative=0),
+        along=partial(statics.under_response, response, derivative=0),
         points={name: float(loads[:, number] @ moved) for name, number in names.items()},
-        own_weight=partial(held_weight, statics.refuse_loose, float(moved @ pull)),
+        own_weight=partial(held_weight, statics.rigid, float(moved @ pull)),
     )
 
 
 def _points(
-    names: dict[str, int], held: HeldModel, statics: LineStatics, sections: NoSections, parts: _Parts
-) -> LinePoints:
+    names: dict[str, int], held: HeldModel, track: tuple[LineStatics, NoSections, Array], parts: _Parts
+) -> Points:
     shapes, rows, slopes, pull, loads = parts
+    statics, sections, stresses = track
     moved = held.flexibility.solve(loads)
-    return LinePoints(
+    return Points(
         numbers=names,
         shapes=loads.T @ shapes,
         flexibility=loads.T @ moved,
         response=slopes @ (rows.T @ moved),
+        section_response=stresses,
         weight=moved.T @ pull,
+        rigid=statics.rigid,
         statics=statics,
         sections=sections,
     )
 
 
-def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> NoSections:
-    """Stress along the track where the body has a recovery matrix: means of rows at the track's nodes."""
-    if body.rows_of_stress is None:
-        return NoSections()
+def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> tuple[NoSections, Array]:
+    """Stress along the track where the body has a recovery matrix: means of rows at the track's nodes (P,); and (P, Q)
+    stress there per unit force at points."""
     shapes, rows, slopes, pull, loads = parts
+    if body.rows_of_stress is None:
+        return NoSections(), np.zeros((0, loads.shape[1]))
     told = np.array([held.recovery[np.array(one) - 1].mean(axis=0) for one in body.rows_of_stress])
     moved = held.flexibility.solve(np.ascontiguousarray(told.T))
-    return LineStress(
-        statics=statics,
-        values=told @ shapes,
-        response=(rows.T @ moved).T @ slopes.T,
-        weight=moved.T @ pull,
-        points=moved.T @ loads,
+    stress = LineStress(
+        statics=statics, values=told @ shapes, response=(rows.T @ moved).T @ slopes.T, weight=moved.T @ pull
     )
+    return stress, moved.T @ loads

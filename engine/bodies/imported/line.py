@@ -1,4 +1,4 @@
-"""The track of an imported body between its nodes: mode shapes, statics, and points beside it.
+"""The track of an imported body between its nodes: mode shapes, statics and stress.
 
 Between two nodes the deflection is the cubic of both values and slopes (mechanics section 1). Slopes are the nodes'
 rotations about the axis across track and load; or those of the C2 spline through the values (not-a-knot), where the
@@ -9,15 +9,16 @@ solve with this interpolation gives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from engine.bodies.frame.shapes import end_weights
 from engine.bodies.frame.track import track_places
-from engine.bodies.modal.modal_body import Array
+from engine.bodies.modal.modal_body import Array, refuse_loose
 from engine.kernels.shapes import combined_rows
 from results_schema.errors import BadInput
 
@@ -33,14 +34,7 @@ def cubics(places: Array, s: ArrayLike, derivative: int) -> tuple[Any, Array]:
     left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
     length = np.diff(places)[left]
     x = np.clip((at - places[left]) / length, 0.0, 1.0)
-    table, powers = _CUBIC, np.arange(4)
-    for _ in range(derivative):
-        table, powers = (table * powers)[:, 1:], powers[:-1]
-    weights = np.zeros((_ENDS, len(at)))
-    for coefficients in table.T[::-1]:
-        weights = weights * x + coefficients[:, None]
-    weights *= length ** (np.arange(_ENDS)[:, None] % 2 - derivative)
-    return 2 * left[:, None] + np.arange(_ENDS), weights.T
+    return 2 * left[:, None] + np.arange(_ENDS), end_weights(_CUBIC, x, length, derivative)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +62,9 @@ class LineStatics:
     weight: Array
     rigid: int
 
-    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S), m^(1-j)/N; j = 0..3."""
-        return self.influence_at(np.atleast_1d(x)[:, None], np.atleast_1d(s)[None, :], derivative)
-
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """The same for pairs, `x` and `s` broadcast against each other; summed in a fixed order."""
+        """d^j/dx^j of the deflection at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast against each
+        other; summed in a fixed order."""
         place, load = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(s))
         taken, takes = cubics(self.places, place.reshape(-1), derivative)
         acting, acts = cubics(self.places, load.reshape(-1), 0)
@@ -85,22 +76,13 @@ class LineStatics:
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under own weight per unit gravity, m^(1-j)/(m/s^2)."""
-        self.refuse_loose()
-        return self.under(self.weight, x, derivative)
+        refuse_loose(self.rigid)
+        return self.under_response(self.weight, x, derivative)
 
-    def under(self, ends: Array, x: ArrayLike, derivative: int) -> Array:
-        """(X,) d^j/dx^j of the deflection where values and slopes are `ends` (2 P,)."""
+    def under_response(self, response: Array, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) where values and slopes are `response` (2 P,)."""
         numbers, weights = cubics(self.places, x, derivative)
-        return np.asarray(np.sum(weights * ends[numbers], axis=1))
-
-    def refuse_loose(self) -> None:
-        """Raise BadInput for a body that no static state can carry."""
-        if self.rigid:
-            what, received = (
-                "own weight of a body that is free to move as a rigid one",
-                f"{self.rigid} rigid-body mode(s)",
-            )
-            raise BadInput(what, where="supports", expected="supports that hold the body", received=received)
+        return np.asarray(np.sum(weights * response[numbers], axis=1))
 
 
 class NoSections:
@@ -118,7 +100,7 @@ class NoSections:
         """Raises BadInput."""
         self._refuse(quantity)
 
-    def under_point(self, quantity: str, number: int, x: ArrayLike) -> Array:
+    def under_response(self, quantity: str, response: Array, x: ArrayLike) -> Array:
         """Raises BadInput."""
         self._refuse(quantity)
 
@@ -130,13 +112,12 @@ class NoSections:
 @dataclass(frozen=True, eq=False)
 class LineStress(NoSections):
     """Stress at the nodes of a track, linear in between: of N modes, values (P, N); per unit value and slope loads,
-    response (P, 2 P); under own weight per unit gravity, weight (P,); per unit force at points, points (P, Q)."""
+    response (P, 2 P); under own weight per unit gravity, weight (P,)."""
 
     statics: LineStatics
     values: Array
     response: Array
     weight: Array
-    points: Array
 
     def rows(self, quantity: str, s: ArrayLike) -> Array:
         """Stress of every mode at the stations `s` (S,), as (S, N). Raises BadInput for another quantity."""
@@ -156,12 +137,12 @@ class LineStress(NoSections):
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
         """Stress at `x` (X,) under the body's own weight, per unit gravity."""
-        self.statics.refuse_loose()
-        return self._along(quantity, x, self.weight[:, None])[:, 0]
+        refuse_loose(self.statics.rigid)
+        return self.under_response(quantity, self.weight, x)
 
-    def under_point(self, quantity: str, number: int, x: ArrayLike) -> Array:
-        """Stress at `x` (X,) per unit force at a point."""
-        return self._along(quantity, x, self.points[:, [number]])[:, 0]
+    def under_response(self, quantity: str, response: Array, x: ArrayLike) -> Array:
+        """Stress at `x` (X,) where it is `response` (P,) at the nodes."""
+        return self._along(quantity, x, response[:, None])[:, 0]
 
     def _along(self, quantity: str, x: ArrayLike, values: Array) -> Array:
         left, share = self._between(quantity, x)
@@ -175,38 +156,3 @@ class LineStress(NoSections):
         at = track_places(x, float(places[-1]))
         left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
         return left, (at - places[left]) / np.diff(places)[left]
-
-
-@dataclass(frozen=True, eq=False)
-class LinePoints:
-    """Points by name: shapes (Q, N), kg^(-1/2); flexibility (Q, Q), m/N; response (2 P, Q) of the track's values and
-    slopes to a unit force at each; weight (Q,): motion under own weight per unit gravity."""
-
-    numbers: Mapping[str, int]
-    shapes: Array
-    flexibility: Array
-    response: Array
-    weight: Array
-    statics: LineStatics
-    sections: NoSections
-
-    def row(self, name: str) -> Array:
-        """(N,) what every mode moves a point by."""
-        return np.asarray(self.shapes[self.numbers[name]])
-
-    def influence(self, name: str, x: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` (X,) of the track per unit force at a point."""
-        return self.statics.under(self.response[:, self.numbers[name]], x, derivative)
-
-    def section_influence(self, quantity: str, name: str, x: ArrayLike) -> Array:
-        """Stress at `x` (X,) of the track per unit force at a point. Raises BadInput for other quantities."""
-        return self.sections.under_point(quantity, self.numbers[name], x)
-
-    def between(self, name: str, other: str) -> float:
-        """Motion of a point per unit force at another one, m/N."""
-        return float(self.flexibility[self.numbers[name], self.numbers[other]])
-
-    def own_weight(self, name: str) -> float:
-        """Motion of a point under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
-        self.statics.refuse_loose()
-        return float(self.weight[self.numbers[name]])

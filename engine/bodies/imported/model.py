@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.bodies.files.model import FileModel
 from engine.bodies.frame.assembly import cross_matrix
-from engine.bodies.modal.flexibility import Flexibility, factorised
+from engine.bodies.modal.flexibility import Flexibility, factorised, symmetric_lu
 from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
 
@@ -132,18 +132,12 @@ def _refuse_negative_mass(mass: Any) -> None:
     scale = diags_array(1.0 / np.sqrt(diagonal[rows]))
     shifted = (scale @ mass[rows][:, rows] @ scale + _NEGATIVE * diags_array(np.ones(len(rows)))).tocsc()
     try:
-        factor = _factor(shifted)
+        factor = symmetric_lu(shifted)
     except RuntimeError:
         return  # exactly singular: not negative
     if np.array_equal(factor.perm_r, factor.perm_c) and (factor.U.diagonal() < 0.0).any():
         count = int(np.count_nonzero(factor.U.diagonal() < 0.0))
         raise BadInput("the mass matrix is not positive", where="mass", received=f"{count} negative eigenvalue(s)")
-
-
-def _factor(matrix: Any) -> Any:
-    from scipy.sparse.linalg import splu
-
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _factorised(file: FileModel, free: Counts, stiffness: Any, mass: Any, motion: Array) -> Flexibility:

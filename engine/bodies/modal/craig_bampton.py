@@ -44,13 +44,6 @@ class Reduction:
         omega, shapes = pair.modes(size)
         return omega, self.basis @ shapes
 
-    def response(self, loads: Array) -> Array:
-        """(n, c) static displacements of a held model under loads (b, c) on the interface."""
-        size = len(self.stiffness)
-        whole = np.zeros((size, loads.shape[1]))
-        whole[: len(self.interface)] = loads
-        return np.asarray(self.basis @ np.linalg.solve(self.stiffness, whole))
-
 
 def reduce_model(
     stiffness: csc_array, mass: csc_array, interface: Counts, interior_rigid: Array, fixed_modes: int

@@ -7,12 +7,17 @@ nonzero eigenvalues (with M) are 1/omega^2 of the elastic modes.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from engine.bodies.modal.modal_body import Array
+from engine.linear_algebra import one_thread
+from engine.study_file.document import shortened
+from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -118,7 +123,7 @@ class Flexibility:
         """Elastic eigenvalues below a number; None where the factorisation does not tell."""
         from scipy.sparse import csc_array
 
-        factor = _factorise(csc_array(self.stiffness - shift * self.mass))
+        factor = symmetric_lu(csc_array(self.stiffness - shift * self.mass))
         if not np.array_equal(factor.perm_r, factor.perm_c):
             return None
         negative: Array = factor.U.diagonal() < 0.0
@@ -154,13 +159,13 @@ def factorised(stiffness: csc_array, mass: csc_array, rigid: Array) -> Flexibili
     from scipy.linalg import qr
 
     count = rigid.shape[1]
-    modes = _of_unit_mass(rigid, mass)
+    modes = of_unit_mass(rigid, mass)
     held = qr(rigid.T, mode="r", pivoting=True)[1][:count] if count else np.zeros(0, dtype=np.int64)
     kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
-    return Flexibility(stiffness, mass, modes, kept, _factorise(stiffness[kept][:, kept].tocsc()))
+    return Flexibility(stiffness, mass, modes, kept, symmetric_lu(stiffness[kept][:, kept].tocsc()))
 
 
-def _of_unit_mass(rigid: Array, mass: Any) -> Array:
+def of_unit_mass(rigid: Array, mass: Any) -> Array:
     """The same motions with R^T M R = 1."""
     if not rigid.shape[1]:
         return rigid
@@ -168,7 +173,25 @@ def _of_unit_mass(rigid: Array, mass: Any) -> Array:
     return np.asarray(np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), rigid.T).T)
 
 
-def _factorise(matrix: Any) -> Any:
+@contextmanager
+def solving(what: str, where: str, expected: str) -> Iterator[Callable[..., None]]:
+    """One thread of linear algebra, and a refusal of what fails, or of arrays in which the function that it gives finds
+    what is not finite. Raises BadInput."""
+    import scipy.linalg  # noqa: F401, its library is to be held too
+
+    def demand_finite(*parts: Array) -> None:
+        if not all(np.isfinite(part).all() for part in parts):
+            raise ArithmeticError("a result that is not finite")
+
+    try:
+        with one_thread(), np.errstate(all="ignore"):
+            yield demand_finite
+    except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
+        raise BadInput(what, where=where, expected=expected, received=shortened(str(error))) from error
+
+
+def symmetric_lu(matrix: Any) -> Any:
+    """The factors of a sparse symmetric matrix, whose pivots stay on the diagonal: their signs count eigenvalues."""
     from scipy.sparse.linalg import splu
 
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -10,6 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from results_schema.errors import BadInput
+
 Array = NDArray[np.float64]
 
 # an end whose modes all move by less than this part of the largest at some places along the track does not move
@@ -26,11 +28,8 @@ class Shapes(Protocol):
 class Statics(Protocol):
     """Static flexibility of a body along its track (elastic part only, see `ModalBody.influence`)."""
 
-    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
-        """d^j/dx^j of the deflection at `x` (X,) per unit force at `s` (S,), as (X, S)."""
-
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
-        """The same for pairs: `x` and `s` are broadcast against each other."""
+        """d^j/dx^j of the deflection at `x` per unit force at `s`, for pairs that are broadcast against each other."""
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under the body's own weight, per unit gravity."""
@@ -48,28 +47,68 @@ class Sections(Protocol):
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
         """The quantity at `x` (X,) under the body's own weight, per unit gravity."""
 
+    def under_response(self, quantity: str, response: Array, x: ArrayLike) -> Array:
+        """The quantity at `x` (X,) by a response of the body, see `Points`."""
 
-class Points(Protocol):
-    """Points of a body off its track, by name: where shoes, sensors and dampers stand."""
 
-    @property
-    def numbers(self) -> Mapping[str, int]:
-        """The points' names."""
+class Responding(Protocol):
+    """Statics of a model whose track follows from the motions of some of its points."""
+
+    def under_response(self, response: Array, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` (X,) where those points move by `response`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of a body off its track, by name: where shoes, sensors and dampers stand.
+
+    A point is one number of the body's motion, v = r . u; a unit force there is the load r, so that one static solution
+    tells what it does to the track and what a load on the track does to it (Maxwell). shapes (P, N), kg^(-1/2);
+    flexibility (P, P), m/N; response, section_response (..., P) to a unit force at each point, as statics and sections
+    take them; weight (P,): motion under own weight per unit gravity; rigid: number of rigid-body modes.
+    """
+
+    numbers: Mapping[str, int]
+    shapes: Array
+    flexibility: Array
+    response: Array
+    section_response: Array
+    weight: Array
+    rigid: int
+    statics: Responding
+    sections: Sections
 
     def row(self, name: str) -> Array:
-        """(N,) what every mode moves a point by, kg^(-1/2)."""
+        """(N,) what every mode moves a point by."""
+        return np.asarray(self.shapes[self.numbers[name]])
 
     def influence(self, name: str, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) of the track per unit force at a point; and the other way round."""
+        return self.statics.under_response(self.response[:, self.numbers[name]], x, derivative)
 
     def section_influence(self, quantity: str, name: str, x: ArrayLike) -> Array:
         """A section force, stress or strain at `x` (X,) of the track per unit force at a point."""
+        return self.sections.under_response(quantity, self.section_response[:, self.numbers[name]], x)
 
     def between(self, name: str, other: str) -> float:
         """Motion of a point per unit force at another one, m/N."""
+        return float(self.flexibility[self.numbers[name], self.numbers[other]])
 
     def own_weight(self, name: str) -> float:
-        """Motion of a point under the body's own weight, per unit gravity."""
+        """Motion of a point under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
+        return held_weight(self.rigid, float(self.weight[self.numbers[name]]))
+
+
+def refuse_loose(rigid: int) -> None:
+    """Raise BadInput for a body with rigid-body modes, which no static state can carry."""
+    if rigid:
+        raise BadInput(
+            "own weight of a body that is free to move as a rigid one",
+            where="supports",
+            expected="supports that hold the body",
+            received=f"{rigid} rigid-body mode(s)",
+            remedy="pin it at two places, clamp it, or set it on two springs",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +129,9 @@ class Gauge:
         return np.array([self.points[loaded]]) if isinstance(loaded, str) else self.along(loaded)
 
 
-def held_weight(refuse_loose: Callable[[], None], weight: float) -> float:
-    """The motion under own weight of a place of a body that is held, else what `refuse_loose` raises."""
-    refuse_loose()
+def held_weight(rigid: int, weight: float) -> float:
+    """The motion under own weight of a place of a body. Raises BadInput where this has rigid-body modes."""
+    refuse_loose(rigid)
     return weight
 
 
@@ -167,7 +206,8 @@ class ModalBody:
         is the inertia relief: the force is balanced by the body's rigid acceleration and the result is
         orthogonal to the rigid-body modes. Jumps and errors as in `shape`.
         """
-        return self.statics.influence(x, s, derivative)
+        place, load = np.broadcast_arrays(np.atleast_1d(x)[:, None], np.atleast_1d(s))
+        return self.statics.influence_at(place, load, derivative)
 
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """`influence` for pairs of places, broadcast against each other (sensors under a carriage: x = s)."""

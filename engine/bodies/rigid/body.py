@@ -36,10 +36,6 @@ class RigidShapes:
 class RigidStatics:
     """Nothing bends."""
 
-    def influence(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
-        """Zero, as (X, S)."""
-        return np.zeros((np.size(x), np.size(s)))
-
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
         """Zero, for pairs."""
         return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(s)))
