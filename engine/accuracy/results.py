@@ -1,13 +1,14 @@
 """Every number that a study reports of a variant, the tolerance that it is held to, and how far two marches differ.
 
-Results come in families (`FAMILIES`); a family names its results and tells by how much each differs between two
-outcomes, over the scale that the second one has.
+Results come in families (`FAMILIES`); a family names its results, and what tells by how much each differs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +39,11 @@ class Result(NamedTuple):
     follows: bool = False
 
 
-class Pair(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Pair:
     """Two outcomes of the same variants of a scene. apart (S, V): the largest difference of the histories of every
-    signal at common stations."""
+    signal at common stations. Its methods tell by how much a result differs, (V,), over the scale that the second has.
+    """
 
     asked: Asked
     model: SceneModel
@@ -52,113 +55,100 @@ class Pair(NamedTuple):
     def gap(self, name: str) -> Array:
         """|difference| of a result; 0 where neither has a number, infinite where only one has."""
         left, right = self.one.numbers[name], self.other.numbers[name]
-        gap = np.where(np.isnan(left) & np.isnan(right), 0.0, np.abs(left - right))
+        gap: Array = np.where(np.isnan(left) & np.isnan(right), 0.0, np.abs(left - right))
         return np.where(np.isnan(gap), np.inf, gap)
 
-    @property
-    def length(self) -> float:
-        """m of the first carriage's track."""
-        return self.model.riders[0].length
+    def reading(self, name: str, sensor: int) -> Array:
+        """An extreme or root mean square of a sensor, no less than a part of what its histories differ by."""
+        gap = np.maximum(self.gap(name), HISTORY_PART * self.apart[sensor])
+        return np.asarray(gap / self.other.scale[:, sensor])
+
+    def place(self, name: str) -> Array:
+        """A place, over the length of the first carriage's track."""
+        return self.gap(name) / self.model.riders[0].length
+
+    def history(self, sensor: int) -> Array:
+        """A kept history."""
+        return np.asarray(self.apart[sensor] / self.other.scale[:, sensor])
+
+    def acceleration(self, signal: int) -> Array:
+        """The history of a carriage's acceleration, over its largest."""
+        return _over(self.apart[signal], np.nanmax(np.abs(self.other.history[:, signal]), axis=0, initial=0.0))
+
+    def contact_force(self, name: str, carriage: int) -> Array:
+        """An extreme of a contact force, over the weight."""
+        forces = contact_forces(self.model)
+        histories = self.apart[len(self.apart) - len(forces) :]
+        apart = histories[[force.carriage == carriage for force in forces]].max(axis=0)
+        return _over(np.maximum(self.gap(name), HISTORY_PART * apart), np.abs(self._weights[carriage]))
+
+    def envelope(self, name: str) -> Array:
+        """Extremes along a body, over the largest anywhere."""
+        return _over(np.max(self.gap(name), axis=1), np.max(np.abs(self.other.numbers[name]), axis=1))
+
+    def cycle(self, name: str, sensor: int) -> Array:
+        """What the kind of study makes of the history of a cycle."""
+        return np.asarray(np.where(np.isinf(self.other.scale), 0.0, self._cycles[name])[:, sensor])
+
+    @cached_property
+    def _weights(self) -> Array:
+        return weights(self.model, self.values)
+
+    @cached_property
+    def _cycles(self) -> Mapping[str, Array]:
+        assert self.asked.reduction is not None
+        apart = self.apart[: len(self.asked.study.sensor)]
+        compared = Compared(self.one.numbers, self.other.numbers, self.other.scale, apart, self.values)
+        return self.asked.reduction.differences(compared)
 
 
-class Family(Protocol):
-    """Results of one sort, in the same order in both."""
-
-    def results(self, asked: Asked) -> Iterator[Result]:
-        """What a study has of them."""
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        """(V,) how far each is apart, over its scale."""
+Entry = tuple[Result, Callable[[Pair], Array]]  # and how far it is apart
 
 
-class OfSensors:
-    """Extremes, root mean squares, the carriage's places at extremes, and kept histories."""
+def _of_sensors(asked: Asked) -> Iterator[Entry]:
+    for j, (name, sensor) in enumerate(asked.study.sensor.items()):
+        held = _held(asked.study, sensor.quantity, sensor.tolerance)
+        for own in (f"{name}_{end}" for end in EXTREMES):
+            yield Result(own, name, *held), partial(Pair.reading, name=own, sensor=j)
+        for own in (f"{name}_{end}_position" for end in ENDS):
+            yield Result(own, name), partial(Pair.place, name=own)
+        if asked.keeps_histories:
+            yield Result(name, name, *held), partial(Pair.history, sensor=j)
 
-    def results(self, asked: Asked) -> Iterator[Result]:
-        for name, sensor in asked.study.sensor.items():
+
+def _of_accelerations(asked: Asked) -> Iterator[Entry]:
+    for j, name in enumerate(asked.study.carriage if asked.accelerated else (), start=len(asked.study.sensor)):
+        yield Result(f"{name}_acceleration_across", name), partial(Pair.acceleration, signal=j)
+
+
+def _of_contact_forces(asked: Asked) -> Iterator[Entry]:
+    for c, name in enumerate(asked.study.carriage):
+        for own in (f"{name}_contact_force_{end}" for end in ENDS):
+            yield Result(own, name), partial(Pair.contact_force, name=own, carriage=c)
+        own = f"{name}_contact_force_min_position"
+        yield Result(own, name), partial(Pair.place, name=own)
+
+
+def _of_envelopes(asked: Asked) -> Iterator[Entry]:
+    for name in envelope_names(asked.study):
+        own = name.rpartition("_envelope_")[0]
+        held = _held(asked.study, asked.study.envelope[own].quantity, None)
+        yield Result(name, own, *held), partial(Pair.envelope, name=name)
+
+
+def _of_cycles(asked: Asked) -> Iterator[Entry]:
+    for result in () if asked.reduction is None else asked.reduction.compared:
+        for j, (name, sensor) in enumerate(asked.study.sensor.items()):
             held = _held(asked.study, sensor.quantity, sensor.tolerance)
-            yield from (Result(f"{name}_{end}", name, *held) for end in EXTREMES)
-            yield from (Result(f"{name}_{end}_position", name) for end in ENDS)
-            if asked.keeps_histories:
-                yield Result(name, name, *held)
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        for j, name in enumerate(pair.asked.study.sensor):
-            scale = pair.other.scale[:, j]
-            for end in EXTREMES:
-                yield np.maximum(pair.gap(f"{name}_{end}"), HISTORY_PART * pair.apart[j]) / scale
-            yield from (pair.gap(f"{name}_{end}_position") / pair.length for end in ENDS)
-            if pair.asked.keeps_histories:
-                yield pair.apart[j] / scale
+            yield Result(f"{result} {name}", name, *held), partial(Pair.cycle, name=result, sensor=j)
 
 
-class OfAccelerations:
-    """Histories of the accelerations of the carriages, which stand behind the sensors."""
-
-    def results(self, asked: Asked) -> Iterator[Result]:
-        for name in asked.study.carriage if asked.accelerated else ():
-            yield Result(f"{name}_acceleration_across", name)
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        first, last = len(pair.asked.study.sensor), len(pair.apart) - len(contact_forces(pair.model))
-        for j in range(first, last):
-            yield _over(pair.apart[j], np.nanmax(np.abs(pair.other.history[:, j]), axis=0, initial=0.0))
-
-
-class OfContactForces:
-    """Extremes of the contact forces over the weight, and the carriage's place at the smallest."""
-
-    def results(self, asked: Asked) -> Iterator[Result]:
-        for name in asked.study.carriage:
-            yield from (Result(f"{name}_contact_force_{end}", name) for end in ENDS)
-            yield Result(f"{name}_contact_force_min_position", name)
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        forces, weight = contact_forces(pair.model), np.abs(weights(pair.model, pair.values))
-        histories = pair.apart[len(pair.apart) - len(forces) :]
-        for c, name in enumerate(pair.asked.study.carriage):
-            apart = histories[[force.carriage == c for force in forces]].max(axis=0)
-            for end in ENDS:
-                yield _over(np.maximum(pair.gap(f"{name}_contact_force_{end}"), HISTORY_PART * apart), weight[c])
-            yield pair.gap(f"{name}_contact_force_min_position") / pair.length
-
-
-class OfEnvelopes:
-    """Extremes along bodies, over the largest anywhere."""
-
-    def results(self, asked: Asked) -> Iterator[Result]:
-        for name in envelope_names(asked.study):
-            own = name.rpartition("_envelope_")[0]
-            yield Result(name, own, *_held(asked.study, asked.study.envelope[own].quantity, None))
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        for name in envelope_names(pair.asked.study):
-            yield _over(np.max(pair.gap(name), axis=1), np.max(np.abs(pair.other.numbers[name]), axis=1))
-
-
-class OfCycles:
-    """What the kind of study makes of the histories of a cycle."""
-
-    def results(self, asked: Asked) -> Iterator[Result]:
-        for result in () if asked.reduction is None else asked.reduction.compared:
-            for name, sensor in asked.study.sensor.items():
-                yield Result(f"{result} {name}", name, *_held(asked.study, sensor.quantity, sensor.tolerance))
-
-    def differences(self, pair: Pair) -> Iterator[Array]:
-        if pair.asked.reduction is not None:
-            scale = pair.other.scale
-            apart = pair.apart[: len(pair.asked.study.sensor)]
-            compared = Compared(pair.one.numbers, pair.other.numbers, scale, apart, pair.values)
-            for gaps in pair.asked.reduction.differences(compared).values():
-                yield from np.where(np.isinf(scale), 0.0, gaps).T
-
-
-FAMILIES: tuple[Family, ...] = (OfSensors(), OfAccelerations(), OfContactForces(), OfEnvelopes(), OfCycles())
+FAMILIES = (_of_sensors, _of_accelerations, _of_contact_forces, _of_envelopes, _of_cycles)
 
 
 def results_of(asked: Asked) -> tuple[Result, ...]:
     """All results of a study whose error is measured, in the order of `differences`."""
-    return tuple(result for family in FAMILIES for result in family.results(asked))
+    return tuple(result for family in FAMILIES for result, _ in family(asked))
 
 
 def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Outcome, other: Outcome) -> Array:
@@ -166,7 +156,7 @@ def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Out
     Infinite where only ``one`` has diverged, NaN where the other has."""
     with np.errstate(invalid="ignore", over="ignore"):  # of those that have diverged
         pair = Pair(asked, model, values, one, other, _apart(one, other))
-        found = np.stack([gap for family in FAMILIES for gap in family.differences(pair)])
+        found = np.stack([apart(pair) for family in FAMILIES for _, apart in family(asked)])
     found[:, one.status >= Status.NOT_CONVERGED] = np.inf
     found[:, other.status >= Status.NOT_CONVERGED] = np.nan
     return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,29 +38,30 @@ BEAM_ELEMENTS = 64
 MOST_SUPPORTS = 50
 
 
-class FullTrack(Protocol):
-    """What places on a track read, as rows on the degrees of freedom of the body."""
+@dataclass(frozen=True)
+class RigidTrack:
+    """Heave (m) and pitch (rad) about the centre of mass at `centre`, m; otherwise as `FrameTrack`."""
+
+    centre: float
 
     def rows(self, s: Array, derivative: int = 0) -> Rows:
-        """d^j/ds^j of the deflection."""
+        found = no_rows(len(s))
+        found.values[:, 0] = float(derivative == 0)
+        found.values[:, 1] = s - self.centre if derivative == 0 else float(derivative == 1)
+        found.freedoms[:, 1] = 1
+        return found
 
-    def within(self, x: Array, s: Array) -> Array:
-        """Deflection at x that the element's own bending between its ends adds per unit force at s, m/N."""
+    def within(self, x: Array, s: Array, quantity: str = "displacement") -> Array:
+        return np.zeros(np.broadcast_shapes(x.shape, s.shape))
 
     def inside(self, s: Array) -> tuple[Array, Array]:
-        """Places on the same elements, off their ends by the steps that come with them, m."""
+        return s, np.ones(len(s))
 
-    def under_weight(self, x: Array) -> Array:
-        """The same per unit gravity under own weight."""
+    def under_weight(self, x: Array, quantity: str = "displacement") -> Array:
+        return np.zeros(len(x))
 
     def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
-        """A section force, stress or strain, from displacements and from accelerations."""
-
-    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
-        """What a unit force at s adds to it where it stands on the element of x."""
-
-    def sections_under_weight(self, quantity: str, x: Array) -> Array:
-        """What own weight on the element adds per unit gravity."""
+        raise BadInput("a rigid body has no section forces", where="quantity", received=quantity)
 
 
 class Damping(NamedTuple):
@@ -97,7 +98,7 @@ class FullBody:
     pull: Array
     damping: Damping
     flexibility: Flexibility | None
-    track: FullTrack
+    track: FrameTrack | RigidTrack
     points: dict[str, Array]
     gauges: Mapping[str, FullGauge] = field(default_factory=dict)
     gravity_share: float = 1.0
@@ -264,38 +265,6 @@ def _kept(body: Body, frame: Frame, assembly: Assembly, flexibility: Flexibility
     count = AUTO_MODES if body.modes == "auto" else int(body.modes)
     omega, shapes = flexibility.modes(min(count, len(assembly.free)))
     return omega[:count], shapes[:, :count]
-
-
-@dataclass(frozen=True)
-class RigidTrack:
-    """Heave (m) and pitch (rad) about the centre of mass at `centre`, m."""
-
-    centre: float
-
-    def rows(self, s: Array, derivative: int = 0) -> Rows:
-        found = no_rows(len(s), 2)
-        found.values[:, 0] = float(derivative == 0)
-        found.values[:, 1] = s - self.centre if derivative == 0 else float(derivative == 1)
-        found.freedoms[:, 1] = 1
-        return found
-
-    def within(self, x: Array, s: Array) -> Array:
-        return np.zeros(np.broadcast_shapes(x.shape, s.shape))
-
-    def inside(self, s: Array) -> tuple[Array, Array]:
-        return s, np.ones(len(s))
-
-    def under_weight(self, x: Array) -> Array:
-        return np.zeros(len(x))
-
-    def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
-        raise BadInput("a rigid body has no section forces", where="quantity", received=quantity)
-
-    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
-        return np.zeros(np.broadcast_shapes(x.shape, s.shape))
-
-    def sections_under_weight(self, quantity: str, x: Array) -> Array:
-        return np.zeros(len(x))
 
 
 def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:

@@ -133,6 +133,4 @@ def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array
 def _standing(whole: Unreduced, tables: SceneTables, counts: Counts) -> Along:
     """All riders at rest where they are at stations by their count."""
     places = np.stack([tables.timeline.positions(r, counts) for r in range(len(whole.riders))], axis=1)
-    on = np.isfinite(places)
-    still = np.zeros_like(places)
-    return Along(np.where(on, np.clip(places, 0.0, [rider.length for rider in whole.riders]), 0.0), still, still, on)
+    return Along.at_rest(places, np.isfinite(places), whole.riders)

@@ -112,9 +112,7 @@ def _start(model: Unreduced, course: Course) -> tuple[Array, Array]:
     riders = course.timeline.riders
     places = np.array([[float(rider.motion.path(0.0).S) + rider.offset for rider in riders]])
     on = np.array([[rider.touches(0.0, 1e-9) for rider in riders]])
-    still = np.zeros_like(places)
-    along = Along(np.where(on, np.clip(places, 0.0, [rider.length for rider in riders]), 0.0), still, still, on)
-    return statics_at(model, along).states[0], np.zeros(model.size)
+    return statics_at(model, Along.at_rest(places, on, riders)).states[0], np.zeros(model.size)
 
 
 @dataclass(frozen=True, eq=False)

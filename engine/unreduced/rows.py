@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from engine.model.timeline import Rider
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
@@ -27,6 +28,13 @@ class Along(NamedTuple):
     ds: Array
     dds: Array
     on: Flags
+
+    @classmethod
+    def at_rest(cls, places: Array, on: Flags, riders: Sequence[Rider]) -> Along:
+        """Riders that stand still at places (S, R) of their tracks where they are on them."""
+        still = np.zeros_like(places)
+        lengths = [rider.length for rider in riders]
+        return cls(np.where(on, np.clip(places, 0.0, lengths), 0.0), still, still, on)
 
     def some(self, which: NDArray[np.bool_] | slice) -> Along:
         """Some of the stations."""
@@ -49,8 +57,7 @@ def at_positions(model: Unreduced, positions: ArrayLike) -> Along:
     place = given[:, owners] + offsets
     with np.errstate(invalid="ignore"):
         on = (place >= -1e-12 * lengths) & (place <= lengths * (1.0 + 1e-12))
-    still = np.zeros_like(place)
-    return Along(np.where(on, np.clip(place, 0.0, lengths), 0.0), still, still, on)
+    return Along.at_rest(place, on, model.riders)
 
 
 def nowhere(model: Unreduced) -> Along:
@@ -63,7 +70,7 @@ def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
     """(S, T, 12) d^j/ds^j of the deflection under every tie, zero where it is off the body."""
     index, values = [np.zeros((len(along.s), 0, WIDTH), dtype=np.int64)], [np.zeros((len(along.s), 0, WIDTH))]
     for tie in model.ties:
-        rows = _wide(model.bodies[tie.body].track.rows(along.s[:, tie.rider], derivative))
+        rows = model.bodies[tie.body].track.rows(along.s[:, tie.rider], derivative)
         index.append((rows.freedoms + model.firsts[tie.body])[:, None])
         values.append((rows.values * along.on[:, tie.rider, None])[:, None])
     return Rows(np.concatenate(index, axis=1), np.concatenate(values, axis=1))
@@ -220,14 +227,14 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     if sensor.reads.of_section:
         moved, inertia = track.sections(sensor.quantity, place)
         return _Parts(moved.moved(first), none, inertia.values)
-    shape = _wide(track.rows(place).moved(first))
+    shape = track.rows(place).moved(first)
     if rate == 0:
         return _Parts(shape, none, none)
     on_u, on_v, on_a = none, none, shape.values
     if rate == 1:
         on_v, on_a = shape.values, none
     if rider is not None:
-        slope, bend = (_wide(track.rows(place, order)).values for order in (1, 2))
+        slope, bend = (track.rows(place, order).values for order in (1, 2))
         ds, dds = along.ds[:, rider, None], along.dds[:, rider, None]
         if rate == 1:
             on_u = ds * slope
@@ -247,13 +254,12 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
     body = model.study.body_of(name)
     track, gauge = model.bodies[body].track, model.bodies[body].gauges.get(name)
     place, _ = _place(model, sensor, along)
-    section = sensor.reads.of_section
     forces = np.zeros((len(along.s), len(model.ties)))
 
     def adds(s: Array) -> Array:
         if gauge is not None:
             return gauge.within(s)
-        return track.sections_within(sensor.quantity, place, s) if section else track.within(place, s)
+        return track.within(place, s, sensor.quantity)
 
     for j, tie in enumerate(model.ties):
         if tie.body == body:
@@ -261,10 +267,8 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
         if tie.rides == body and tie.at is not None:
             forces[:, j] -= adds(np.full(len(place), tie.at))
     added = np.zeros(len(place))
-    if _weighs(model.study, body) and gauge is not None:
-        added += gauge.under_weight * model.study.gravity
-    elif _weighs(model.study, body):
-        spread = track.sections_under_weight(sensor.quantity, place) if section else track.under_weight(place)
+    if _weighs(model.study, body):
+        spread = track.under_weight(place, sensor.quantity) if gauge is None else gauge.under_weight
         added += spread * model.study.gravity
     return forces, added
 
@@ -272,12 +276,3 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
 def _weighs(study: Study, body: str) -> bool:
     """Whether own weight on the body's elements counts; it cancels where a body that rides counts from its rest."""
     return study.body[body].own_weight and all(carriage.riding_body != body for carriage in study.carriage.values())
-
-
-def _wide(rows: Rows) -> Rows:
-    """The same with 12 entries per row."""
-    more = WIDTH - rows.freedoms.shape[1]
-    if more == 0:
-        return rows
-    pad = ((0, 0), (0, more))
-    return Rows(np.pad(rows.freedoms, pad, mode="edge"), np.pad(rows.values, pad))

@@ -82,8 +82,7 @@ def level_readings(model: Unreduced) -> Array:
 def statics_at(model: Unreduced, along: Along) -> Statics:
     """Static states at stations, whatever the speed there."""
     _check_held(model)
-    still = np.zeros_like(along.s)
-    resting = Along(along.s, still, still, along.on)
+    resting = Along.at_rest(along.s, along.on, model.riders)
     level, solver = level_readings(model), StaticSolver(model)
     sensors, forces, states = [], [], []
     for first in range(0, len(along.s), STATIONS):

@@ -25,7 +25,7 @@ STEP = 1e-3  # of an element's length, between places of a derivative
 
 
 class Rows(NamedTuple):
-    """Rows with a few entries each: values (S, k) at the degrees of freedom `freedoms` (S, k)."""
+    """Rows with a few entries each: values (S, WIDTH) at the degrees of freedom `freedoms` (S, WIDTH)."""
 
     freedoms: Counts
     values: Array
@@ -45,9 +45,9 @@ class Rows(NamedTuple):
         return found
 
 
-def no_rows(count: int, width: int = WIDTH) -> Rows:
+def no_rows(count: int) -> Rows:
     """Rows of zeros."""
-    return Rows(np.zeros((count, width), dtype=np.int64), np.zeros((count, width)))
+    return Rows(np.zeros((count, WIDTH), dtype=np.int64), np.zeros((count, WIDTH)))
 
 
 def rows_of(row: Array) -> Rows:
@@ -79,12 +79,18 @@ class FrameTrack:
         return cls(track, numbers.reshape(-1, 6)[ends.points], ends.arms, spread)
 
     def rows(self, s: Array, derivative: int = 0) -> Rows:
+        """d^j/ds^j of the deflection."""
         element, _ = self.track.at(s)
         return self._on_nodes(element, self.track.to_ends(s, derivative))
 
-    def within(self, x: Array, s: Array) -> Array:
+    def within(self, x: Array, s: Array, quantity: str = "displacement") -> Array:
+        """What the element's own bending between its ends adds to a quantity at x per unit force at s."""
         place, load = (part.reshape(-1) for part in np.broadcast_arrays(x, s))
-        return self.track.within(place, load).reshape(np.broadcast_shapes(x.shape, s.shape))
+        if quantity == "displacement":
+            found = self.track.within(place, load)
+        else:
+            found = self._sum(quantity, self.track.at(place)[0], held_forces(self.track, place, load))
+        return found.reshape(np.broadcast_shapes(x.shape, s.shape))
 
     def inside(self, s: Array) -> tuple[Array, Array]:
         """(S,) places on the same elements, off their ends by the steps (S,) that come with them, m."""
@@ -92,10 +98,19 @@ class FrameTrack:
         step = STEP * self.track.beams.length[element]
         return np.clip(s, self.track.places[element] + 2.0 * step, self.track.places[element + 1] - 2.0 * step), step
 
-    def under_weight(self, x: Array) -> Array:
-        return self.track.under_spread_load(x, self.spread)
+    def under_weight(self, x: Array, quantity: str = "displacement") -> Array:
+        """The same per unit gravity under own weight on the element."""
+        if quantity == "displacement":
+            return self.track.under_spread_load(x, self.spread)
+        element, at = self.track.at(x)
+        return self._sum(quantity, element, spread_forces(self.track, element, at, self.spread[element]))
+
+    def _sum(self, quantity: str, element: Counts, forces: Array) -> Array:
+        """(S,) a section force, stress or strain from the section forces (S, 6) of elements (S,)."""
+        return np.asarray(np.sum(section_weights(self.track, quantity)[element] * forces, axis=1))
 
     def sections(self, quantity: str, x: Array) -> tuple[Rows, Rows]:
+        """A section force, stress or strain, from displacements and from accelerations."""
         element, at = self.track.at(x)
         weights = section_weights(self.track, quantity)[element]
         elements, places = np.repeat(element, WIDTH), np.repeat(at, WIDTH)
@@ -112,18 +127,6 @@ class FrameTrack:
         ends = moved.reshape(-1, 2, 6)[:, :, :3].mean(axis=1)
         local = np.einsum("sij,sj->si", self.track.axes[element], ends)
         return np.asarray(-self.track.beams.mass[element, None] * local)
-
-    def sections_within(self, quantity: str, x: Array, s: Array) -> Array:
-        place, load = (part.reshape(-1) for part in np.broadcast_arrays(x, s))
-        element, _ = self.track.at(place)
-        forces = held_forces(self.track, place, load)
-        found = np.sum(section_weights(self.track, quantity)[element] * forces, axis=1)
-        return np.asarray(found.reshape(np.broadcast_shapes(x.shape, s.shape)))
-
-    def sections_under_weight(self, quantity: str, x: Array) -> Array:
-        element, at = self.track.at(x)
-        forces = spread_forces(self.track, element, at, self.spread[element])
-        return np.asarray(np.sum(section_weights(self.track, quantity)[element] * forces, axis=1))
 
     def _on_nodes(self, element: Counts, ends: Array) -> Rows:
         """Rows on degrees of freedom from rows (S, 12) on the ends of the elements' axes: u_end = u + theta x arm."""

@@ -71,8 +71,8 @@ class TrackShapes:
 
 
 def end_weights(table: Array, x: Array, length: Array, derivative: int) -> Array:
-    """(S, n) d^j/ds^j at x (S,) in [0, 1] of elements of length (S,), per unit of the values and derivatives at one end,
-    then at the other; table (n, n): these as polynomials."""
+    """(S, n) d^j/ds^j at x (S,) in [0, 1] of elements of length (S,), per unit of the values and derivatives at their
+    left ends, then at the right ones; table (n, n): these as polynomials."""
     powers, count = np.arange(len(table)), np.arange(len(table))
     for _ in range(derivative):
         table, powers = (table * powers)[:, 1:], powers[:-1]
