@@ -98,7 +98,7 @@ def transitions(tables: SceneTables, values: VariantValues) -> Array:
     array([[ 0.,  1.],
            [-1.,  0.]])
     """
-    spread = _spread(values, 2 * tables.model.omega.size)
+    spread = values.part(_variants(values.size, 2 * tables.model.omega.size))
     scales = _velocities(tables.model, spread.size)
     ready = prepare(tables, spread, np.zeros(0, dtype=np.int64))
     _fill(ready.state, scales)
@@ -142,7 +142,7 @@ def spectral_radius(matrices: Array) -> Array:
 
 def _held_lanes(model: SceneModel, values: VariantValues, units: int, step: Array) -> Lanes:
     """Lanes without loads: every variant, with its step (V,) in s, once for each of so many unit states."""
-    table = _unloaded(lane_table(model, _spread(values, units)))
+    table = _unloaded(lane_table(model, values.part(_variants(values.size, units))))
     return table.steps_of(to_blocks(step[_variants(values.size, units)]))
 
 
@@ -156,12 +156,6 @@ def _unit_states(lanes: Lanes, scales: Array) -> State:
 def _variants(size: int, units: int) -> NDArray[np.int64]:
     """(lanes,) which variant is in which lane: each once per unit state, the last also in what fills up a block."""
     return padded(np.repeat(np.arange(size), units))
-
-
-def _spread(values: VariantValues, units: int) -> VariantValues:
-    """The numbers of those lanes."""
-    lanes = _variants(values.size, units)
-    return VariantValues(values.study, {path: column[lanes] for path, column in values.columns.items()}, lanes.size)
 
 
 def _unloaded(lanes: LaneTable) -> LaneTable:

@@ -6,7 +6,7 @@ the residual flexibility, the whole influence line less that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,19 @@ def shared(model: SceneModel, r: int, s: int, along: Along) -> Iterator[tuple[At
         for other in model.attachments[s]:
             if one.body == other.body and holds(one, along) and holds(other, along):
                 yield one, other
+
+
+def tie_shapes(model: SceneModel, ties: Sequence[int], along: Along) -> Array:
+    """(S, N, R) what some ties read of every coordinate: mode shapes of bodies, and sprung masses."""
+    found = np.zeros((along[0].s.size, model.omega.size, len(ties)))
+    for place, r in enumerate(ties):
+        for attachment in model.attachments[r]:
+            if holds(attachment, along):
+                shapes = attachment.factor * rows(model, attachment, along)
+                found[:, model.bodies[attachment.body].modes, place] += shapes
+        if r >= model.first_spring and (mode := model.springs[r - model.first_spring].mode) is not None:
+            found[:, mode, place] = -1.0
+    return found
 
 
 def residual(model: SceneModel, along: Along) -> Array:

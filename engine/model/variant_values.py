@@ -89,8 +89,7 @@ class VariantValues:
     @property
     def padded(self) -> VariantValues:
         """The same filled up to whole blocks by repeating the last variant."""
-        lanes = padded(np.arange(self.size))
-        return VariantValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+        return self.part(padded(np.arange(self.size)))
 
     def part(self, lanes: NDArray[np.int64]) -> VariantValues:
         """Some of the variants."""

@@ -24,14 +24,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import LANES
-from engine.model.attachment import holds, residual_flexibility, rows, shared
+from engine.model.attachment import Along, residual_flexibility, shared, tie_shapes
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
 from engine.model.variant_values import VariantValues, from_blocks, lane_table
 
 Array = NDArray[np.float64]
-Along = tuple[StationPath, ...]
 
 UNRESISTED = 1e-10  # of the shift: omega^2 below it is a motion that nothing resists, and rounding
 ENDLESS = 1e-13  # of the largest: what no force moves, as a joint or a massless wheel forbids it
@@ -120,13 +117,7 @@ def _parts(system: _System, size: int) -> Iterator[slice]:
 
 def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     """The matrices of all variants at all stations."""
-    padding = (0, -values.size % LANES)
-    whole = VariantValues(
-        values.study,
-        {path: np.pad(column, padding, mode="edge") for path, column in values.columns.items()},
-        values.size + padding[1],
-    )
-    lanes = lane_table(model, whole)
+    lanes = lane_table(model, values.padded)
     masses = [number for number, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
     ties = np.array([*masses, *range(model.first_spring, model.ties)], dtype=np.int64)
     on_track = from_blocks(lanes.mass, values.size)[masses]
@@ -145,17 +136,9 @@ def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
 
 def _rows(model: SceneModel, along: Along, ties: NDArray[np.int64], masses: int) -> Array:
     """(S, n, T) what every tie holds together: the track, and the mass or what rides."""
-    found = np.zeros((along[0].s.size, model.omega.size + masses, len(ties)))
-    for place, r in enumerate(ties):
-        for attachment in model.attachments[r]:
-            if holds(attachment, along):
-                found[:, model.bodies[attachment.body].modes, place] += attachment.factor * rows(
-                    model, attachment, along
-                )
-        mode = model.springs[r - model.first_spring].mode if r >= model.first_spring else model.omega.size + place
-        if mode is not None:
-            found[:, mode, place] = -1.0
-    return found
+    touching = np.zeros((along[0].s.size, masses, len(ties)))
+    touching[:, np.arange(masses), np.arange(masses)] = -1.0
+    return np.concatenate([tie_shapes(model, ties.tolist(), along), touching], axis=1)
 
 
 def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:

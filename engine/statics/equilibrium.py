@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.attachment import Along, residual, rows, shared
+from engine.model.attachment import Along, modal_flexibility_between, residual, shared, tie_shapes
 from engine.model.scene_model import SceneModel
 
 Array = NDArray[np.float64]
@@ -53,21 +53,19 @@ def static_state(model: SceneModel, along: Along) -> StaticState:
     loose = unrestrained_coordinates(model)
     if not model.springs:
         return StaticState(weights, loose, np.zeros((1, len(loose), count + 1)))
-    stations, springs = along[0].s.size, np.arange(model.first_spring, model.ties)
-    held = np.zeros((stations, len(springs), len(loose)))
-    pushed = np.zeros((stations, count, len(loose)))
-    for place, mode in enumerate(loose):
-        held[:, :, place] = _row(model, springs, along, int(mode))
-        pushed[:, :, place] = _row(model, np.arange(count), along, int(mode))
+    stations, first = along[0].s.size, model.first_spring
+    held, pushed = (
+        np.swapaxes(tie_shapes(model, ties, along)[:, loose], 1, 2) for ties in (range(first, model.ties), range(count))
+    )
     soft = flexibility(model, along)
-    gap = np.zeros((stations, len(springs), count + 1))
-    gap[:, :, :count] = soft[:, model.first_spring :, :count]
+    gap = np.zeros((stations, len(model.springs), count + 1))
+    gap[:, :, :count] = soft[:, first:, :count]
     gap[:, :, count] = _level(model, along)
     own = np.array([0.0 if s.rigid else 1.0 / model.study.value(f"{s.key}.stiffness") for s in model.springs])
-    matrix = soft[:, model.first_spring :, model.first_spring :] + np.diag(own)
+    matrix = soft[:, first:, first:] + np.diag(own)
     force, coordinate = _solved(matrix, held, gap, pushed)
     whole = np.repeat(weights, stations, axis=0)
-    whole[:, model.first_spring :] = force
+    whole[:, first:] = force
     return StaticState(whole, loose, coordinate)
 
 
@@ -77,25 +75,9 @@ def flexibility(model: SceneModel, along: Along) -> Array:
     for r in range(model.first_spring, model.ties):
         for s in range(model.ties):
             for one, other in shared(model, r, s, along):
-                soft = model.bodies[one.body].modal.modal_flexibility
-                both = rows(model, one, along) * rows(model, other, along)
-                found[:, r, s] += one.factor * other.factor * np.sum(both * soft, axis=1)
+                found[:, r, s] += modal_flexibility_between(model, one, other, along)
     missed = residual(model, along)
     return found + missed if missed.size else found
-
-
-def _row(model: SceneModel, ties: Indices, along: Along, mode: int) -> Array:
-    """(S, R) how a coordinate moves some ties."""
-    found = np.zeros((along[0].s.size, len(ties)))
-    for place, r in enumerate(ties):
-        if r >= model.first_spring and model.springs[r - model.first_spring].mode == mode:
-            found[:, place] = -1.0
-        for attachment in model.attachments[r]:
-            modes = model.bodies[attachment.body].modes
-            touches = attachment.rider is None or along[attachment.rider].active
-            if touches and modes.start <= mode < modes.stop:
-                found[:, place] += attachment.factor * rows(model, attachment, along)[:, mode - modes.start]
-    return found
 
 
 def _level(model: SceneModel, along: Along) -> Array:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.model.attachment import Along
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import ContactForce, contact_forces, contact_row
 from engine.observation.readings import Sensor
@@ -17,7 +17,6 @@ from engine.observation.signals import build_signals
 from engine.statics.equilibrium import static_state
 
 Array = NDArray[np.float64]
-Along = tuple[StationPath, ...]
 
 
 class StaticReadings(NamedTuple):
