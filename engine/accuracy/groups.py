@@ -1,10 +1,13 @@
-"""Variants that are computed alike: marched with what was chosen for them, or level by level until they converge."""
+"""Variants that are computed alike: marched with what was chosen for them, or level by level until they converge; and
+marched again for their histories."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import lcm
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -12,19 +15,23 @@ from numpy.typing import NDArray
 
 from engine.accuracy.choice import Choice
 from engine.accuracy.grids import MOST_COMPARED, SceneGrid
+from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import USUAL_LEVEL, Halted, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
-from engine.march.outcome import Flat, Outcome, outcome, used
+from engine.march.outcome import Flat, Outcome, number_of, outcome, used
 from engine.march.tables import SceneTables
 from engine.model.numerics import Numerics
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import MOST_STATIONS
 from engine.model.variant_values import VariantValues
+from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
+from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Kept = Literal["numbers", "histories"]
+USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by
 
 PACE = 1.2e9  # modes x steps x variants per second and thread of an ordinary server, for the size of chunks only
 PLACE = 0.2  # of a march that an envelope's place takes besides; likewise
@@ -196,3 +203,33 @@ class ConvergingGroup(Group):
         left_open = len(levels.numerics) > 1
         held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)
         return Found(own.outcome, own.used, apart, held)
+
+
+def marches_again(grid: SceneGrid, used: Flat) -> Iterator[tuple[SceneTables, Counts]]:
+    """The marches of some variants by what these were computed with, and which of them (lanes) each is for."""
+    taken = np.stack([used[name] for name in USED], axis=1).astype(np.int64)
+    rows, own = np.unique(taken, axis=0, return_inverse=True)
+    for number, row in enumerate(rows):
+        yield _tables(grid, *(int(part) for part in row)), np.flatnonzero(own.reshape(-1) == number)
+
+
+def _tables(grid: SceneGrid, fidelity: int, scheme: int, modes: int, steps: int) -> SceneTables:
+    """The tables of a march; where the study leaves its steps open, finer ones if there are too few for a history."""
+    model = _model(grid, fidelity, scheme, modes)
+    unit = grid.unit * model.scheme.stride
+    by = max(1, steps // unit)
+    if grid.fixed or grid.asked.study.output.histories != "auto":
+        return grid.tables(model, by)
+    if grid.asked.window == "last-cycle":  # all variants have the same phases
+        return grid.tables(model, lcm(by * unit, CYCLE_STATIONS) // unit)
+    return grid.tables(model, by * -(-(WHOLE_STATIONS - 1) // (by * unit)))
+
+
+def _model(grid: SceneGrid, fidelity: int, scheme: int, modes: int) -> SceneModel:
+    """The scene as a variant was computed with it; statics know all modes, and march none."""
+    for numerics in (*as_fixed(grid).numerics, *ladder_of(grid.asked, grid).columns):
+        model = grid.model(numerics)
+        same = model.fidelity == fidelity and number_of(model.scheme) == scheme
+        if same and (model.body_modes == modes or fidelity == Fidelity.STATIC):
+            return model
+    raise ValueError(f"modes: expected those of a march of this scene, received {modes}")

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.groups import Found, Group
-from engine.accuracy.recomputed import marches_again
+from engine.accuracy.groups import Found, Group, marches_again
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import Plan
 from engine.march.outcome import Flat, histories
@@ -89,4 +88,4 @@ def _histories(plan: Plan, group: Group, variants: Counts, used: Flat, halted: C
 
 def _counts(plan: Plan, tables: SceneTables) -> Counts:
     """Stations of the kept histories of a march, by their count."""
-    return counts_shown(tables.timeline, plan.window, plan.study.output.histories)
+    return counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)

@@ -63,7 +63,8 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     for name, places in envelope_places(plan.base).items():
         dim = f"{name}_place"
         dataset = dataset.assign_coords({dim: (dim, places, declared[dim].attributes())})
-    extra = {} if plan.reduction is None else dict(plan.reduction.outputs(study))
+    reduction = plan.asked.reduction
+    extra = {} if reduction is None else dict(reduction.outputs(study))
     results = results_of(plan.asked)
     names = [result.name for result in results]
     dataset = dataset.assign_coords(result=("result", names, axes()["result"].attributes()))

@@ -128,7 +128,7 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     from engine.model.variant_values import padded
 
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
-    tables = {id(b): SceneTables(b.scene, b.steps, plan.window, "sensors", stride) for b in plan.groups}
+    tables = {id(b): SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in plan.groups}
     workers = threads or os.cpu_count() or 1
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     if stride > 1:

@@ -75,16 +75,6 @@ class Plan:
         return self.cases.size
 
     @property
-    def window(self) -> Window:
-        """What extremes and histories cover."""
-        return self.asked.window
-
-    @property
-    def reduction(self) -> Reduction | None:
-        """What the study makes of histories."""
-        return self.asked.reduction
-
-    @property
     def converges(self) -> bool:
         """Whether every variant is marched until its results stay: where there are few."""
         return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids))
@@ -149,7 +139,7 @@ class Plan:
     @cached_property
     def phases_shown(self) -> Array | None:
         """The phases of the kept histories over a cycle, if all variants have the same."""
-        if self.window != "last-cycle" or self.base.riders[0].motion.period is None:
+        if self.asked.window != "last-cycle" or self.base.riders[0].motion.period is None:
             return None
         if self.study.output.histories == "auto" and not self.grids[0].fixed:
             return np.arange(CYCLE_STATIONS) / CYCLE_STATIONS
@@ -157,7 +147,7 @@ class Plan:
             return None
         timeline = self.grids[0].tables(self.grids[0].scene, 1).timeline
         first, last = timeline.window
-        return (counts_shown(timeline, self.window, self.study.output.histories) - first) / (last - first)
+        return (counts_shown(timeline, self.asked.window, self.study.output.histories) - first) / (last - first)
 
     @property
     def disk_bytes(self) -> int:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
+from engine.bodies.modal.modal_body import ModalBody
 from engine.model.variant_values import moving_mass, weight
 
 Array = NDArray[np.float64]
@@ -50,32 +51,39 @@ def _leaves_between(plan: Plan) -> Iterator[str]:
 
 
 def _fast(plan: Plan) -> Iterator[str]:
-    worst = max((_speed_ratio(grid).max() for grid in plan.grids), default=0.0)
+    """Of the first carriage, beside omega_1 L/pi."""
+    worst = 0.0
+    for grid in plan.grids:
+        scene = grid.scene
+        speed = float((scene.carriages[0].rider.top_speed / _time_scale(grid)).max())
+        worst = max(worst, speed * np.pi / (scene.first_omega * scene.leading_body.modal.length))
     if worst > FAST:
         yield f"some variants run at up to {worst:.3g} times the critical speed omega_1 L/pi: are the units right?"
 
 
 def _heavy(plan: Plan) -> Iterator[str]:
-    worst = 0.0
-    for grid in plan.grids:
-        for number, carriage in enumerate(grid.scene.carriages):
-            mass = grid.scene.bodies[carriage.body].modal.mass
-            worst = max(worst, float(moving_mass(grid.scene, grid.values, number).max()) / mass)
+    ratios = [moving_mass(g.scene, g.values, number).max() / body.mass for g, number, body in _carriages(plan)]
+    worst = max(ratios, default=0.0)
     if worst > HEAVY:
         yield f"a carriage weighs up to {worst:.3g} times its body: look at more modes and steps before believing it"
 
 
 def _deep(plan: Plan) -> Iterator[str]:
     worst = 0.0
-    for grid in plan.grids:
-        for number, carriage in enumerate(grid.scene.carriages):
-            body = grid.scene.bodies[carriage.body].modal
-            if not body.rigid_modes:
-                s = np.linspace(0.0, body.length, 33)
-                flexibility = np.abs(body.influence_at(s, s)).max() / body.length
-                worst = max(worst, float(np.abs(weight(grid.scene, grid.values, number)).max()) * flexibility)
+    for grid, number, body in _carriages(plan):
+        if not body.rigid_modes:
+            s = np.linspace(0.0, body.length, 33)
+            flexibility = np.abs(body.influence_at(s, s)).max() / body.length
+            worst = max(worst, float(np.abs(weight(grid.scene, grid.values, number)).max()) * flexibility)
     if worst > DEEP:
         yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
+
+
+def _carriages(plan: Plan) -> Iterator[tuple[SceneGrid, int, ModalBody]]:
+    """Every carriage of every scene by its number, and the body on which it rides."""
+    for grid in plan.grids:
+        for number, carriage in enumerate(grid.scene.carriages):
+            yield grid, number, grid.scene.bodies[carriage.body].modal
 
 
 def _thin(plan: Plan) -> Iterator[str]:
@@ -93,19 +101,5 @@ def _time_scale(grid: SceneGrid) -> Array:
     return grid.values.scene_time_scale
 
 
-def _speed_ratio(grid: SceneGrid) -> Array:
-    """(V,) top speed of the first carriage over the critical speed."""
-    scene = grid.scene
-    speed = scene.carriages[0].rider.top_speed / _time_scale(grid)
-    return np.asarray(speed * np.pi / (scene.first_omega * scene.leading_body.modal.length))
-
-
-REMARKS: tuple[Callable[[Plan], Iterator[str]], ...] = (
-    _unsupported,
-    _released,
-    _leaves_between,
-    _fast,
-    _heavy,
-    _deep,
-    _thin,
-)
+REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
+REMARKS = (_unsupported, _released, _leaves_between, _fast, _heavy, _deep, _thin)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.recomputed import marches_again
+from engine.accuracy.groups import marches_again
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.march.outcome import Flat
@@ -66,7 +66,7 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
     tables = _tables(own, study)
     values = VariantValues(study, {}, LANES)
     wanted = plan.study.output.histories
-    counts = counts_shown(tables.timeline, plan.window, "auto" if wanted == "none" else wanted)
+    counts = counts_shown(tables.timeline, plan.asked.window, "auto" if wanted == "none" else wanted)
     marched = march_scheme(tables, values, counts, 1)
     whole = unreduced_model(study, *plan.grids[number].scene.timing)
     by = int(np.clip(MOST_STEPS // tables.timeline.steps, 1, FINER))

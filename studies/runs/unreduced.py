@@ -62,7 +62,7 @@ def unreduced_group(plan: Plan, dataset: xr.Dataset, check: Callable[[], None] =
 
 def _used(dataset: xr.Dataset, variant: int) -> dict[str, NDArray[Any]]:
     """What a variant was computed with, by the names of the archive."""
-    from engine.accuracy.recomputed import USED
+    from engine.accuracy.groups import USED
 
     return {name: dataset[name].values.reshape(-1)[[variant]] for name in USED}
 

@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 
 from engine.accuracy.results import results_of
 from engine.batch.audit import SEED, audit
-from engine.batch.plan import make_plan
 from engine.linear_algebra import one_thread
-from studies.protocol.study import kind_of
-from tests.calibration.scenes import draw, reads_moment
+from tests.calibration.scenes import draw, judged, planned, reads_moment
 
 Array = NDArray[np.float64]
 
@@ -46,15 +44,10 @@ class Row(NamedTuple):
 
 
 @one_thread()
-def judged(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
+def rows_of(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
     """The rows of a scene."""
-    scene = draw(seed, number, size)
-    kind, study = kind_of(scene.study(tolerance=tolerance)), scene.study(tolerance=tolerance)
-    plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
-    plan.choose(lambda jobs: [job() for job in jobs] and None, lambda: False)
-    pilots = np.zeros(0, dtype=np.int64) if plan.choice is None else plan.choice.pilots
-    others = np.setdiff1d(np.arange(plan.size), pilots)
-    picked = np.sort(np.random.default_rng([SEED, number]).permutation(others)[:JUDGED])
+    plan = planned(draw(seed, number, size, tolerance))
+    picked = judged(plan, JUDGED, [SEED, number])
     found = audit(plan, picked, lambda: False)
     held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
     observed, told, doubt = (part[held] / tolerance for part in (found.observed, found.told, found.doubt))
@@ -64,18 +57,8 @@ def judged(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
         matter = (observed[:, v] > MATTERS) & (observed[:, v] > doubt[:, v])
         ratios = tuple((told[matter, v] / observed[matter, v]).tolist())
         worst, marked = float(observed[:, v].max()), bool(np.nanmax(told[:, v]) > 1.0 or np.isnan(told[:, v]).any())
-        rows.append(
-            Row(
-                number,
-                tolerance,
-                reads_moment(number),
-                worst,
-                float(np.nanmax(doubt[:, v])),
-                marked,
-                work[int(variant)],
-                ratios,
-            )
-        )
+        own = tolerance, reads_moment(number), worst, float(np.nanmax(doubt[:, v])), marked, work[int(variant)]
+        rows.append(Row(number, *own, ratios))
     return rows
 
 
@@ -108,21 +91,13 @@ def main() -> None:
     numbers, started = range(*given.scenes), time.perf_counter()
     with get_context("spawn").Pool(given.processes) as pool:
         for tolerance in given.tolerances:
-            work = partial(judged, given.seed, given.size, tolerance)
+            work = partial(rows_of, given.seed, given.size, tolerance)
             rows = [row for part in pool.imap_unordered(work, numbers) for row in part]
-            for words, own in (
-                ("displacements", [r for r in rows if not r.moment]),
-                ("with a moment", [r for r in rows if r.moment]),
-            ):
-                print(f"{tolerance:g}, {said(own, words)}", flush=True)
+            for moment, words in ((False, "displacements"), (True, "with a moment")):
+                print(f"{tolerance:g}, {said([row for row in rows if row.moment is moment], words)}", flush=True)
             worst = sorted(rows, key=lambda row: -row.worst)[:12]
-            print(
-                "  worst: "
-                + "; ".join(
-                    f"scene {r.scene}: {r.worst:.2g} (truth {r.doubt:.2g}{', marked' if r.marked else ''})"
-                    for r in worst
-                )
-            )
+            shown = (f"scene {r.scene}: {r.worst:.2g} (truth {r.doubt:.2g}{', marked' * r.marked})" for r in worst)
+            print(f"  worst: {'; '.join(shown)}")
             print(f"  {time.perf_counter() - started:.0f} s", flush=True)
 
 

@@ -5,21 +5,21 @@ A beam has L = E I = rho A = 1, so that a carriage's mass is its mass ratio mu, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.accuracy.reference import in_turn
+from engine.batch.plan import Plan, make_plan
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
+from studies.protocol.study import kind_of
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
 
-LANES = 8  # variants of a scene
 SLOWEST, FASTEST = 0.002, 0.6  # alpha
 GRAVITY = 9.81
 KINDS = {"cruise": "passage", "out-and-back": "asymmetry", "sinusoidal": "double-peak"}
@@ -28,62 +28,11 @@ SPRUNG = ("end springs", "inner springs", "three springs", "springs and dampers"
 CYCLES = ((1, 2, 3, 4, 5, 6), (0.3, 0.25, 0.15, 0.1, 0.1, 0.1))
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """A scene with variants that differ in speed, mass, damping and, on a spring, in stiffness and its damper.
-
-    seed, number: what it is drawn from. columns: (V,) swept values by dotted key.
-    """
-
-    seed: int
-    number: int
-    supports: str
-    carriage_kind: str
-    bed: Table
-    carriage: Table
-    sensors: dict[str, Table]
-    columns: dict[str, Array]
-    alpha: Array
-    mu: Array
-    zeta: Array
-
-    @property
-    def motion(self) -> Table:
-        """The motion, with the pace of no variant."""
-        return dict(self.carriage["motion"])
-
-    @property
-    def kind(self) -> str:
-        """The kind of study."""
-        return KINDS[self.motion["kind"]]
-
-    @property
-    def reads_moment(self) -> bool:
-        """Whether a bending moment is read."""
-        return "moment" in self.sensors
-
-    def study(self, variants: Array | None = None, body: Table | None = None, **solver: Any) -> Study:
-        """The study of some variants, or all. body: other keys of the beam."""
-        chosen = np.arange(self.alpha.size) if variants is None else variants
-        axes = {
-            f"axis{number}": {"of": path, "values": column[chosen].tolist()}
-            for number, (path, column) in enumerate(self.columns.items())
-        }
-        tables = {"kind": self.kind, "sensor": self.sensors, "sweep": {"zip": True} | axes, "gravity": GRAVITY}
-        return study(self.bed | (body or {}), self.carriage, **tables, solver=solver)
-
-    @cached_property
-    def told(self) -> str:
-        """How it was drawn, for people."""
-        motion = {key: value for key, value in self.motion.items() if key not in ("speed", "frequency")}
-        supports = self.bed["supports"]
-        return f"{supports} | {motion} | {self.carriage_kind} | {self.sensors}"
-
-
-def draw(seed: int, number: int, size: int = LANES) -> Scene:
-    """Scene of a number in the sample of a seed with so many variants; no other scene has a say in it."""
+def draw(seed: int, number: int, size: int, tolerance: float) -> Study:
+    """Scene of a number in the sample of a seed, with variants that differ in speed, mass, damping and, on a spring, in
+    stiffness and its damper; no other scene has a say in it."""
     random = np.random.default_rng([seed, number])
-    name, supports = _supports(random)
+    supports = _supports(random)
     motion = _motion(random, list(KINDS)[number % len(KINDS)])
     kind = str(random.choice(["mass", "force", "oscillator"], p=[0.7, 0.12, 0.18]))
     if kind == "oscillator" and "after" in motion:
@@ -97,7 +46,23 @@ def draw(seed: int, number: int, size: int = LANES) -> Scene:
     zeta = np.where(random.random(size) < 0.25, 0.0, random.uniform(0.0, 0.1, size))
     carriage, columns = _carriage(random, kind, motion, mu, first)
     columns |= {_pace_key(motion): _pace(motion, alpha * first / np.pi), "body.bed.damping_ratio": zeta}
-    return Scene(seed, number, name, kind, bed, carriage, sensors, columns, alpha, mu, zeta)
+    axes = {f"axis{n}": {"of": path, "values": column.tolist()} for n, (path, column) in enumerate(columns.items())}
+    tables = {"kind": KINDS[motion["kind"]], "sensor": sensors, "sweep": {"zip": True} | axes, "gravity": GRAVITY}
+    return study(bed, carriage, **tables, solver={"tolerance": tolerance})
+
+
+def planned(study: Study) -> Plan:
+    """The plan of a study, chosen for."""
+    kind = kind_of(study)
+    plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
+    plan.choose(in_turn, lambda: False)
+    return plan
+
+
+def judged(plan: Plan, count: int, seed: int | list[int]) -> NDArray[np.int64]:
+    """Some variants that are no pilots."""
+    others = np.arange(plan.size) if plan.choice is None else np.setdiff1d(np.arange(plan.size), plan.choice.pilots)
+    return np.sort(np.random.default_rng(seed).permutation(others)[:count])
 
 
 def reads_moment(number: int) -> bool:
@@ -138,11 +103,10 @@ def _log(random: Random, low: float, high: float, size: int) -> Array:
     return np.exp(random.uniform(np.log(low), np.log(high), size))
 
 
-def _supports(random: Random) -> tuple[str, Any]:
-    """A name, and supports that hold the beam: both ends in words, or springs."""
+def _supports(random: Random) -> str | list[Table]:
+    """Supports that hold the beam: both ends in words, or springs."""
     if random.random() < 0.6:
-        ends = str(random.choice(ENDS))
-        return ends, ends
+        return str(random.choice(ENDS))
     name = str(random.choice(SPRUNG))
     low, high = (0.0, 1.0) if name == "end springs" else (_between(random, 0.0, 0.3), _between(random, 0.7, 1.0))
     places = [low, _between(random, 0.4, 0.6), high] if name == "three springs" else [low, high]
@@ -152,7 +116,7 @@ def _supports(random: Random) -> tuple[str, Any]:
             spring["rotational"] = float(_log(random, 0.1, 100.0, 1)[0])
         if name == "springs and dampers" or random.random() < 0.1:
             spring["damping"] = float(_log(random, 0.05, 5.0, 1)[0])
-    return name, springs
+    return springs
 
 
 def _motion(random: Random, kind: str) -> Table:
