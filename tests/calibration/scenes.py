@@ -5,8 +5,6 @@ A beam has L = E I = rho A = 1, so that a carriage's mass is its mass ratio mu, 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
