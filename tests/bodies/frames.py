@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from engine.bodies.beam.modes import BeamProperties, uniform_beam
+from engine.bodies.beam.modes import uniform_beam
 from engine.bodies.frame.body import frame_body
 from engine.bodies.frame.frame import Frame
 from engine.bodies.modal.modal_body import ModalBody
+from tests.bodies.beams import uniform
 
 LENGTH, AREA, SECOND_MOMENT, MODULUS, DENSITY = 15.0, 0.01, 8.33e-6, 2.1e11, 7850.0
 RAIL: dict[str, Any] = {
@@ -53,7 +54,7 @@ def body(table: dict[str, Any]) -> ModalBody:
 
 def beam(ends: tuple[str, str], modes: int) -> ModalBody:
     """The same rail as the engine's uniform beam."""
-    return uniform_beam(BeamProperties(LENGTH, AREA, SECOND_MOMENT, MODULUS, DENSITY, ends=ends), modes)
+    return uniform_beam(uniform(LENGTH, AREA, SECOND_MOMENT, MODULUS, DENSITY, ends=ends), modes)
 
 
 def turned(table: dict[str, Any], matrix: np.ndarray) -> dict[str, Any]:

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
+from engine.bodies.beam.modes import uniform_beam
 from engine.bodies.modal.modal_body import Array, ModalBody
 from results_schema.errors import BadInput
+from tests.bodies.beams import uniform, unit
 from tests.bodies.waves import Support, hermite_model
 from tests.reference import closed_forms
 
@@ -22,17 +23,17 @@ FREE_BODIES: dict[str, dict[str, Any]] = {
     "free-free": {"ends": ("free", "free")},
     "pinned-free": {"ends": ("pinned", "free")},
     "free-pinned": {"ends": ("free", "pinned")},
-    "one spring": {"supports": (Spring(0.3, 40.0),)},
-    "rotary springs": {"supports": (Spring(0.3, 0.0, 5.0), Spring(0.8, 0.0, 2.0))},
+    "one spring": {"supports": ((0.3, 40.0),)},
+    "rotary springs": {"supports": ((0.3, 0.0, 5.0), (0.8, 0.0, 2.0))},
 }
 
 
 def unit_beam(modes: int = 1, **how: Any) -> ModalBody:
-    return uniform_beam(BeamProperties(1.0, 1.0, 1.0, 1.0, 1.0, **how), modes)
+    return uniform_beam(unit(**how), modes)
 
 
 def on_springs(*supports: Support) -> ModalBody:
-    return unit_beam(supports=tuple(Spring(at, k, k_r) for at, k, k_r in supports))
+    return unit_beam(supports=supports)
 
 
 def modal_sum(body: ModalBody, x: Array, s: Array, derivative: int = 0) -> Array:
@@ -132,9 +133,7 @@ def test_what_the_modes_leave_out_falls_like_the_third_power_of_their_number() -
         assert -4.0 * bend.item() == pytest.approx(4.0 / (math.pi**2 * (modes + 1)), rel=2.5 / (modes + 1) ** 2)
 
 
-@pytest.mark.parametrize(
-    "how", [{}, {"ends": ("clamped", "free")}, {"supports": (Spring(0.2, 50.0), Spring(0.9, 8.0, 3.0))}]
-)
+@pytest.mark.parametrize("how", [{}, {"ends": ("clamped", "free")}, {"supports": ((0.2, 50.0), (0.9, 8.0, 3.0))}])
 def test_own_weight_is_the_integral_of_the_influence_and_the_modal_sum(how: dict[str, Any]) -> None:
     body = unit_beam(64, **how)
     points, weights = np.polynomial.legendre.leggauss(4)
@@ -150,7 +149,7 @@ def test_own_weight_is_the_integral_of_the_influence_and_the_modal_sum(how: dict
 
 
 def test_own_weight_of_a_pinned_beam_in_units() -> None:
-    body = uniform_beam(BeamProperties(15.0, 0.01, 8.33e-6, 210e9, 7850.0), 1)
+    body = uniform_beam(uniform(15.0, 0.01, 8.33e-6, 210e9, 7850.0), 1)
     x = np.linspace(0.0, 15.0, 31)
     stiffness, weight = 210e9 * 8.33e-6, 78.5
     expected = [closed_forms.own_weight_pinned(place / 15.0) * weight * 15.0**4 / stiffness for place in x]

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from engine.bodies.beam.modes import BeamProperties, Spring, uniform_beam
 from engine.scene.study import Study
 from tests.naive import motions, ode
 from tests.naive import newmark as naive
@@ -77,19 +76,7 @@ def bed_of(study: Study, name: str) -> Bed:
 
         dampers: tuple[tuple[float, float], ...] = ()
     else:
-        springs = tuple(Spring(s.at, s.stiffness, s.rotational, s.damping) for s in table.springs)
-        modal = uniform_beam(
-            BeamProperties(
-                length=table.length,
-                area=table.area,
-                second_moment=table.second_moment,
-                youngs_modulus=table.youngs_modulus,
-                density=table.density,
-                ends=table.ends,
-                supports=springs,
-            ),
-            table.modes,
-        )
+        modal = table.build()
         omega, own, dampers = modal.omega, modal.participation, modal.dampers
 
         def phi(s: float, derivative: int) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import product
 from typing import Annotated, Literal
 
@@ -112,19 +111,9 @@ class Beam(Body):
         return self.modes == "auto"
 
     def build(self) -> ModalBody:
-        from engine.bodies.beam import modes
+        from engine.bodies.beam.modes import uniform_beam
 
-        properties = modes.BeamProperties(
-            length=self.length,
-            area=self.area,
-            second_moment=self.second_moment,
-            youngs_modulus=self.youngs_modulus,
-            density=self.density,
-            ends=self.ends,
-            supports=tuple(modes.Spring(s.at, s.stiffness, s.rotational, s.damping) for s in self.springs),
-            fibre_distance=math.nan if self.fibre_distance is None else self.fibre_distance,
-        )
-        return modes.uniform_beam(properties, AUTO_MODES if self.modes == "auto" else int(self.modes))
+        return uniform_beam(self, AUTO_MODES if self.modes == "auto" else int(self.modes))
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
