@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 import engine
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid
 from engine.accuracy.results import differences, results_of, worst_held
-from engine.batch.plan import Plan, make_plan
+from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import Outcome, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
-from studies.protocol.study import kind_of
-from tests.calibration.scenes import draw
+from tests.calibration.scenes import draw, judged, planned
 
 Array = NDArray[np.float64]
 
@@ -62,21 +61,12 @@ def passages(size: int, seed: int, tolerance: float, quantity: str) -> Study:
     )
 
 
-def planned(study: Study) -> Plan:
-    """The plan of a study, chosen for."""
-    kind = kind_of(study)
-    plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
-    plan.choose(lambda jobs: [job() for job in jobs] and None, lambda: False)
-    return plan
-
-
 @one_thread()
-def compared(plan: Plan, judged: int, seed: int) -> dict[str, Any]:
+def compared(plan: Plan, count: int, seed: int) -> dict[str, Any]:
     """Work of some variants that are no pilots, the least work that holds, and how far what they took is off."""
     assert plan.choice is not None
-    [grid], [members] = plan.grids, plan.members
-    others = np.setdiff1d(members, plan.choice.pilots)
-    picked = np.sort(np.random.default_rng(seed).permutation(others)[:judged])
+    [grid] = plan.grids
+    picked = judged(plan, count, seed)
     values = VariantValues(grid.scene.study, plan.cases.columns_of(picked), picked.size)
     numerics, cut = REFERENCE
     truth = march(grid, values, numerics, int(grid.safe_cuts(numerics, values, cut).max()))
@@ -140,7 +130,7 @@ def main() -> None:
             study = passages(given.size, given.seed, tolerance, given.quantity)
             print(told(compared(planned(study), given.judged, given.seed), f"{tolerance:g}"), flush=True)
         for number in np.random.default_rng(given.seed).permutation(250)[: given.sweeps].tolist():
-            plan = planned(draw(20240609, number, given.size).study(tolerance=tolerance))
+            plan = planned(draw(20240609, number, given.size, tolerance))
             print(told(compared(plan, given.judged, given.seed), f"{tolerance:g}, scene {number}"), flush=True)
 
 
