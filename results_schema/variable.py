@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Literal
+
+import numpy as np
 
 from results_schema.status import flag_meanings, flag_values
 
@@ -50,6 +53,14 @@ class Variable:
         elif self.units is not None and self.dtype != "str":
             found["units"] = self.units or "1"
         return found | ({"comment": self.meaning} if self.meaning else {})
+
+    def holding(
+        self, values: Any, dims: Sequence[str] | None = None
+    ) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
+        """Dimensions, values in the declared type, and attributes, as a dataset takes them."""
+        array = np.asarray(values)
+        own = tuple(self.dims if dims is None else dims)
+        return own, array if self.dtype == "str" else array.astype(self.dtype), self.attributes()
 
 
 REGISTRY: dict[str, dict[str, Variable]] = {}

@@ -13,7 +13,7 @@ from engine.march.envelopes import envelope_places
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases
-from results_schema.store.parts import Rows, joined
+from results_schema.store.rows import Rows
 from results_schema.variables import Variable, axes, declarations, expand, sensor_unit
 
 if TYPE_CHECKING:
@@ -24,29 +24,6 @@ Counts = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 SHAPE_STATIONS = 201  # of the mode shapes in the archive
-
-
-class Collector:
-    """A sink that keeps results in memory: `arrays` (V, ...) by name, and the histories of the kept variants."""
-
-    def __init__(self, size: int) -> None:
-        self.arrays: Arrays = {}
-        self._size = size
-        self._selected: list[Rows] = []
-
-    def add(self, variants: Counts, arrays: Arrays, selected: Rows | None) -> None:
-        """Take one chunk's results."""
-        for name, array in arrays.items():
-            if name not in self.arrays:
-                self.arrays[name] = np.zeros((self._size, *array.shape[1:]), dtype=array.dtype)
-            self.arrays[name][variants] = array
-        if selected is not None:
-            self._selected.append(selected)
-
-    @property
-    def selected(self) -> Rows | None:
-        """All kept histories, ascending by variant."""
-        return joined(self._selected)
 
 
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,17 @@ from engine.linear_algebra import one_thread
 from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.errors import BadInput, Interrupted
+from results_schema.store.rows import Chunk, Collector, Rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from engine.march.march import March
-    from results_schema.store.parts import Rows
 
 Counts = NDArray[np.int64]
-Arrays = dict[str, NDArray[Any]]
-Sink = Callable[[Counts, Arrays, "Rows | None"], object]
+T = TypeVar("T")
+Halted = Callable[[], bool]
+Sink = Callable[[Chunk], object]
 Progress = Callable[[int, int], object]
 
 _COUNTING = threading.Lock()
@@ -54,7 +55,7 @@ def run(
     depend on either, bit for bit. reduction, results: as of `make_plan`. Until it returns, linear algebra keeps to
     one thread in the whole process.
     """
-    from engine.batch.dataset import Collector, build
+    from engine.batch.dataset import build
 
     plan = make_plan(study, reduction=reduction, results=results)
     collector = Collector(plan.size)
@@ -77,30 +78,22 @@ def execute(
 
     Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
     """
-    _check_threads(threads)
+    if threads is not None and threads < 1:
+        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))
     warm_up(plan)
     choose(plan, threads, stop)
     tasks = list(plan.chunks(done, chunk))
+    left = Counter(id(group) for group, _ in tasks)
     finished = 0 if done is None else int(done.size)
-    halt = threading.Event()
-    results: queue.Queue[Any] = queue.Queue(maxsize=WAITING * (threads or os.cpu_count() or 1))
-    worker = threading.Thread(target=_compute, args=(plan, tasks, threads, results, (halt, stop)), daemon=True)
-    worker.start()
-    try:
-        for _ in tasks:
-            outcome = _next(results, stop)
-            if isinstance(outcome, BaseException):
-                raise outcome
-            variants, arrays, selected = outcome
-            sink(variants, arrays, selected)
-            finished += variants.size
-            if progress is not None:
-                progress(finished, plan.size)
-    finally:
-        halt.set()
-        while worker.is_alive():
-            _drain(results)
-            worker.join(0.01)
+
+    def take(found: Chunk) -> None:
+        nonlocal finished
+        sink(found)
+        finished += found.rows.variants.size
+        if progress is not None:
+            progress(finished, plan.size)
+
+    share_out([partial(_task, plan, task, left) for task in tasks], threads or cores(), take, stop=stop)
 
 
 def warm_up(plan: Plan) -> None:
@@ -111,11 +104,11 @@ def warm_up(plan: Plan) -> None:
 
 def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
     """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
-    from engine.march.stepper import Halted
+    from engine.march.stepper import Halted as Gone
 
     try:
-        plan.choose(lambda jobs: run_jobs(jobs, threads or os.cpu_count() or 1), partial(_any_set, (stop,)))
-    except Halted:
+        plan.choose(partial(run_jobs, threads=threads or cores()), partial(_any_set, (stop,)))
+    except Gone:
         raise Interrupted("stopped; finished work is kept", remedy="run again to go on") from None
 
 
@@ -129,7 +122,7 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
 
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
     tables = {id(b): SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in plan.groups}
-    workers = threads or os.cpu_count() or 1
+    workers = threads or cores()
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     if stride > 1:
         pairs = [(tables[id(group)], plan.values(group, padded(part)), nothing, part.size) for group, part in chunks]
@@ -155,81 +148,96 @@ def seconds_of_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> float
     return time.perf_counter() - start
 
 
+def cores() -> int:
+    """Threads where nobody says how many."""
+    return os.cpu_count() or 1
+
+
 def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
-    """Jobs on threads."""
+    """Jobs on threads; on the caller's own where that is to be the only one. The only place that shares out work."""
+    if threads == 1:
+        for job in jobs:
+            job()
+        return
     import dask.threaded
 
     graph = {("job", i): (job,) for i, job in enumerate(jobs)}
     dask.threaded.get(graph, list(graph), num_workers=threads)
 
 
+def share_out(
+    jobs: Sequence[Callable[[Halted], T]],
+    threads: int,
+    sink: Callable[[T], object],
+    *,
+    stop: threading.Event | None = None,
+    grace: float = np.inf,
+) -> None:
+    """Jobs on threads beside the calling one, which hands result after result to ``sink``, in the order they finish.
+
+    A job is given what tells whether to give up. Raises what a job or the sink raised, and Interrupted when ``stop`` is
+    set, after the jobs in flight have ended or so many seconds of ``grace``.
+    """
+    halt, results = threading.Event(), queue.Queue[Any](maxsize=WAITING * threads)
+    halted = partial(_any_set, (halt, stop))
+    worker = threading.Thread(
+        target=run_jobs, args=([partial(_do, job, results, halted) for job in jobs], threads), daemon=True
+    )
+    worker.start()
+    try:
+        for _ in jobs:
+            found = _next(results, stop)
+            if isinstance(found, BaseException):
+                raise found
+            sink(found)
+    finally:
+        halt.set()
+        end = time.monotonic() + grace
+        while worker.is_alive() and time.monotonic() < end:
+            _drain(results)
+            worker.join(0.01)
+
+
+def _do(job: Callable[[Halted], object], results: queue.Queue[Any], halted: Halted) -> None:
+    """One job; what it raises travels to the caller as its result."""
+    if halted():
+        return
+    try:
+        found: object = job(halted)
+    except BaseException as error:
+        found = error
+    while not halted():  # wait for room in the queue, unless the caller has gone
+        with suppress(queue.Full):
+            results.put(found, timeout=0.05)
+            return
+
+
 def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
     from engine.march.richardson import march_scheme
-    from engine.march.stepper import Halted
+    from engine.march.stepper import Halted as Gone
     from engine.march.tables import SceneTables
 
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
-    with suppress(Halted):
+    with suppress(Gone):
         values = grid.values.part(np.zeros(1, dtype=np.int64)).padded
         march_scheme(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 
-def _compute(
-    plan: Plan,
-    tasks: list[tuple[Group, Counts]],
-    threads: int | None,
-    results: queue.Queue[Any],
-    halts: tuple[threading.Event, threading.Event | None],
-) -> None:
-    """Run the chunks as one dask graph on its threaded scheduler."""
-    import dask.threaded
-
-    halted = partial(_any_set, halts)
-    left = Counter(id(group) for group, _ in tasks)
-    graph = {
-        ("chunk", i): (partial(_task, plan, (group, variants), left, results, halted),)
-        for i, (group, variants) in enumerate(tasks)
-    }
-    try:
-        dask.threaded.get(graph, list(graph), num_workers=threads or os.cpu_count())
-    except BaseException as error:
-        _hand_over(error, results, halted)
-
-
-def _task(
-    plan: Plan,
-    chunk: tuple[Group, Counts],
-    left: Counter[int],
-    results: queue.Queue[Any],
-    halted: Callable[[], bool],
-) -> None:
-    """One chunk; what it raises travels to the caller as its result. The last of a scene drops its tables."""
+def _task(plan: Plan, task: tuple[Group, Counts], left: Counter[int], halted: Halted) -> Chunk:
+    """One chunk. The last of a scene drops its tables."""
     from engine.batch.chunk import run_chunk
 
-    if halted():
-        return
-    group, variants = chunk
+    group, variants = task
     try:
-        found: Any = (variants, *run_chunk(plan, group, variants, halted))
-    except BaseException as error:
-        found = error
-    with _COUNTING:
-        left[id(group)] -= 1
-        last = left[id(group)] == 0
-    if last:
-        group.forget()
-    _hand_over(found, results, halted)
-
-
-def _hand_over(found: Any, results: queue.Queue[Any], halted: Callable[[], bool]) -> None:
-    """Wait for room in the queue, unless the caller has gone."""
-    while not halted():
-        try:
-            results.put(found, timeout=0.05)
-            return
-        except queue.Full:
-            continue
+        arrays, selected = run_chunk(plan, group, variants, halted)
+    finally:
+        with _COUNTING:
+            left[id(group)] -= 1
+            last = left[id(group)] == 0
+        if last:
+            group.forget()
+    return Chunk(Rows(variants, arrays), selected)
 
 
 def _next(results: queue.Queue[Any], stop: threading.Event | None) -> Any:
@@ -250,8 +258,3 @@ def _drain(results: queue.Queue[Any]) -> None:
 
 def _any_set(events: tuple[threading.Event | None, ...]) -> bool:
     return any(event is not None and event.is_set() for event in events)
-
-
-def _check_threads(threads: int | None) -> None:
-    if threads is not None and threads < 1:
-        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))

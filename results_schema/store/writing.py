@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +13,24 @@ from results_schema.store import files
 from results_schema.store.tables import Column, Table
 
 _CHUNK_BYTES = 1 << 20
+PLAIN: Mapping[str, Any] = {"fletcher32": True}  # of what is read soon
+PACKED: Mapping[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
 
 
-def write_tables(path: Path, tables: Mapping[str, Table], added: Mapping[str, Any]) -> None:
+def write_tables(
+    path: Path, tables: Mapping[str, Table], added: Mapping[str, Any], filters: Mapping[str, Any] = PACKED
+) -> None:
     """Write tables by group ("/", "/model/bed") into a new file; `added` joins the root's attributes."""
     import netCDF4
 
     with files.NETCDF_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
         for group, table in tables.items():
             place = dataset if group == "/" else dataset.createGroup(group)
-            _write_table(place, table)
+            _write_table(place, table, filters)
         dataset.setncatts(dict(added))
 
 
-def _write_table(place: Any, table: Table) -> None:
+def _write_table(place: Any, table: Table, filters: Mapping[str, Any]) -> None:
     for name, size in table.sizes.items():
         place.createDimension(name, size)
     place.setncatts({key: _attribute(value) for key, value in table.attributes.items()})
@@ -34,7 +39,8 @@ def _write_table(place: Any, table: Table) -> None:
     for name, column in table.columns.items():
         beside = [] if column.is_coordinate else _coordinates_of(column, further, table)
         named.update(beside)
-        _write_column(place, name, column, beside)
+        named_beside = {"coordinates": " ".join(beside)} if beside else {}
+        _write_column(place, name, replace(column, attributes={**column.attributes, **named_beside}), filters)
     rest = [name for name in further if name not in named]
     if rest:
         place.setncattr("coordinates", " ".join(rest))
@@ -45,21 +51,18 @@ def _coordinates_of(column: Column, further: list[str], table: Table) -> list[st
     return [name for name in further if set(table.columns[name].dims) <= set(column.dims)]
 
 
-def _write_column(place: Any, name: str, column: Column, coordinates: list[str]) -> None:
+def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, Any]) -> None:
     options: dict[str, Any] = {"fill_value": False}
     if column.data.dtype.kind == "f" and not column.is_coordinate:
         options["fill_value"] = column.data.dtype.type(np.nan)
     if column.is_chunked:
-        chunks = chunk_shape(column.data.shape, column.data.itemsize)
-        options |= {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": chunks}
+        options |= {**filters, "chunksizes": chunk_shape(column.data.shape, column.data.itemsize)}
     variable = place.createVariable(name, str if column.is_text else column.data.dtype, column.dims, **options)
     variable.set_auto_maskandscale(False)
     if column.is_chunked:
         # Chunks are written whole, one after the other: a cache per variable would only take memory.
         variable.set_var_chunk_cache(_CHUNK_BYTES)
     variable.setncatts({key: _attribute(value) for key, value in column.attributes.items() if key != "_FillValue"})
-    if coordinates:
-        variable.setncattr("coordinates", " ".join(coordinates))
     variable[...] = column.data if column.dims else column.data.item()
 
 

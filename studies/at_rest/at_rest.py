@@ -1,12 +1,12 @@
 """Studies of a scene with its carriages at rest: the first one at one position after another, every other one where it
-starts. Nothing is marched; a kind says by `AtRest` what it computes of a scene, and this cuts the work into pieces.
+starts. Nothing is marched; a kind says what it computes of a scene, and this cuts the work into pieces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from engine.scene.carriages import MAX_CONTACTS
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from studies.at_rest.positions import CORRECTED, Asked, Positions, positions_of, with_modes
-from studies.protocol.measuring import Piece, Work
+from studies.at_rest.labelling import Gathering, asked_coordinates
+from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
+from studies.protocol.parts import Piece, Work
+from studies.protocol.study import PiecedKind, question_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,62 +37,82 @@ UNREDUCED_SECONDS = 0.5  # of one position, about
 START_SECONDS, SHAPES_SECONDS = 0.5, 3.0
 
 
-class AtRest(Protocol):
-    """What a kind computes of a scene at rest; arrays by the names of results, with the dimensions of `Grid`."""
+class AtRestKind(PiecedKind):
+    """What a kind computes of a scene at rest: arrays by the names of results. Its pieces are shapes of the base scene,
+    all variants, and what is compared."""
 
-    name: str
+    settings: type[Asked] = Asked
+    sweeps = True
 
     def variants(self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]) -> Named:
-        """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V,) where a contact opens."""
+        """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V, S) where a contact opens."""
+        raise NotImplementedError
 
     def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> Named:
         """Results (B, S, ...) along all bodies, of the scene without sweep."""
+        raise NotImplementedError
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> Named:
         """Results (S, ...) of the unreduced model, by the names of `variants`."""
+        raise NotImplementedError
 
     def check_model(self, model: SceneModel) -> None:
         """Refuse a scene that has no answer. Raises BadInput."""
 
     def fidelity(self, model: SceneModel) -> Fidelity:
         """Which model computes it."""
+        return model.fidelity
 
-    def inner(self, study: Study, model: SceneModel) -> Mapping[str, tuple[str, NDArray[Any]]]:
+    def inner(self, model: SceneModel) -> Mapping[str, tuple[str, NDArray[Any]]]:
         """Dimensions of results beyond variant and position: result -> dimension and its coordinate."""
+        raise NotImplementedError
 
+    def check(self, study: Study) -> None:
+        """Positions exist, and numbers of modes that every body takes."""
+        asked = question_of(study, self.settings)
+        positions_of(study, asked)
+        check_mode_counts(study, asked)
 
-def pieces_of(kind: AtRest, study: Study, asked: Asked) -> list[Piece]:
-    """The work of a study at rest: shapes of its base scene, all variants, and what is compared."""
-    from engine.batch.plan import check_memory
-    from engine.model.distinct_models import base_scene
-    from engine.scene.sweep import expand
-    from engine.unreduced.scene import unreduced_model
+    def coordinates(self, study: Study) -> Mapping[str, NDArray[Any]]:
+        asked = question_of(study, self.settings)
+        return asked_coordinates(positions_of(study, asked), asked)
 
-    model = base_scene(study)
-    kind.check_model(model)
-    places, cases = positions_of(study, asked), expand(study)
-    if places.unreduced.size:
-        check_held(model)
-        unreduced_model(study.without_sweep())  # refuses bodies that have none
-    count = places.all.size
-    check_memory(study, cases.size, 8 * cases.size * _numbers(study, asked, count))
-    seconds = SHAPES_SECONDS + count * STATION_SECONDS
-    found = [Piece("shapes", "shapes of all bodies in the base scene", partial(_shapes, kind, study, places), seconds)]
-    step = max(1, AT_ONCE // count)
-    for number, first in enumerate(range(0, cases.size, step)):
-        size = min(step, cases.size - first)
-        words = f"{size:,} variants at {count} positions" if cases.size > 1 else f"{count} positions"
-        compute = partial(_variants, kind, study, places, slice(first, first + size))
-        seconds, large = START_SECONDS + size * count * STATION_SECONDS, size * _numbers(study, asked, count) * 8
-        found.append(Piece(f"variants-{number:04d}", words, compute, seconds, large))
-    for modes in asked.mode_counts:
-        words = f"{modes} modes of every body at {places.checked.size} positions"
-        found.append(Piece(f"modes-{modes}", words, partial(_with_modes, kind, study, places, modes), START_SECONDS))
-    if places.unreduced.size:
-        words = f"the unreduced model at {places.unreduced.size} positions"
-        seconds = START_SECONDS + UNREDUCED_SECONDS * places.unreduced.size
-        found.append(Piece("unreduced", words, partial(_unreduced, kind, study, places), seconds))
-    return found
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        return Gathering(self, pieces, study).dataset()
+
+    def pieces(self, study: Study) -> list[Piece]:
+        from engine.batch.plan import check_memory
+        from engine.model.distinct_models import base_scene
+        from engine.scene.sweep import expand
+        from engine.unreduced.scene import unreduced_model
+
+        model, asked = base_scene(study), question_of(study, self.settings)
+        self.check_model(model)
+        places, cases = positions_of(study, asked), expand(study)
+        if places.unreduced.size:
+            check_held(model)
+            unreduced_model(study.without_sweep())  # refuses bodies that have none
+        count = places.all.size
+        check_memory(study, cases.size, 8 * cases.size * _numbers(study, asked, count))
+        seconds = SHAPES_SECONDS + count * STATION_SECONDS
+        shapes = partial(_shapes, self, study, places)
+        found = [Piece("shapes", "shapes of all bodies in the base scene", shapes, seconds)]
+        step = max(1, AT_ONCE // count)
+        for number, first in enumerate(range(0, cases.size, step)):
+            size = min(step, cases.size - first)
+            words = f"{size:,} variants at {count} positions" if cases.size > 1 else f"{count} positions"
+            compute = partial(_variants, self, study, places, slice(first, first + size))
+            seconds, large = START_SECONDS + size * count * STATION_SECONDS, size * _numbers(study, asked, count) * 8
+            found.append(Piece(f"variants-{number:04d}", words, compute, seconds, large))
+        for modes in asked.mode_counts:
+            words = f"{modes} modes of every body at {places.checked.size} positions"
+            compute = partial(_with_modes, self, study, places, modes)
+            found.append(Piece(f"modes-{modes}", words, compute, START_SECONDS))
+        if places.unreduced.size:
+            words = f"the unreduced model at {places.unreduced.size} positions"
+            seconds = START_SECONDS + UNREDUCED_SECONDS * places.unreduced.size
+            found.append(Piece("unreduced", words, partial(_unreduced, self, study, places), seconds))
+        return found
 
 
 def check_held(model: SceneModel) -> None:
@@ -111,7 +133,7 @@ def _numbers(study: Study, asked: Asked, positions: int) -> int:
     return 8 + positions * (modes or 2 * len(study.sensor) + MAX_CONTACTS * len(study.carriage))
 
 
-def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
+def _shapes(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Shapes along all bodies, of the scene without sweep."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
@@ -120,7 +142,7 @@ def _shapes(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dat
     return _plain(kind.shapes(model, frozen(model, places.all)))
 
 
-def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
+def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
     """Some variants, in the order of the scenes that they share."""
     from engine.model.distinct_models import scenes, structure
     from engine.model.variant_values import VariantValues
@@ -139,7 +161,9 @@ def _variants(kind: AtRest, study: Study, places: Positions, part: slice, work: 
     return _plain({"number": np.concatenate(numbers), **joined})
 
 
-def _evaluated(kind: AtRest, model: SceneModel, values: VariantValues, places: Positions) -> dict[str, NDArray[Any]]:
+def _evaluated(
+    kind: AtRestKind, model: SceneModel, values: VariantValues, places: Positions
+) -> dict[str, NDArray[Any]]:
     """Results of some variants of a scene, with NaN where a contact is off the body."""
     from engine.model.station_path import frozen
 
@@ -156,7 +180,7 @@ def _evaluated(kind: AtRest, model: SceneModel, values: VariantValues, places: P
     return found
 
 
-def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:
+def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:
     """Results with another number of modes of every body, with and without static correction."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
@@ -173,7 +197,7 @@ def _with_modes(kind: AtRest, study: Study, places: Positions, modes: int, work:
     return _plain({name: np.stack([one[name] for one in found]) for name in names})
 
 
-def _unreduced(kind: AtRest, study: Study, places: Positions, work: Work) -> xr.Dataset:
+def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Results of the unreduced model, and those of the modes at the same positions."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen

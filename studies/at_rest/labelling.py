@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from results_schema.variables import Variable
 from studies.at_rest.positions import Asked, Positions, positions_of
-from studies.protocol.measuring import described, usual
+from studies.protocol.parts import usual
+from studies.protocol.study import question_of
 from studies.results.results import sensor_units
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from engine.scene.study import Study
-    from studies.at_rest.at_rest import AtRest
+    from studies.at_rest.at_rest import AtRestKind
 
 BODY_PLACES = 101  # along every body, of its shapes
 
@@ -58,11 +59,6 @@ COORDINATES = (
 )
 
 
-def gathered(kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked: Asked) -> xr.Dataset:
-    """The study's dataset from its pieces."""
-    return _Gathering(kind, pieces, study, asked).dataset()
-
-
 def asked_coordinates(places: Positions, asked: Asked) -> dict[str, NDArray[Any]]:
     """The coordinates that follow from what is asked."""
     return {
@@ -74,16 +70,16 @@ def asked_coordinates(places: Positions, asked: Asked) -> dict[str, NDArray[Any]
     }
 
 
-class _Gathering:
+class Gathering:
     """The pieces of one study with what their dimensions mean."""
 
-    def __init__(self, kind: AtRest, pieces: Mapping[str, xr.Dataset], study: Study, asked: Asked) -> None:
+    def __init__(self, kind: AtRestKind, pieces: Mapping[str, xr.Dataset], study: Study) -> None:
         from engine.model.distinct_models import base_scene
         from engine.scene.sweep import expand
 
-        self.kind, self.pieces, self.asked = kind, pieces, asked
-        self.model, self.cases, self.places = base_scene(study), expand(study), positions_of(study, asked)
-        self.inner = kind.inner(study, self.model)
+        self.pieces, self.asked = pieces, question_of(study, kind.settings)
+        self.model, self.cases, self.places = base_scene(study), expand(study), positions_of(study, self.asked)
+        self.inner = kind.inner(self.model)
         self.declared = _declared(kind.name, study)
 
     def dataset(self) -> xr.Dataset:
@@ -106,7 +102,7 @@ class _Gathering:
             "body_place": np.linspace(0.0, 1.0, BODY_PLACES),
             **dict(self.inner.values()),
         }
-        return [(name, described(known[name], (name,), array)) for name, array in values.items()]
+        return [(name, known[name].holding(array, (name,))) for name, array in values.items()]
 
     def _dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a result beyond variant and position."""
@@ -126,7 +122,7 @@ class _Gathering:
         found = dict(usual(self.cases.dims, **own, steps=np.zeros(shape)))
         for name, array in whole.items():
             dims = (*self.cases.dims, "position", *self._dims(name))
-            found[name] = described(self.declared[name], dims, array.reshape(*shape, *array.shape[1:]))
+            found[name] = self.declared[name].holding(array.reshape(*shape, *array.shape[1:]), dims)
         return found
 
     def _shapes(self) -> dict[str, Any]:
@@ -135,7 +131,7 @@ class _Gathering:
         for name, array in self.pieces["shapes"].data_vars.items():
             along = ("on_body", "position", *self._dims(str(name)), "body_place")
             dims = along if array.ndim == len(along) else ("position", *self._dims(str(name)))
-            found[str(name)] = described(self.declared[str(name)], dims, array.values)
+            found[str(name)] = self.declared[str(name)].holding(array.values, dims)
         return found
 
     def _mode_counts(self) -> dict[str, Any]:
@@ -149,7 +145,7 @@ class _Gathering:
             if variable is not None:
                 array = np.stack([part[name].values for part in parts], axis=1)
                 dims = ("correction", "mode_count", "checked_position", *self._dims(name))
-                found[variable.name] = described(variable, dims, array)
+                found[variable.name] = variable.holding(array, dims)
         return found
 
     def _unreduced(self) -> dict[str, Any]:
@@ -162,11 +158,11 @@ class _Gathering:
                 continue
             dims = ("unreduced_position", *self._dims(name))
             full, reduced = piece[name].values, piece[f"{name}_reduced"].values
-            found[f"{name}_unreduced"] = described(self.declared[f"{name}_unreduced"], dims, full)
+            found[f"{name}_unreduced"] = self.declared[f"{name}_unreduced"].holding(full, dims)
             # every frequency by itself; readings change their sign on the way
             size = np.abs(full) if name == "frequency" else np.full_like(full, np.abs(full).max(initial=0.0))
             part = np.divide(reduced - full, size, out=np.zeros_like(full), where=size > 0.0)
-            found[f"{name}_difference"] = described(self.declared[f"{name}_difference"], dims, part)
+            found[f"{name}_difference"] = self.declared[f"{name}_difference"].holding(part, dims)
         return found
 
 

@@ -33,20 +33,11 @@ def init(kind: str, file: Path | None) -> None:
 def check(study: str) -> None:
     """Validate a study and print what a run would do."""
     import engine
-    from studies.commands.preview import preview, preview_of_pieces
-    from studies.protocol.measuring import MeasuringKind
+    from studies.commands.preview import preview
     from studies.protocol.study import kind_of
-    from studies.runs.unreduced import check_unreduced
 
     loaded = engine.load(catalogue.find_study(study))
-    kind = kind_of(loaded)
-    if isinstance(kind, MeasuringKind):
-        shown = preview_of_pieces(kind, loaded)
-    else:
-        check_unreduced(loaded)
-        plan = engine.make_plan(loaded, reduction=kind.reduction(loaded), results=kind.name)
-        shown = preview(plan, len(os.sched_getaffinity(0)))
-    console.show_preview(shown)
+    console.show_preview(preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0))))
 
 
 def run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
@@ -107,16 +98,18 @@ def info(archive: Path) -> None:
 def _refuse_unfinished(archive: Path) -> None:
     """Tell of an unfinished run where its archive is not there yet. Raises BadInput."""
     from results_schema.store.parts import finished_so_far
-    from results_schema.store.pieces import pieces_so_far
 
-    if archive.exists() or (finished := finished_so_far(archive)) is None:
+    if archive.exists() or (parts := finished_so_far(archive)) is None:
         return
-    pieces = pieces_so_far(archive)
+    variants = {int(number) for part in parts for number in part}
+    pieces = sum(part.size == 0 for part in parts)
     raise BadInput(
         "not there yet; an unfinished run of it is",
         where=str(archive),
         expected="a finished archive",
-        received=counted(pieces, "finished piece") if pieces else f"parts with {counted(finished, 'finished variant')}",
+        received=counted(pieces, "finished piece")
+        if pieces
+        else f"parts with {counted(len(variants), 'finished variant')}",
         remedy=f"wait for the run if one is at work, or go on from there: wanderlast run STUDY -o {archive}",
     )
 

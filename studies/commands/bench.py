@@ -16,6 +16,7 @@ from engine.march.step_rules import allow_any_steps
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from results_schema.store.rows import Chunk
 
 BEST_OF = 7
 MOST_REPEATS = 20
@@ -163,7 +164,8 @@ def largest_deflections(scene: Scene) -> NDArray[np.float64]:
     """(variants,) largest magnitude of the midspan deflection, m: what the march that `measure` times computes."""
     found = np.empty(scene.variants)
 
-    def take(variants: NDArray[np.int64], arrays: dict[str, NDArray[Any]], selected: object) -> None:
+    def take(chunk: Chunk) -> None:
+        variants, arrays = chunk.rows
         found[variants] = np.maximum(arrays[f"{MIDSPAN}_max"], -arrays[f"{MIDSPAN}_min"])
 
     execute(make_plan(scene.study(), check_steps=allow_any_steps), take)

@@ -165,13 +165,13 @@ def _about_statuses(counts: Mapping[str, int], noun: str) -> Iterator[str]:
 
 
 def _about_work(outcome: Outcome) -> str:
+    from studies.findings.numerics_used import is_marched
     from studies.reporting import summary
 
-    pieced = summary.is_pieced(outcome.results)
     variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))
     if outcome.was_finished:
         return f"{outcome.archive} holds the finished results of this very study; nothing to do"
-    resumed = counted(outcome.resumed, "piece") if pieced else f"{outcome.resumed:,} of them"
+    resumed = f"{outcome.resumed:,} of them" if is_marched(outcome.results) else counted(outcome.resumed, "piece")
     earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
     return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"
 

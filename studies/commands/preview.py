@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,19 +13,17 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
 from engine.batch.plan import Plan
-from engine.batch.plausibility import remarks
 from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases, expand
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
-from studies.protocol.measuring import disk_bytes
+from studies.protocol.parts import Pieces, Variants
 from studies.results.formatting import counted, number, unit_text
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
-    from studies.protocol.measuring import MeasuringKind
 
 Array = NDArray[np.float64]
 
@@ -48,8 +47,16 @@ class Preview:
     remarks: tuple[str, ...]
 
 
-def preview(plan: Plan, threads: int) -> Preview:
-    """The explanation of a plan for so many threads, from about a second of measuring."""
+@singledispatch
+def preview(parts: Any, threads: int) -> Preview:
+    """The explanation of a study's work for so many threads."""
+    raise NotImplementedError
+
+
+@preview.register
+def _of_variants(parts: Variants, threads: int) -> Preview:
+    """That of a plan, from about a second of measuring."""
+    plan = parts.plan
     seen = forecast(plan, threads)
     tables = (
         *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan)),
@@ -58,7 +65,7 @@ def preview(plan: Plan, threads: int) -> Preview:
     room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
     cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}"
     remark = (seen.remark,) if seen.remark else ()
-    return Preview(tuple(table for table in tables if table.rows), cost, (*remarks(plan), *remark))
+    return Preview(tuple(table for table in tables if table.rows), cost, (*parts.remarks, *remark))
 
 
 def _audit(seen: Forecast) -> str:
@@ -74,9 +81,10 @@ def _audit(seen: Forecast) -> str:
     )
 
 
-def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
-    """The explanation of a study that measures: its pieces, one after another, and the time they take."""
-    pieces = kind.pieces(study)
+@preview.register
+def _of_pieces(parts: Pieces, threads: int) -> Preview:
+    """That of pieces, one after another, and the time they take."""
+    kind, study, pieces = parts.kind, parts.study, parts.pieces
     rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
     cases = expand(study)
     if kind.sweeps:
@@ -89,7 +97,7 @@ def preview_of_pieces(kind: MeasuringKind, study: Study) -> Preview:
     )
     cost = (
         f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
-        f"{size(disk_bytes(pieces))} on the disk."
+        f"{size(parts.disk_bytes)} on the disk."
     )
     return Preview(tuple(table for table in tables if table.rows), cost, ())
 

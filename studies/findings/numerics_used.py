@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.status import Fidelity, SchemeUsed, label
-from studies.protocol.study import is_measuring
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -27,9 +29,9 @@ NAMES: Mapping[Fidelity, str] = {
 }
 
 
-def is_marched(results: Results) -> bool:
-    """Whether variants of a sweep were computed, each with a model, modes and steps of its own."""
-    return not is_measuring(str(results.dataset.attrs["study_kind"]))
+def is_marched(dataset: xr.Dataset) -> bool:
+    """Whether variants of a sweep were marched, each with a model, modes and steps of its own."""
+    return ERROR in dataset
 
 
 def of_variants(results: Results, name: str) -> Array:
@@ -67,7 +69,9 @@ def told_choices(results: Results) -> list[str]:
 def as_json(results: Results) -> list[dict[str, Any]]:
     """What `run --json` says of it: one entry for every model that variants took, cheapest first."""
     chosen = of_variants(results, MODEL)
-    return [_entry(results, model, chosen == model) for model in (models(results) if is_marched(results) else ())]
+    return [
+        _entry(results, model, chosen == model) for model in (models(results) if is_marched(results.dataset) else ())
+    ]
 
 
 def _entry(results: Results, model: Fidelity, which: NDArray[np.bool_]) -> dict[str, Any]:

@@ -14,13 +14,12 @@ from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
 from studies.findings import indices, theory
+from studies.protocol.study import Kind
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, listed, percent, quantity
 from studies.results.results import VARIANT, Results, extreme
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
@@ -103,7 +102,7 @@ class AsymmetryReduction:
         return {"lag": lag, "loop_area": compared.gap("loop_area")} | rms
 
 
-class Asymmetry:
+class Asymmetry(Kind):
     """The kind "asymmetry"."""
 
     name = "asymmetry"
@@ -134,9 +133,6 @@ class Asymmetry:
 
     def reduction(self, study: Study) -> AsymmetryReduction:
         return AsymmetryReduction()
-
-    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-        return dataset
 
     def findings(self, results: Results) -> list[str]:
         left = theory.remainder_of_start(results)

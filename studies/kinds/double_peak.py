@@ -15,6 +15,7 @@ from results_schema.variables import AXES, MARCH, Variable, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.findings.peaks import PEAKS, peaks
+from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import MINUS, counted, listed, number, percent
 from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
@@ -128,7 +129,7 @@ class DoublePeakReduction:
         return {"peak_value": compared.of_readings(_peak_gap(compared)), "harmonic": compared.relative(harmonics)}
 
 
-class DoublePeak:
+class DoublePeak(Kind):
     """The kind "double-peak"."""
 
     name = "double-peak"

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
 from results_schema.variables import Variable, declare
-from studies.at_rest.at_rest import pieces_of
+from studies.at_rest.at_rest import AtRestKind
 from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors
-from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
-from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.protocol.measuring import Piece, question_of
+from studies.at_rest.labelling import BODY_PLACES, COORDINATES
+from studies.at_rest.positions import Asked, all_positions
+from studies.protocol.study import question_of
 from studies.results.findings_common import first_carriage, in_words
 from studies.results.formatting import counted, listed, number, percent, quantity
 from studies.results.results import Results, extreme
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import StationPath
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
-    from results_schema.status import Fidelity
     from studies.pictures.common.figures import Figure
 
 Array = NDArray[np.float64]
@@ -103,14 +98,13 @@ RESULTS = (
 declare("eigenfrequencies", *RESULTS, *COORDINATES)
 
 
-class Eigenfrequencies:
+class Eigenfrequencies(AtRestKind):
     """The kind "eigenfrequencies"."""
 
     name = "eigenfrequencies"
     summary = "natural frequencies and shapes of the coupled system against the carriage's position"
     question = "How do the natural frequencies change with the place of the carriage?"
-    settings: type[Spec] = Question
-    sweeps = True
+    settings = Question
 
     def check(self, study: Study) -> None:
         """Something moves that has inertia, and positions exist."""
@@ -122,17 +116,36 @@ class Eigenfrequencies:
                 where=study.source.where("solver.fidelity" if forced else "carriage"),
                 expected='"auto"' if forced else 'a carriage of the kind "mass", "oscillator" or "body"',
             )
-        asked = question_of(study, Question)
-        positions_of(study, asked)
-        check_mode_counts(study, asked)
+        super().check(study)
 
-    def pieces(self, study: Study) -> Sequence[Piece]:
-        asked = question_of(study, Question)
-        return pieces_of(_Coupled(asked.modes), study, asked)
+    def variants(
+        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
+    ) -> dict[str, NDArray[Any]]:
+        from engine.statics.coupled_modes import coupled_frequencies
 
-    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
-        asked = question_of(study, Question)
-        return gathered(_Coupled(asked.modes), pieces, study, asked)
+        return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}
+
+    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
+        from engine.model.variant_values import VariantValues
+        from engine.statics.coupled_modes import coupled_modes
+
+        found = coupled_modes(model, VariantValues(model.study, {}, 1), along, _count(model.study))
+        lines = []
+        for part in model.bodies:
+            rows = part.modal.shape(np.linspace(0.0, part.modal.length, BODY_PLACES))
+            lines.append(np.einsum("xn,snk->skx", rows, found.shapes[0, :, part.modes]))
+        return {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
+
+    def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
+        from engine.unreduced.scene import unreduced_model
+        from engine.unreduced.statics import unreduced_frequencies
+
+        found = unreduced_frequencies(unreduced_model(study), all_positions(model, positions), _count(study))
+        return {"frequency": found}
+
+    def inner(self, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
+        mode = ("mode", np.arange(1, _count(model.study) + 1))
+        return {"frequency": mode, "base_frequency": mode, "mode_shape": mode}
 
     def findings(self, results: Results) -> list[str]:
         said = [_along(results), *_together(results), *_sweep(results)]
@@ -147,48 +160,9 @@ class Eigenfrequencies:
 KIND = Eigenfrequencies()
 
 
-class _Coupled:
-    """What is computed of a scene at rest: `studies.at_rest.at_rest.AtRest`."""
-
-    name = "eigenfrequencies"
-
-    def __init__(self, count: int) -> None:
-        self.count = count
-
-    def variants(
-        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
-    ) -> dict[str, NDArray[Any]]:
-        from engine.statics.coupled_modes import coupled_frequencies
-
-        return {"frequency": coupled_frequencies(model, values, along, self.count) / (2.0 * np.pi)}
-
-    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
-        from engine.model.variant_values import VariantValues
-        from engine.statics.coupled_modes import coupled_modes
-
-        found = coupled_modes(model, VariantValues(model.study, {}, 1), along, self.count)
-        lines = []
-        for part in model.bodies:
-            rows = part.modal.shape(np.linspace(0.0, part.modal.length, BODY_PLACES))
-            lines.append(np.einsum("xn,snk->skx", rows, found.shapes[0, :, part.modes]))
-        return {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
-
-    def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
-        from engine.unreduced.scene import unreduced_model
-        from engine.unreduced.statics import unreduced_frequencies
-
-        found = unreduced_frequencies(unreduced_model(study), all_positions(model, positions), self.count)
-        return {"frequency": found}
-
-    def check_model(self, model: SceneModel) -> None:
-        """Nothing more: a body that nothing holds has frequencies too."""
-
-    def fidelity(self, model: SceneModel) -> Fidelity:
-        return model.fidelity
-
-    def inner(self, study: Study, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
-        mode = ("mode", np.arange(1, self.count + 1))
-        return {"frequency": mode, "base_frequency": mode, "mode_shape": mode}
+def _count(study: Study) -> int:
+    """How many frequencies are asked for."""
+    return question_of(study, Question).modes
 
 
 def _signed(shapes: Array) -> Array:

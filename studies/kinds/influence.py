@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.study_file.spec import Spec
 from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import Variable, declare
-from studies.at_rest.at_rest import check_held, pieces_of
+from studies.at_rest.at_rest import AtRestKind, check_held
 from studies.at_rest.findings import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
-from studies.at_rest.labelling import BODY_PLACES, COORDINATES, gathered
-from studies.at_rest.positions import Asked, all_positions, check_mode_counts, positions_of
-from studies.protocol.measuring import Piece, question_of
+from studies.at_rest.labelling import BODY_PLACES, COORDINATES
+from studies.at_rest.positions import all_positions
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, percent, quantity
 from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import StationPath
     from engine.model.variant_values import VariantValues
@@ -119,14 +114,12 @@ RESULTS = (
 declare("influence", *RESULTS, *COORDINATES)
 
 
-class Influence:
+class Influence(AtRestKind):
     """The kind "influence"."""
 
     name = "influence"
     summary = "static readings, contact forces and deflected shapes under gravity against the carriage's position"
     question = "What do the weights do at rest, wherever the carriage stands?"
-    settings: type[Spec] = Asked
-    sweeps = True
 
     def check(self, study: Study) -> None:
         """Something stands on a body, something with a static reading is measured, and positions exist."""
@@ -140,34 +133,7 @@ class Influence:
                     expected="displacement, a section force, stress or contact_force",
                     received=sensor.quantity,
                 )
-        asked = question_of(study, Asked)
-        positions_of(study, asked)
-        check_mode_counts(study, asked)
-
-    def pieces(self, study: Study) -> Sequence[Piece]:
-        return pieces_of(_Static(), study, question_of(study, Asked))
-
-    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
-        return gathered(_Static(), pieces, study, question_of(study, Asked))
-
-    def findings(self, results: Results) -> list[str]:
-        said = [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
-        said += _contacts(results)
-        return [*said, *_unreduced(results), *_mode_counts(results), *told_statuses(results)]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import influence
-
-        return influence.pictures(results)
-
-
-KIND = Influence()
-
-
-class _Static:
-    """What is computed of a scene at rest: `studies.at_rest.at_rest.AtRest`."""
-
-    name = "influence"
+        super().check(study)
 
     def variants(
         self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
@@ -217,10 +183,23 @@ class _Static:
     def fidelity(self, model: SceneModel) -> Fidelity:
         return Fidelity.STATIC
 
-    def inner(self, study: Study, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
+    def inner(self, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
         from engine.statics.static_response import contact_names
 
         return {"contact_force": ("contact", np.array(contact_names(model)))}
+
+    def findings(self, results: Results) -> list[str]:
+        said = [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        said += _contacts(results)
+        return [*said, *_unreduced(results), *_mode_counts(results), *told_statuses(results)]
+
+    def figures(self, results: Results) -> list[Figure]:
+        from studies.pictures import influence
+
+        return influence.pictures(results)
+
+
+KIND = Influence()
 
 
 def _span(results: Results, sensor: str) -> str:

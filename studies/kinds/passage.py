@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import VARIANT, Axis, Index, Results, chosen, extreme
@@ -28,7 +29,7 @@ BEYOND = "The equations assume contact: beyond, they say no more."
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
 
-class Passage:
+class Passage(Kind):
     """The kind "passage"."""
 
     name = "passage"
@@ -39,9 +40,6 @@ class Passage:
         """Something moves and something is measured."""
         first_carriage(study)
         check_sensors(study)
-
-    def reduction(self, study: Study) -> None:
-        return None
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return with_amplification(dataset, study)

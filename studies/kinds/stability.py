@@ -14,7 +14,8 @@ from results_schema.variables import axes, declare
 from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked
 from studies.maps.table import MAPS
-from studies.protocol.measuring import Piece, question_of, usual
+from studies.protocol.parts import Piece, usual
+from studies.protocol.study import PiecedKind, question_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,14 +30,13 @@ for _map in MAPS.values():
     declare("stability", *_map.variables)
 
 
-class Stability:
+class Stability(PiecedKind):
     """The kind "stability"."""
 
     name = "stability"
     summary = "where schemes and couplings grow without reason: limits, thresholds and maps, with the theory beside"
     question = "With which step, mass and speed does a method of time integration stop telling the truth?"
     settings = Asked
-    sweeps = False
 
     def check(self, study: Study) -> None:
         """One mass that crosses one held body, and maps that exist."""

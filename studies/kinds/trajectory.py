@@ -8,13 +8,12 @@ import numpy as np
 
 from results_schema.errors import BadInput
 from results_schema.variables import MARCH, Variable, declare
+from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses
 from studies.results.formatting import counted, quantity
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
@@ -42,7 +41,7 @@ RESULTS = (
 declare("trajectory", *MARCH, *RESULTS)
 
 
-class Trajectory:
+class Trajectory(Kind):
     """The kind "trajectory"."""
 
     name = "trajectory"
@@ -60,12 +59,6 @@ class Trajectory:
                 expected='"auto", "all" or { every = n }',
                 received='"none"',
             )
-
-    def reduction(self, study: Study) -> None:
-        return None
-
-    def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-        return dataset
 
     def findings(self, results: Results) -> list[str]:
         traced = results.traced()

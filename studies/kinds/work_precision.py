@@ -34,7 +34,8 @@ from studies.precision.variables import (
     TOTAL_REFERENCE_ERROR,
     TOTAL_SECONDS,
 )
-from studies.protocol.measuring import Piece, Work, described, question_of, usual
+from studies.protocol.parts import Piece, Work, usual
+from studies.protocol.study import PiecedKind, question_of
 from studies.results.findings_common import check_sensors, first_carriage
 from studies.results.results import Results
 
@@ -106,14 +107,13 @@ class Question(Spec):
 declare("work-precision", *RESULTS, *COORDINATES)
 
 
-class WorkPrecision:
+class WorkPrecision(PiecedKind):
     """The kind "work-precision"."""
 
     name = "work-precision"
     summary = "error against cost of schemes, steps, modes and static correction; what to take for which accuracy"
     question = "Which scheme, how many steps and how many modes give which accuracy at the least cost?"
-    settings: type[Spec] = Question
-    sweeps = False
+    settings = Question
 
     def check(self, study: Study) -> None:
         """One mass on one smooth way in every scene, and sensors with a static value."""
@@ -264,10 +264,10 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
         modes=used,
         steps=np.broadcast_to(counts, diverged.shape).copy(),
     )
-    found = {variable.name: described(variable, *values) for variable, values in data.items()}
+    found = {variable.name: variable.holding(values, dims) for variable, (dims, values) in data.items()}
     by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{slug_of(scene)}") in pieces]
     for variable, name in ((JAX_ERROR, "error"), (JAX_SECONDS, "seconds")) if by_jax else ():
-        found[variable.name] = described(variable, variable.dims, np.stack([piece[name].values for piece in by_jax]))
+        found[variable.name] = variable.holding(np.stack([piece[name].values for piece in by_jax]))
     found |= _automatic(pieces, asked)
     threads = sorted({int(piece["threads"]) for piece in steps})
     told = {
@@ -286,7 +286,7 @@ def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, A
     for name, variable in AUTOMATIC.items():
         missing = np.nan if variable.nan_allowed else 0
         values = [[float(pieces[piece][name]) if piece in pieces else missing for piece in row] for row in names]
-        found[variable.name] = described(variable, variable.dims, values)
+        found[variable.name] = variable.holding(values)
     return found
 
 

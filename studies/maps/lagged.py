@@ -14,7 +14,7 @@ from studies.results.formatting import listed, number
 if TYPE_CHECKING:
     import xarray as xr
 
-    from studies.protocol.measuring import Work
+    from studies.protocol.parts import Work
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from engine.model.variant_values import VariantValues
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
-    from studies.protocol.measuring import Work
+    from studies.protocol.parts import Work
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

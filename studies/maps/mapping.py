@@ -11,12 +11,12 @@ from pydantic import AfterValidator, Field, Strict
 from engine.study_file.spec import Spec
 from engine.study_file.units import fault
 from results_schema.variables import Variable, axes
-from studies.protocol.measuring import Work, described
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from studies.maps.map_scene import Ground
+    from studies.protocol.parts import Work
 
 
 def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -99,8 +99,8 @@ def dataset_of(
     import xarray as xr
 
     known = {variable.name: variable for variable in declared}
-    coords = {name: described(known[name], (name,), found) for name, found in along.items()}
-    data = {name: described(known[name], known[name].dims, _finite(found)) for name, found in values.items()}
+    coords = {name: known[name].holding(found, (name,)) for name, found in along.items()}
+    data = {name: known[name].holding(_finite(found)) for name, found in values.items()}
     return xr.Dataset(data, coords, dict(zip(("most_modes", "most_steps"), marched, strict=True)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from engine.methods.ode import ModalEquations
 from engine.scene.axes import sobol_points
 from engine.scene.study import Study
 from studies.precision import jax_march, precision
-from studies.protocol.measuring import Work
+from studies.protocol.parts import Work
 
 SOLVERS = {"DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10), "Radau": (1e-2, 1e-4, 1e-6, 1e-8)}
 REFERENCE_TOLERANCES = (1e-12, 1e-10)
@@ -166,5 +167,5 @@ def around(study: Study, tolerance: float) -> Study:
 def chosen_tables(study: Study, work: Work) -> SceneTables:
     """The tables of the march that is chosen for the first variant of a study of many. Raises Halted."""
     plan = make_plan(study)
-    plan.choose(lambda jobs: run_jobs(jobs, work.threads), work.halted)
+    plan.choose(partial(run_jobs, threads=work.threads), work.halted)
     return next(group.tables for group in plan.groups if 0 in group.variants)

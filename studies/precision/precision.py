@@ -30,7 +30,7 @@ from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from results_schema.status import Status
-from studies.protocol.measuring import Work
+from studies.protocol.parts import Work
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

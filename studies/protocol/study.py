@@ -3,67 +3,182 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
 from results_schema.pieces import Pieces, lacks
-from studies.protocol.measuring import MeasuringKind, Work, check_measurable, measure
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
     from engine.observation.cycle_reduction import Reduction
     from engine.scene.study import Study
+    from engine.study_file.spec import Spec
     from studies.pictures.common.figures import Figure
+    from studies.protocol.parts import Parts, Piece
     from studies.results.results import Results
+
+    AnySpec = TypeVar("AnySpec", bound=Spec)
+else:
+    AnySpec = TypeVar("AnySpec")
 
 KINDS_FOLDER = Path(__file__).parents[1] / "kinds"
 
 
-class Kind(Protocol):
-    """One kind of question about one scene and its sweep. A module in `studies/kinds` has one as its attribute KIND,
-    and declares its results; or it has a `studies.protocol.measuring.MeasuringKind`. Another package names its own by
-    an entry point, and has a study file to start from as its attribute ``start``.
+class Kind:
+    """One kind of question about a scene and its sweep: how its work is cut into parts, what they become together, and
+    the answer in sentences and figures. What a kind leaves out is as here: all variants are marched. A module in
+    `studies/kinds` has one as its attribute KIND, and declares its results; another package names its own by an entry
+    point.
 
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
+    settings: the class of its table [question], None where it has none. sweeps: whether it takes a [sweep], whose grid
+    is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
+    failure of the run. start: a study file to start from, of a kind of another package.
     """
 
     name: str
     summary: str
     question: str
+    settings: type[Spec] | None = None
+    sweeps = True
+    start: str
 
     def check(self, study: Study) -> None:
         """Refuse a scene that does not suit the kind. Raises BadInput; nothing large is computed."""
 
+    def check_tables(self, study: Study) -> None:
+        """Refuse a table [question], or options in it, that the kind does not know. Raises BadInput."""
+        if self.settings is not None:
+            question_of(study, self.settings)
+        elif study.question:
+            raise BadInput(
+                f"studies of the kind {self.name} have no options",
+                where=study.source.where("question"),
+                expected="no table [question]",
+                received=f"the keys {', '.join(study.question)}",
+            )
+
+    def parts(self, study: Study) -> Parts:
+        """The work. Raises BadInput where it cannot be done."""
+        from studies.protocol.parts import Variants
+
+        return Variants(self, study)
+
     def reduction(self, study: Study) -> Reduction | None:
         """What to compute from the histories of each chunk of variants; None where extremes are enough."""
+        return None
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-        """The engine's dataset with the study's own results."""
+        """The march's dataset with the study's own results."""
+        return dataset
+
+    def coordinates(self, study: Study) -> Mapping[str, NDArray[Any]]:
+        """The coordinates that follow from the table [question]."""
+        return {}
 
     def findings(self, results: Results) -> list[str]:
         """The answer in sentences, the most important first; every number comes from the data."""
+        return []
 
     def figures(self, results: Results) -> list[Figure]:
         """The figures of the report, the most important first."""
+        return []
 
 
-AnyKind = Kind | MeasuringKind
+class PiecedKind(Kind):
+    """A kind that is computed in pieces of its own instead of by a march of variants."""
+
+    sweeps = False
+
+    def check_tables(self, study: Study) -> None:
+        if study.sweep.axes and not self.sweeps:
+            raise BadInput(
+                f"a study of the kind {self.name} takes no sweep: it varies methods, not the scene",
+                where=study.source.where("sweep"),
+                expected="no table [sweep]",
+                received=f"the axes {', '.join(study.sweep.axes)}",
+                remedy="what it varies stands in the table [question]",
+            )
+        if study.envelope:
+            raise BadInput(
+                f"studies of the kind {self.name} have no envelopes",
+                where=study.source.where("envelope"),
+                expected="no table [envelope]",
+                received=", ".join(study.envelope),
+            )
+        super().check_tables(study)
+        if self.sweeps:
+            _check_names(study)
+
+    def parts(self, study: Study) -> Parts:
+        from studies.protocol import parts
+
+        return parts.Pieces(self, study)
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        """The work, always the same for the same study; nothing large is computed."""
+        raise NotImplementedError
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        """The study's dataset from the datasets of all pieces by name."""
+        raise NotImplementedError
+
+
+def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
+    """The table [question] of a study, validated. Raises BadInput with the dotted key.
+
+    >>> import engine
+    >>> from engine.study_file.spec import Spec
+    >>> class Counts(Spec):
+    ...     modes: int = 3
+    >>> question_of(engine.Study(kind="passage", question={"modes": 5}), Counts).modes
+    5
+    """
+    from pydantic import ValidationError, create_model
+
+    from engine.study_file.spec import Spec, refuse
+
+    data = {"question": study.question}
+    whole = create_model("Whole", __base__=Spec, question=(settings, ...))
+    try:
+        return whole.model_validate(data).question  # type: ignore[attr-defined, no-any-return]
+    except ValidationError as error:
+        refuse(error, whole, data, study.source)
+
+
+def _check_names(study: Study) -> None:
+    """Refuse names of sensors, carriages and axes that the kind's own results have."""
+    from results_schema.variables import expand
+    from studies.results.results import sensor_units
+
+    try:
+        declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
+    except BadInput as error:
+        raise BadInput(error.what, where=study.source.where(error.where), remedy=error.remedy) from None
+    for name in study.sweep.axes:
+        if name in declared:
+            where = study.source.where(f"sweep.{name}")
+            raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
+
+
 KIND_HAS = ("name", "summary", "question", "check", "findings", "figures")
 
 
-class _OwnKinds(Mapping[str, AnyKind]):
+class _OwnKinds(Mapping[str, Kind]):
     """The kinds of the folder of kinds, each imported when it is asked for."""
 
-    def __getitem__(self, name: str) -> AnyKind:
+    def __getitem__(self, name: str) -> Kind:
         if name not in self._names:
             raise KeyError(name)
-        return cast(AnyKind, import_module(f"studies.kinds.{name.replace('-', '_')}").KIND)
+        kind: Kind = import_module(f"studies.kinds.{name.replace('-', '_')}").KIND
+        return kind
 
     def __contains__(self, name: object) -> bool:
         return name in self._names
@@ -80,7 +195,7 @@ class _OwnKinds(Mapping[str, AnyKind]):
 
 
 #: The kinds of study that there are; a new one is one new file in the folder of kinds, or an entry point.
-KINDS: Pieces[AnyKind] = Pieces(
+KINDS: Pieces[Kind] = Pieces(
     group="wanderlast.kinds",
     noun="kind of study",
     own=_OwnKinds(),
@@ -89,12 +204,19 @@ KINDS: Pieces[AnyKind] = Pieces(
 )
 
 
+class _Completed(Kind):
+    """An object of another package that is no `Kind`: what it leaves out is as in `Kind`."""
+
+    def __init__(self, own: object) -> None:
+        self.__dict__ |= {name: getattr(own, name) for name in dir(own) if not name.startswith("__")}
+
+
 def kind_names() -> tuple[str, ...]:
     """The kinds of study that there are."""
     return tuple(sorted(KINDS))
 
 
-def kind_named(name: str, where: str = "kind") -> AnyKind:
+def kind_named(name: str, where: str = "kind") -> Kind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
     if name not in KINDS:
         known = kind_names()
@@ -102,26 +224,14 @@ def kind_named(name: str, where: str = "kind") -> AnyKind:
         remedy = f'did you mean "{near[0]}"?' if near else ""
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
-    return KINDS[name]
+    kind = KINDS[name]
+    return kind if isinstance(kind, Kind) else _Completed(kind)
 
 
-def is_measuring(name: str) -> bool:
-    """Whether the kind of that name is computed in pieces, and not by a march. Raises BadInput for an unknown one."""
-    return isinstance(kind_named(name), MeasuringKind)
-
-
-def kind_of(study: Study) -> AnyKind:
+def kind_of(study: Study) -> Kind:
     """The kind of a study, after its check. Raises BadInput."""
     kind = kind_named(study.kind, study.source.where("kind"))
-    if isinstance(kind, MeasuringKind):
-        check_measurable(study, kind)
-    elif study.question:
-        raise BadInput(
-            f"studies of the kind {kind.name} have no options",
-            where=study.source.where("question"),
-            expected="no table [question]",
-            received=f"the keys {', '.join(study.question)}",
-        )
+    kind.check_tables(study)
     kind.check(study)
     return kind
 
@@ -129,46 +239,20 @@ def kind_of(study: Study) -> AnyKind:
 def run(study: Study, **options: Any) -> xr.Dataset:
     """Run a study in memory: the dataset of its archive. Raises BadInput.
 
-    options: as of `engine.run`; of a study that measures only `threads` and `progress`.
+    options: threads, progress and chunk, as of `engine.run`.
     """
-    from engine.batch.execution import run as march
+    from studies.protocol.parts import Memory, Work
 
-    kind = kind_of(study)
-    if isinstance(kind, MeasuringKind):
-        work = Work(options.pop("threads", None))
-        return gathered(measure(kind.pieces(study), work, **options), study)
-    return finish(march(study, reduction=kind.reduction(study), results=kind.name, **options), study)
+    parts, store = kind_of(study).parts(study), Memory()
+    parts.compute(store, Work(**options))
+    return compared(parts.gather(store), study)
 
 
-def finish(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """The study's own results added to the engine's dataset, all compared with the declarations.
+def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """A study's results with units of sensors and the study's attributes, compared with the declarations.
 
     Raises ArchiveError where the two differ.
     """
-    from results_schema.variables import expand
-    from studies.results.results import envelope_units, sensor_units
-
-    kind = kind_named(study.kind)
-    assert not isinstance(kind, MeasuringKind)
-    finished = kind.summarise(dataset, study)
-    declared = expand(kind.name, sensor_units(study), tuple(study.carriage), envelope_units(study))
-    # The engine offers static values to every summary; they are results only where the kind says so.
-    offered = [f"{sensor}_static" for sensor in study.sensor]
-    return _compared(finished.drop_vars([n for n in offered if n not in declared], errors="ignore"), study)
-
-
-def gathered(pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
-    """The dataset of a study that measures from its finished pieces, compared with the declarations.
-
-    Raises ArchiveError where the two differ.
-    """
-    kind = kind_named(study.kind)
-    assert isinstance(kind, MeasuringKind)
-    return _compared(kind.gather(pieces, study), study)
-
-
-def _compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """With units of sensors and the study's attributes, and as declared."""
     from results_schema.validate import validate
     from studies.results.results import envelope_units, sensor_units
 

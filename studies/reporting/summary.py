@@ -10,13 +10,14 @@ import numpy as np
 
 from results_schema.status import Status, label
 from results_schema.variables import expand
+from studies.findings.numerics_used import is_marched
+from studies.protocol.study import kind_named
 from studies.results.formatting import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from engine.scene.study import Study
-    from studies.protocol.study import AnyKind
     from studies.results.results import Results
     from studies.runs.runner import Outcome
 
@@ -54,21 +55,7 @@ class Range:
 
 def is_measured(results: xr.Dataset) -> bool:
     """Whether these are results of a study that measures: its grid is no sweep."""
-    kind = _kind(results)
-    return is_pieced(results) and not getattr(kind, "sweeps", False)
-
-
-def is_pieced(results: xr.Dataset) -> bool:
-    """Whether these were computed in pieces, and not by a march."""
-    from studies.protocol.study import is_measuring
-
-    return is_measuring(str(results.attrs["study_kind"]))
-
-
-def _kind(results: xr.Dataset) -> AnyKind:
-    from studies.protocol.study import kind_named
-
-    return kind_named(str(results.attrs["study_kind"]))
+    return not kind_named(str(results.attrs["study_kind"])).sweeps
 
 
 def noun(results: xr.Dataset) -> str:
@@ -92,7 +79,7 @@ def ranges(study_results: Results) -> Iterator[Range]:
     in pieces of every result, but where they take a sweep without what belongs to no variant."""
     results = study_results.dataset
     grid = results["status"].dims
-    if is_pieced(results):
+    if not is_marched(results):
         beside = () if is_measured(results) else _beside_the_grid(study_results.study)
         for name, array in results.data_vars.items():
             if array.dtype.kind == "f" and name not in beside:

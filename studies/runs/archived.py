@@ -11,10 +11,8 @@ import numpy as np
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
-from studies.at_rest.labelling import asked_coordinates
-from studies.at_rest.positions import Asked, positions_of
-from studies.protocol.measuring import MeasuringKind, question_of
-from studies.protocol.study import AnyKind, kind_named
+from studies.findings.numerics_used import is_marched
+from studies.protocol.study import Kind, kind_named
 from studies.results.results import Results, envelope_units, sensor_units
 
 if TYPE_CHECKING:
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
 
     from engine.bodies.modal.description import Recorded
     from engine.scene.study import Study
-    from engine.study_file.spec import Spec
 
 MODELS = "/model/"
 SAME = 1e-9  # relative difference of an axis's values from those of the study: other machines round otherwise
@@ -99,23 +96,22 @@ def _findings(archive: Archive, study: Study) -> Iterator[str]:
     if missing:
         yield from (f"{MODELS}{name}: expected what this body out of files is, received nothing" for name in missing)
         return
-    if isinstance(kind, MeasuringKind):
-        yield from _position_findings(root, study, question_of(study, kind.settings))
+    yield from _asked_findings(root, study, kind)
     yield from _axis_findings(root, study)
     yield from _label_findings(root, study)
     names = (sensor_units(study), tuple(study.carriage), envelope_units(study))
     yield from root_findings(root, study.kind, *names)
     for path, group in archive.groups.items():
         yield from (f"{path}: {text}" for text in group_findings(group, path, int(root["status"].size)))
-    yield from _model_findings(root, study, kind, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
+    yield from _model_findings(root, study, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
 
 
-def _model_findings(root: xr.Dataset, study: Study, kind: AnyKind, groups: Mapping[str, xr.Dataset]) -> Iterator[str]:
+def _model_findings(root: xr.Dataset, study: Study, groups: Mapping[str, xr.Dataset]) -> Iterator[str]:
     """The bodies: they are the study's, and those out of files have all that theory asks of them."""
     for path in groups:
         if path.removeprefix(MODELS) not in study.body:
             yield f"{path}: expected a body of the study"
-    if isinstance(kind, MeasuringKind):
+    if not is_marched(root):
         return
     name = next(iter(study.carriage.values())).on
     if study.body[name].recorded is None:
@@ -151,11 +147,9 @@ def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
             yield f"{axis.name}: expected the unit {axis.units or '1'!r}, received {found.attrs.get('units')!r}"
 
 
-def _position_findings(root: xr.Dataset, study: Study, asked: Spec) -> Iterator[str]:
-    """The coordinates of a study at rest against what it asks for."""
-    if not isinstance(asked, Asked):
-        return
-    for name, wanted in asked_coordinates(positions_of(study, asked), asked).items():
+def _asked_findings(root: xr.Dataset, study: Study, kind: Kind) -> Iterator[str]:
+    """The coordinates of a study against what it asks for."""
+    for name, wanted in kind.coordinates(study).items():
         found = root.coords.get(name)
         if found is not None and (found.shape != wanted.shape or not np.allclose(found.values, wanted, SAME, SAME)):
             yield f"{name}: expected what the study asks for, received others"

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import is_marched
-from studies.protocol.measuring import Work, described
+from studies.protocol.parts import Work
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
     from engine.batch.audit import Audit
     from engine.batch.plan import Plan
-    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -32,13 +30,6 @@ GROUP = "/audit"
 NONE_AUDITED = (
     "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
 )
-
-
-def refuse_audit(study: Study) -> None:
-    """Refuse an audit of a study that marches no variants. Raises BadInput."""
-    if study.solver.audit not in ("auto", 0):
-        where = study.source.where("solver.audit")
-        raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
 
 
 def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
@@ -102,7 +93,7 @@ def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr
         "result": ("result", whole, axes()["result"].attributes()),
     }
     return xr.Dataset(
-        {name: described(declared[name], declared[name].dims, array) for name, array in arrays.items()},
+        {name: declared[name].holding(array) for name, array in arrays.items()},
         coords=coordinates | own,
     )
 
@@ -169,7 +160,7 @@ class Verdict:
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
     if group is None:
-        left_open = is_marched(results) and results.study.solver.audit == "auto"
+        left_open = is_marched(results.dataset) and results.study.solver.audit == "auto"
         return [NONE_AUDITED] if left_open and bool(results.kept.any()) else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []

@@ -1,4 +1,4 @@
-"""From a study to its archive: lock, parts, march, assembly, one file written whole.
+"""From a study to its archive: lock, parts, assembly, one file written whole.
 
 Killed at any moment it leaves finished parts behind, and goes on from them when it is started again.
 """
@@ -8,35 +8,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
+import xarray as xr
 
 from engine.scene.study import Study
-from results_schema.errors import ArchiveError, BadInput, Interrupted
+from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import files
 from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
 from results_schema.store.parts import PartStore
-from results_schema.store.pieces import PieceStore
-from results_schema.store.run_folder import RunFolder
-from studies.protocol.measuring import MeasuringKind, Work, disk_bytes, measure
 from studies.protocol.options import RunOptions
+from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop
-from studies.protocol.study import Kind, finish, gathered, kind_of
+from studies.protocol.study import compared, kind_of
 from studies.results.results import Results
 from studies.runs.archived import with_first_frequency
-from studies.runs.audit import GROUP, audit_group, refuse_audit
+from studies.runs.audit import GROUP, audit_group
 from studies.runs.identity import check_unchanged, files_of, run_key
-from studies.runs.part_writer import Gatherer
 from studies.runs.provenance import attributes
-from studies.runs.unreduced import check_unreduced, refuse_unreduced, unreduced_group
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.batch.plan import Plan
+from studies.runs.unreduced import unreduced_group
 
 Progress = Callable[[int, int], None]
 
@@ -71,10 +63,22 @@ def run_to_archive(
     started, stop = time.perf_counter(), stop or Stop()
     kind = kind_of(study)
     files.check_output_place(archive)
-    run = _Run(study, archive, options, progress, stop, started)
+    run = _Run(study, archive, options, stop, started)
     if _look(run) == "same study, finished":
         return _found_finished(run)
-    return _measured(kind, run) if isinstance(kind, MeasuringKind) else _marched(kind, run)
+    parts = kind.parts(study)
+    files.check_free(archive.parent, parts.disk_bytes, parts.words)
+    with PartStore(archive, run_key(study, parts.names), partial(_look, run), discard=options.overwrite) as store:
+        if _look(run) == "same study, finished":  # somebody else has finished it since the run began
+            store.remove()
+            return _found_finished(run)
+        work = Work(options.threads, stop, progress)
+        resumed = parts.compute(store, work)
+        work.check()
+        root = _as_declared(parts.gather(store), study)
+        groups = groups_beside(parts, root, work)
+        seconds = _write(run, root, store, groups)
+    return Outcome(archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP))
 
 
 class _Run(NamedTuple):
@@ -83,66 +87,37 @@ class _Run(NamedTuple):
     study: Study
     archive: Path
     options: RunOptions
-    progress: Progress | None
     stop: Stop
     started: float
 
 
-def _marched(kind: Kind, run: _Run) -> Outcome:
-    """A study of one scene and its sweep: all variants of its plan, in parts."""
+@singledispatch
+def groups_beside(parts: Any, root: xr.Dataset, work: Work) -> Mapping[str, xr.Dataset]:
+    """What an archive holds beside its root, by group. Raises Interrupted."""
+    raise NotImplementedError
+
+
+@groups_beside.register
+def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, xr.Dataset]:
+    """The bodies, the audit, and the comparison with the unreduced model."""
     from engine.batch.dataset import model_groups
-    from engine.batch.plan import make_plan
-    from engine.batch.plausibility import remarks
 
-    check_unreduced(run.study)
-    plan = make_plan(run.study, reduction=kind.reduction(run.study), results=kind.name)
-    files.check_free(run.archive.parent, 2 * plan.disk_bytes, f"the parts and the archive of {plan.size} variants")
-    worth_knowing, key = tuple(remarks(plan)), run_key(run.study)
-    make_store = PartStore.discard_foreign if run.options.overwrite else PartStore
-    with make_store(run.archive, key, partial(_look, run)) as store:
-        if _look(run) == "same study, finished":
-            return _given_up(store, run)
-        done = store.finished()
-        _march(plan, store, done, run)
-        run.stop.check()
-        root = _finished_dataset(plan, store)
-        audit = audit_group(plan, root, Work(run.options.threads, run.stop))
-        models = with_first_frequency(model_groups(plan.base), Results(root, run.study))
-        groups = models | unreduced_group(plan, root, run.stop.check) | audit
-        seconds = _write(run, root, store, groups)
-    return Outcome(run.archive, root, int(done.size), False, seconds, worth_knowing, audit.get(GROUP))
+    plan = parts.plan
+    audit = audit_group(plan, root, work)
+    models = with_first_frequency(model_groups(plan.base), Results(root, plan.study))
+    return models | unreduced_group(plan, root, work.check) | audit
 
 
-def _measured(kind: MeasuringKind, run: _Run) -> Outcome:
-    """A study in pieces, one after another."""
-    refuse_unreduced(run.study)
-    refuse_audit(run.study)
-    pieces = kind.pieces(run.study)
-    files.check_free(run.archive.parent, disk_bytes(pieces), "the pieces and the archive")
-    key = run_key(run.study, [piece.name for piece in pieces])
-    make_store = PieceStore.discard_foreign if run.options.overwrite else PieceStore
-    with make_store(run.archive, key, partial(_look, run)) as store:
-        if _look(run) == "same study, finished":
-            return _given_up(store, run)
-        names = {piece.name for piece in pieces}
-        done = {name: found for name, found in store.finished().items() if name in names}
-        work, progress = Work(run.options.threads, run.stop), run.progress or (lambda finished, total: None)
-        found = measure(pieces, work, done=done, keep=store.write, progress=progress)
-        run.stop.check()
-        root = _as_declared(gathered, found, run.study)
-        seconds = _write(run, root, store, _bodies(run.study))
-    return Outcome(run.archive, root, len(done), False, seconds)
-
-
-def _bodies(study: Study) -> Mapping[str, xr.Dataset]:
-    """The bodies of the scene without its sweep, by group."""
+@groups_beside.register
+def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.Dataset]:
+    """The bodies of the scene without its sweep."""
     from engine.batch.dataset import model_groups
     from engine.model.distinct_models import base_scene
 
-    return model_groups(base_scene(study))
+    return model_groups(base_scene(parts.study))
 
 
-def _write(run: _Run, root: xr.Dataset, store: RunFolder, groups: Mapping[str, xr.Dataset]) -> float:
+def _write(run: _Run, root: xr.Dataset, store: PartStore, groups: Mapping[str, xr.Dataset]) -> float:
     """Write the archive and remove its parts; the seconds that the run has taken."""
     seconds = time.perf_counter() - run.started
     root = root.assign_attrs(attributes(run.study, store.key, seconds))
@@ -162,12 +137,6 @@ def _found_finished(run: _Run) -> Outcome:
     found = open_archive(run.archive)
     seconds, audit = time.perf_counter() - run.started, found.groups.get(GROUP)
     return Outcome(run.archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
-
-
-def _given_up(store: RunFolder, run: _Run) -> Outcome:
-    """Somebody else has finished this very study since the run began."""
-    store.remove()
-    return _found_finished(run)
 
 
 def _look(run: _Run) -> OutputState:
@@ -220,33 +189,9 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
     return state
 
 
-def _march(plan: Plan, store: PartStore, done: np.ndarray, run: _Run) -> None:
-    from engine.batch.execution import execute
-
-    if run.progress is not None:
-        run.progress(int(done.size), plan.size)
-    if done.size == plan.size:
-        return
-    threads, stop = run.options.threads, run.stop
+def _as_declared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """That it is as declared is our affair, not the user's."""
     try:
-        with Gatherer(store.write) as parts:
-            execute(plan, parts.add, threads=threads, progress=run.progress, stop=stop.event, done=done)
-    except Interrupted:
-        stop.check()
-        raise
-
-
-def _finished_dataset(plan: Plan, store: PartStore) -> xr.Dataset:
-    """The study's dataset from all parts. That it is as declared is our affair, not the user's."""
-    from engine.batch.dataset import build
-
-    arrays, selected = store.assemble(plan.size), store.assemble_selected()
-    dataset = build(plan, arrays, selected if selected.variants.size else None)
-    return _as_declared(finish, dataset, plan.study)
-
-
-def _as_declared(make: Callable[[Any, Study], xr.Dataset], found: Any, study: Study) -> xr.Dataset:
-    try:
-        return make(found, study)
+        return compared(dataset, study)
     except ArchiveError as error:
         raise AssertionError(str(error)) from error

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.variables import axes, declarations, sensor_unit
-from studies.protocol.measuring import described
 from studies.results.formatting import counted, listed, percent
 from studies.results.results import Results, spread
 
@@ -19,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.batch.plan import Plan
-    from engine.scene.study import Study
     from engine.unreduced.comparison import Compared
 
 Array = NDArray[np.float64]
@@ -27,22 +24,6 @@ Array = NDArray[np.float64]
 GROUP = "/unreduced"
 FLAT = 1e-9  # of the largest value: a smaller range is rounding
 MOST_NAMES = 4
-
-
-def check_unreduced(study: Study) -> None:
-    """Refuse what cannot be computed again, before anything is. Raises BadInput."""
-    if not study.output.unreduced:
-        return
-    from engine.unreduced.comparison import check_unreduced as check
-
-    check(study)
-
-
-def refuse_unreduced(study: Study) -> None:
-    """Refuse the option in a study that has no variants. Raises BadInput."""
-    if study.output.unreduced:
-        where = study.source.where("output.unreduced")
-        raise BadInput("a study that measures has no variants to compute again", where=where, expected="0")
 
 
 def unreduced_group(plan: Plan, dataset: xr.Dataset, check: Callable[[], None] = lambda: None) -> dict[str, xr.Dataset]:
@@ -89,12 +70,12 @@ def _dataset(variants: Sequence[int], found: Sequence[Compared]) -> xr.Dataset:
     arrays["degrees_of_freedom"] = np.array([one.degrees_of_freedom for one in found])
     arrays["unreduced_steps"] = np.array([one.steps for one in found])
     return xr.Dataset(
-        {name: described(declared[name], declared[name].dims, array) for name, array in arrays.items()},
+        {name: declared[name].holding(array) for name, array in arrays.items()},
         coords={
             "sample": ("sample", np.array(variants, dtype=np.int64), axes()["sample"].attributes()),
             "sensor": ("sensor", list(quantities), axes()["sensor"].attributes()),
-            "sensor_unit": described(
-                axes()["sensor_unit"], ("sensor",), [sensor_unit(one) for one in quantities.values()]
+            "sensor_unit": axes()["sensor_unit"].holding(
+                [sensor_unit(one) for one in quantities.values()], ("sensor",)
             ),
             "station": ("station", np.arange(stations, dtype=np.int64), axes()["station"].attributes()),
         },

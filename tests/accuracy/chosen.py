@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from engine.accuracy.choice import Choice
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import differences, results_of
-from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run_jobs
 from engine.batch.plan import Plan, make_plan
 from engine.march.outcome import Flat
 from engine.scene.study import Study
+from results_schema.store.rows import Collector
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
 from tests.engine.build import Table, beam, fixed
 

@@ -11,10 +11,10 @@ import xarray as xr
 from engine.accuracy.groups import ConvergingGroup, Found, MarchGroup
 from engine.accuracy.results import results_of
 from engine.batch.chunk import told_errors
-from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import make_plan
 from results_schema.status import Fidelity, Status
+from results_schema.store.rows import Collector
 from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import OPEN, passages
 from tests.engine.build import beam, cruise, fixed, mass

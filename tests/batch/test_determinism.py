@@ -16,13 +16,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import engine.march.march
-from engine.batch.dataset import Collector, build
+from engine.batch.dataset import build
 from engine.batch.execution import execute, run
 from engine.batch.plan import Plan, make_plan
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import LaneTable, VariantValues, to_blocks
 from engine.scene.study import Study
 from results_schema.errors import BadInput, Interrupted
+from results_schema.store.rows import Chunk, Collector
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
 from tests.reference import closed_forms, values
 
@@ -215,8 +216,8 @@ class Recorder:
         self.variants: list[int] = []
         self.threads: set[int] = set()
 
-    def __call__(self, variants: NDArray[np.int64], arrays: Any, selected: Any) -> None:
-        self.variants += variants.tolist()
+    def __call__(self, chunk: Chunk) -> None:
+        self.variants += chunk.rows.variants.tolist()
         self.threads.add(threading.get_ident())
 
 
@@ -238,7 +239,7 @@ def test_done_variants_are_left_out() -> None:
     plan, whole = of_mixed()
     done = np.arange(0, 150, 3)
     rest, resumed = Recorder(), Collector(plan.size)
-    execute(plan, lambda *found: (rest(*found), resumed.add(*found)), done=done, chunk=11)
+    execute(plan, lambda chunk: (rest(chunk), resumed.add(chunk)), done=done, chunk=11)
     assert sorted(rest.variants) == sorted(set(range(150)) - set(done.tolist()))
     for name, array in whole.arrays.items():
         left = np.setdiff1d(np.arange(150), done)

@@ -6,7 +6,6 @@ import os
 import signal
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +14,11 @@ import xarray as xr
 import engine
 from results_schema.errors import Interrupted, OutputFailed
 from results_schema.store.archive import open_archive
-from results_schema.store.parts import Rows
+from results_schema.store.rows import Chunk, Rows
 from studies.commands.cli import main
 from studies.protocol.options import RunOptions
+from studies.protocol.parts import Gatherer
 from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
-from studies.runs.part_writer import Gatherer
 from studies.runs.provenance import OF_TIME_AND_MACHINE
 from studies.runs.runner import run_to_archive
 from tests.studies.small import LONG, SCENES, start, write
@@ -37,10 +36,10 @@ def after_parts(monkeypatch: pytest.MonkeyPatch, number: int, number_of_signal: 
     """Write a part for every chunk, and let a signal arrive after so many."""
     written, add = [], Gatherer.add
 
-    def add_and_signal(self: Gatherer, variants: np.ndarray, *rest: Any) -> None:
-        add(self, variants, *rest)
+    def add_and_signal(self: Gatherer, chunk: Chunk) -> None:
+        add(self, chunk)
         self.flush()
-        written.append(variants)
+        written.append(chunk)
         if len(written) == number:
             os.kill(os.getpid(), number_of_signal)
 
@@ -155,33 +154,34 @@ class Written:
     def __init__(self) -> None:
         self.parts: list[tuple[list[int], list[int]]] = []
 
-    def __call__(self, variants: np.ndarray, arrays: Any, selected: Rows | None) -> None:
+    def __call__(self, found: Chunk) -> None:
+        (variants, arrays), selected = found
         assert (arrays["x"][:, 0] == variants + 0.5).all()
         self.parts.append((variants.tolist(), [] if selected is None else selected.variants.tolist()))
 
 
-def chunk(*variants: int) -> tuple[np.ndarray, dict[str, np.ndarray], Rows]:
+def chunk(*variants: int) -> Chunk:
     """A chunk of 8 MiB for every variant, one of which is kept."""
     numbers, x = np.array(variants), np.zeros((len(variants), 2**20))
     x[:, 0] = numbers + 0.5
-    return numbers, {"x": x}, Rows(numbers[:1], {"h": np.zeros((1, 3))})
+    return Chunk(Rows(numbers, {"x": x}), Rows(numbers[:1], {"h": np.zeros((1, 3))}))
 
 
 def test_chunks_share_a_part_of_32_mib() -> None:
     written = Written()
     with Gatherer(written) as parts:
-        parts.add(*chunk(4, 5))
-        parts.add(*chunk(1))
+        parts.add(chunk(4, 5))
+        parts.add(chunk(1))
         assert written.parts == []
-        parts.add(*chunk(2))
-        parts.add(*chunk(7)[:2], None)
-    assert written.parts == [([4, 5, 1, 2], [4, 1, 2]), ([7], [])]
+        parts.add(chunk(2))
+        parts.add(Chunk(chunk(7).rows))
+    assert written.parts == [([1, 2, 4, 5], [1, 2, 4]), ([7], [])]
 
 
 @pytest.mark.parametrize(("error", "kept"), [(KeyboardInterrupt(), 1), (OutputFailed("full"), 0)], ids=str)
 def test_what_has_gathered_is_kept_unless_the_disk_failed(error: BaseException, kept: int) -> None:
     written = Written()
     with pytest.raises(type(error)), Gatherer(written) as parts:
-        parts.add(*chunk(3))
+        parts.add(chunk(3))
         raise error
     assert len(written.parts) == kept

@@ -7,11 +7,10 @@ import tomllib
 import pytest
 
 import engine
-from engine.batch.plan import make_plan
 from engine.scene.sweep import Cases, expand
 from results_schema.errors import BadInput
 from studies.commands import catalogue
-from studies.protocol.measuring import MeasuringKind
+from studies.protocol.parts import Pieces, Variants
 from studies.protocol.study import kind_named, kind_names, kind_of
 from tests.kinds.test_at_rest import COMPARED
 from tests.kinds.test_envelopes import EXTRA
@@ -39,13 +38,14 @@ def test_the_contract_is_there() -> None:
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_studies_are_planned_without_a_complaint(name: str) -> None:
     study = engine.load(BUILT_IN[name])
-    kind = kind_of(study)
-    if isinstance(kind, MeasuringKind):
-        pieces = kind.pieces(study)
+    parts = kind_of(study).parts(study)
+    if isinstance(parts, Pieces):
+        pieces = parts.pieces
         assert len({piece.name for piece in pieces}) == len(pieces) > 1
         assert sum(piece.seconds for piece in pieces) < 180.0
     else:
-        plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
+        assert isinstance(parts, Variants)
+        plan = parts.plan
         assert plan.size >= AT_LEAST.get(name, 3)
         assert plan.seconds < 20.0
     assert len(study.title) > 10
@@ -72,8 +72,7 @@ def test_every_file_is_commented(text: str) -> None:
 @pytest.mark.parametrize("kind", STARTS)
 def test_starts_are_valid(kind: str) -> None:
     found = kind_named(kind)
-    measures = isinstance(found, MeasuringKind) and not found.sweeps
-    assert read(STARTS[kind]).size == 1 if measures else read(STARTS[kind]).size > 1
+    assert read(STARTS[kind]).size > 1 if found.sweeps else read(STARTS[kind]).size == 1
     assert engine.load(STARTS[kind]).kind == kind
 
 

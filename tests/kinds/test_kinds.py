@@ -52,7 +52,7 @@ def test_a_result_that_is_missing_is_noticed() -> None:
     study = scenes.study("asymmetry")
     dataset = studies.run(study)
     with pytest.raises(ArchiveError, match="lag: expected in every asymmetry"):
-        running.finish(dataset.drop_vars("lag"), study)
+        running.compared(dataset.drop_vars("lag"), study)
 
 
 def test_asymmetry_needs_a_motion_that_comes_back() -> None:

@@ -17,7 +17,7 @@ from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separ
 from studies.maps.map_scene import Ground, threshold
 from studies.maps.methods import METHODS, hht
 from studies.maps.table import MAPS
-from studies.protocol.measuring import Work
+from studies.protocol.parts import Work
 from studies.reporting import report
 from studies.results.results import Results
 
@@ -181,7 +181,7 @@ def test_a_mass_tied_by_its_place_rings_and_damping_calms_it() -> None:
 
 
 def question() -> Any:
-    from studies.protocol.measuring import question_of
+    from studies.protocol.study import question_of
 
     return question_of(study(), KIND.settings)
 

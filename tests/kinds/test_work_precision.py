@@ -25,7 +25,7 @@ from studies.precision import ladders
 from studies.precision import pareto as trade
 from studies.precision import precision as measured
 from studies.precision.variables import AUTOMATIC
-from studies.protocol.measuring import Work
+from studies.protocol.parts import Work
 from studies.reporting import answers
 from tests.bodies.frames import PINNED, straight
 from tests.naive import ode

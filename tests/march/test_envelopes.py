@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.batch.dataset import Collector
 from engine.batch.execution import execute, run
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from results_schema.store.rows import Collector
 from tests.bodies.frames import straight
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.engine.reading import Reading

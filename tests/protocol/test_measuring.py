@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +15,18 @@ import xarray as xr
 
 import engine
 import studies
+from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from results_schema.errors import ArchiveBusy, BadInput, Interrupted, OutputFailed
+from results_schema.errors import BadInput, Interrupted, OutputFailed
 from results_schema.store import files
 from results_schema.store.archive import open_archive
-from results_schema.store.pieces import PieceStore, pieces_so_far
+from results_schema.store.parts import PartStore, finished_so_far
+from results_schema.store.tables import Table, from_dataset, to_dataset
 from studies.commands.cli import main
-from studies.protocol.measuring import MeasuringKind, Piece, Work, measure, question_of
 from studies.protocol.options import RunOptions
+from studies.protocol.parts import Memory, Piece, Pieces, Work, usual
 from studies.protocol.stopping import Stop
+from studies.protocol.study import PiecedKind, question_of
 from studies.runs.runner import run_to_archive
 from tests.schema.samples import FailNth
 from tests.studies import precision, scenes
@@ -40,33 +44,47 @@ def piece(name: str, value: float = 1.0) -> Piece:
     return Piece(name, "numbers", lambda work: numbers(value))
 
 
+class Some(PiecedKind):
+    """A kind of these pieces."""
+
+    name = "some"
+
+    def __init__(self, *own: Piece) -> None:
+        self.own = own
+
+    def pieces(self, study: Study) -> tuple[Piece, ...]:
+        return self.own
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        return xr.Dataset({name: float(found.x[0]) for name, found in pieces.items()})
+
+
+def parts(*own: Piece) -> Pieces:
+    return Pieces(Some(*own), engine.Study(kind="passage"))
+
+
 # ---- pieces ----
 
 
 def test_pieces_are_computed_in_their_order_and_handed_over() -> None:
-    kept: list[str] = []
     shown: list[tuple[int, int]] = []
-    found = measure(
-        [piece("b", 2.0), piece("a", 1.0)],
-        Work(),
-        keep=lambda name, _: kept.append(name),
-        progress=lambda finished, total: shown.append((finished, total)),
-    )
-    assert kept == list(found) == ["b", "a"] and shown == [(0, 2), (1, 2), (2, 2)]
-    assert float(found["b"].x[0]) == 2.0
+    own, store = parts(piece("b", 2.0), piece("a", 1.0)), Memory()
+    assert own.compute(store, Work(progress=lambda finished, total: shown.append((finished, total)))) == 0
+    assert list(store.finished()) == ["b", "a"] and shown == [(0, 2), (1, 2), (2, 2)]
+    assert dict(own.gather(store).data_vars) == {"b": 2.0, "a": 1.0}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_between_pieces_keeps_the_finished_ones(number: signal.Signals) -> None:
-    stop, kept = Stop(), list[str]()
+    stop, store = Stop(), Memory()
 
-    def keep(name: str, _: xr.Dataset) -> None:
-        kept.append(name)
-        stop.ask(number.value)
+    def ask(finished: int, total: int) -> None:
+        if finished:
+            stop.ask(number.value)
 
     with pytest.raises(Interrupted) as caught:
-        measure([piece("a"), piece("b")], Work(stop=stop), keep=keep)
-    assert kept == ["a"] and caught.value.exit_code == 128 + number
+        parts(piece("a"), piece("b")).compute(store, Work(stop=stop, progress=ask))
+    assert list(store.finished()) == ["a"] and caught.value.exit_code == 128 + number
 
 
 def test_a_piece_that_never_looks_does_not_hold_up_a_stop() -> None:
@@ -78,7 +96,7 @@ def test_a_piece_that_never_looks_does_not_hold_up_a_stop() -> None:
         return numbers(1.0)
 
     with pytest.raises(Interrupted):
-        measure([Piece("a", "", endless)], Work(stop=stop))
+        parts(Piece("a", "", endless)).compute(Memory(), Work(stop=stop))
     forever.set()
 
 
@@ -91,45 +109,17 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_pieces_come_back_as_they_were(path: Path) -> None:
-    with PieceStore(path, "key") as store:
-        assert store.finished() == {}
-        store.write("one", numbers(1.0))
-        store.write("two", numbers(2.0))
-    assert pieces_so_far(path) == 2
-    with PieceStore(path, "key") as store:
-        found = store.finished()
-        assert set(found) == {"one", "two"}
-        xr.testing.assert_equal(found["two"], numbers(2.0))
-        assert found["two"].attrs == {"told": "yes"}
+    with PartStore(path, "key") as store:
+        for name, value in (("one", 1.0), ("two", 2.0)):
+            store.write(name, {"/": from_dataset(numbers(value))})
+    assert [found.size for found in finished_so_far(path) or ()] == [0, 0]
+    with PartStore(path, "key") as store:
+        assert set(store.finished()) == {"one", "two"}
+        found = to_dataset(store.read("two")["/"])
+        xr.testing.assert_equal(found, numbers(2.0))
+        assert found.attrs == {"told": "yes"}
         store.remove()
     assert list(path.parent.iterdir()) == []
-
-
-def test_damaged_pieces_and_strangers_are_removed(path: Path) -> None:
-    with PieceStore(path, "key") as store:
-        whole, cut, lost = (store.write(name, numbers(1.0)) for name in ("whole", "cut", "lost"))
-        cut.write_bytes(cut.read_bytes()[:-40])
-        files.sidecar(lost).unlink()
-        (whole.parent / "notes.txt").write_text("hello", encoding="utf-8")
-        assert pieces_so_far(path) == 1
-        assert set(store.finished()) == {"whole"}
-        assert sorted(entry.name for entry in whole.parent.iterdir()) == sorted(
-            ["key", whole.name, files.sidecar(whole).name]
-        )
-
-
-def test_pieces_of_another_study_are_refused_or_discarded(path: Path) -> None:
-    with PieceStore(path, "key") as store:
-        store.write("one", numbers(1.0))
-    with pytest.raises(BadInput, match="--overwrite"), PieceStore(path, "other"):
-        pass
-    with PieceStore.discard_foreign(path, "other") as store:
-        assert store.finished() == {}
-
-
-def test_one_run_at_a_time(path: Path) -> None:
-    with PieceStore(path, "key"), pytest.raises(ArchiveBusy), PieceStore(path, "key"):
-        pass
 
 
 # ---- options ----
@@ -164,8 +154,8 @@ def test_kinds_without_options_refuse_them(kind: str) -> None:
 @pytest.mark.parametrize("kind", [name for name in studies.kind_names() if name not in scenes.MOTIONS])
 def test_measuring_kinds_are_such_and_some_refuse_a_sweep(kind: str) -> None:
     found = studies.kind_named(kind)
-    assert isinstance(found, MeasuringKind) and found.name == kind
-    assert found.summary and found.question.endswith("?") and issubclass(found.settings, Spec)
+    assert isinstance(found, PiecedKind) and found.name == kind
+    assert found.summary and found.question.endswith("?") and found.settings and issubclass(found.settings, Spec)
     if found.sweeps:
         return
     text = scenes.text_of("passage", scenes.pace("passage")).replace('"passage"', f'"{kind}"')
@@ -187,15 +177,15 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def after_pieces(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
     """Let a SIGINT arrive when so many pieces are written."""
-    written, write = [], PieceStore.write
+    written, write = [], PartStore.write
 
-    def write_and_signal(self: PieceStore, name: str, dataset: xr.Dataset) -> Path:
-        written.append(write(self, name, dataset))
+    def write_and_signal(self: PartStore, name: str, part: Mapping[str, Table]) -> Path:
+        written.append(write(self, name, part))
         if len(written) == number:
             os.kill(os.getpid(), signal.SIGINT)
         return written[-1]
 
-    monkeypatch.setattr(PieceStore, "write", write_and_signal)
+    monkeypatch.setattr(PartStore, "write", write_and_signal)
 
 
 def test_check_lists_the_pieces_and_writes_nothing(here: Path, capsys: Captured) -> None:
@@ -213,7 +203,7 @@ def test_a_stopped_run_goes_on_from_its_pieces(here: Path, monkeypatch: pytest.M
     assert "finished work is kept" in capsys.readouterr().err and not Path("small.nc").exists()
     assert main(["info", "small.nc"]) == 2
     assert "2 finished pieces" in capsys.readouterr().err
-    first = xr.load_dataset(next(p for p in here.glob("small.nc.parts/*.nc") if _name(p) == "steps-light"))
+    first = xr.load_dataset("small.nc.parts/steps-light.nc")
     assert main(["run", "small.toml", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["resumed"] == 2 and found["status"]["diverged"] > 0 and found["exit_code"] == 0
@@ -231,13 +221,9 @@ def test_a_stopped_run_goes_on_from_its_pieces(here: Path, monkeypatch: pytest.M
     assert "Points by status" in page and "heavy and slow" in page and "seconds_<wbr>per_<wbr>variant" in page
 
 
-def _name(path: Path) -> str:
-    return str(xr.open_dataset(path).attrs["piece"])
-
-
 def test_a_full_disk_keeps_the_finished_pieces(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = engine.load("small.toml")
     monkeypatch.setattr(files, "FAULTS", FailNth(25))
     with pytest.raises(OutputFailed):
         run_to_archive(study, Path("small.nc"), RunOptions())
-    assert 1 <= pieces_so_far("small.nc") < 6 and not Path("small.nc").exists()
+    assert 1 <= len(finished_so_far("small.nc") or ()) < 6 and not Path("small.nc").exists()

@@ -17,7 +17,7 @@ from results_schema.store.archive import open_archive
 from results_schema.validate import validate
 from studies.commands.actions import exit_code
 from studies.commands.cli import main
-from studies.protocol.measuring import Work
+from studies.protocol.parts import Work
 from studies.results.results import Results
 from studies.runs.audit import (
     GROUP,

@@ -7,11 +7,10 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 from scipy.io import mmread, mmwrite
@@ -26,8 +25,9 @@ from results_schema.errors import BadInput
 from results_schema.store import files
 from results_schema.store.archive import FILES, open_archive
 from results_schema.store.parts import PartStore
-from results_schema.store.pieces import PieceStore
+from results_schema.store.tables import Table
 from studies.commands.cli import main
+from studies.protocol import parts as gathering
 from studies.protocol.options import RunOptions
 from studies.protocol.study import KINDS_FOLDER
 from studies.runs import identity
@@ -149,9 +149,9 @@ def test_fault_41_files_that_change_while_the_study_runs(here: Path, monkeypatch
     study = engine.load(imported.write(here, imported.matrices(here)))
     write_part = PartStore.write
 
-    def write_and_change(self: PartStore, variants: np.ndarray, *rest: object) -> Path:
+    def write_and_change(self: PartStore, name: str, part: Mapping[str, Table]) -> Path:
         lift(here / "nodes.csv")
-        return write_part(self, variants, *rest)  # type: ignore[arg-type]
+        return write_part(self, name, part)
 
     monkeypatch.setattr(PartStore, "write", write_and_change)
     with pytest.raises(BadInput, match="has changed while the study ran") as caught:
@@ -221,9 +221,8 @@ def test_fault_42_the_target_is_looked_at_again_under_the_lock(
     write(here, SMALL if kind == "marched" else at_rest.text_of("influence", "positions = 3"))
     write(here, at_rest.text_of("influence", "positions = 5"), "other.toml")
     assert main(["run", "other.toml"]) == 0
-    for store in (PartStore, PieceStore):
-        enter = store.__enter__
-        monkeypatch.setattr(store, "__enter__", lambda self, enter=enter: (another_archive(), enter(self))[1])
+    enter = PartStore.__enter__
+    monkeypatch.setattr(PartStore, "__enter__", lambda self: (another_archive(), enter(self))[1])
     capsys.readouterr()
     assert main(["run", "small.toml"]) == 2
     assert "something else already" in capsys.readouterr().err

@@ -126,6 +126,7 @@ sys.path.insert(0, {root!r})
 import numpy as np
 from pathlib import Path
 from results_schema.store import files, parts
+from results_schema.store.rows import Chunk, Rows
 from results_schema.errors import OutputFailed
 
 full, read_only = Path({full!r}), Path({read_only!r})
@@ -138,12 +139,13 @@ kept = 0
 try:
     with store:
         for number in range(1000):
-            store.write(np.arange(1000) + 1000 * number, dict(x=np.random.default_rng(0).random((1000, 20))))
+            rows = Rows(np.arange(1000) + 1000 * number, dict(x=np.random.default_rng(0).random((1000, 20))))
+            store.write(str(number), Chunk(rows).tables)
             kept += 1
 except OutputFailed as error:
     print("full:", error.exit_code, str(full) in str(error), error.free_bytes < 200_000)
 with store:
-    print("kept:", 0 < kept == store.finished().size // 1000)
+    print("kept:", 0 < kept == len(store.finished()))
 """
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from results_schema.store import files
 from results_schema.store.archive import output_state, write_archive
 from results_schema.store.parts import PartStore
+from results_schema.store.rows import Chunk, Collector, Rows
 from tests.schema.samples import ATTRIBUTES, KillNth, in_child, march
 
 SHAPE = (4, 3)
@@ -24,12 +25,16 @@ def run(path):
         if output_state(path, ATTRIBUTES["study_sha256"]) == "same study, finished":
             store.remove()
             return 0
-        done = set(store.finished())
+        done = {number for variants in store.finished().values() for number in variants}
         open_chunks = [chunk for chunk in CHUNKS if not set(chunk) <= done]
         for chunk in open_chunks:
-            store.write(np.array(chunk), compute(chunk))
+            computed = Chunk(Rows(np.array(chunk), compute(chunk)))
+            store.write(computed.name, computed.tables)
         root = march(SHAPE)
-        for name, array in store.assemble(12).items():
+        found = Collector(12)
+        for name in store.finished():
+            found.add(Chunk.of(store.read(name)))
+        for name, array in found.arrays.items():
             root[name] = (root[name].dims, array.reshape(SHAPE), root[name].attrs)
         write_archive(path, root)
         store.remove()

@@ -7,17 +7,36 @@ import pytest
 
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed
 from results_schema.store import files
-from results_schema.store.parts import PartStore, Rows
+from results_schema.store.parts import PartStore, finished_so_far
+from results_schema.store.rows import Chunk, Collector, Rows
 from tests.schema.samples import FailNth
 
 
-def chunk(variants):
+def arrays(variants):
     variants = np.asarray(variants, np.int64)
-    return variants, {
+    return {
         "peak": np.sqrt(variants.astype(float)),
         "status": (variants % 7).astype(np.int8),
         "harmonic": np.outer(variants, np.arange(17.0)).astype(np.float32),
     }
+
+
+def part(variants, selected=None, /, **others):
+    """Name and tables of a chunk."""
+    rows = Rows(np.asarray(variants, np.int64), others or arrays(variants))
+    chunk = Chunk(rows, selected)
+    return chunk.name, chunk.tables
+
+
+def finished(store):
+    return np.sort(np.concatenate([np.empty(0, np.int64), *store.finished().values()]))
+
+
+def assemble(store, size):
+    found = Collector(size)
+    for name in store.finished():
+        found.add(Chunk.of(store.read(name)))
+    return found
 
 
 @pytest.fixture
@@ -31,13 +50,13 @@ def folder(path):
 
 def test_parts_come_back_where_they_belong(path):
     with PartStore(path, "key") as store:
-        assert store.finished().size == 0
+        assert finished(store).size == 0
         for variants in ([5, 2, 9], [0, 1, 3, 4], [8, 7, 6]):
-            store.write(*chunk(variants))
+            store.write(*part(variants))
     with PartStore(path, "key") as store:
-        np.testing.assert_array_equal(store.finished(), np.arange(10))
-        result = store.assemble(10)
-        _, expected = chunk(np.arange(10))
+        np.testing.assert_array_equal(finished(store), np.arange(10))
+        result = assemble(store, 10).arrays
+        expected = arrays(np.arange(10))
         assert list(result) == list(expected)
         for name, array in expected.items():
             assert result[name].dtype == array.dtype
@@ -51,44 +70,33 @@ def test_histories_of_a_few_variants_travel_with_their_chunk(path):
         return Rows(np.array(variants, np.int64), {"midspan": np.outer(variants, np.ones(5))})
 
     with PartStore(path, "key") as store:
-        store.write(*chunk([3, 4, 5]), rows([5, 3]))
-        store.write(*chunk([0, 1, 2]), rows([1]))
-        store.write(*chunk([6]), rows([]))
-        found = store.assemble_selected()
+        store.write(*part([3, 4, 5], rows([5, 3])))
+        store.write(*part([0, 1, 2], rows([1])))
+        store.write(*part([6], rows([])))
+        found = assemble(store, 7).selected
     np.testing.assert_array_equal(found.variants, [1, 3, 5])
     np.testing.assert_array_equal(found.arrays["midspan"], np.outer([1, 3, 5], np.ones(5)))
-    with PartStore(path.with_name("b.nc"), "key") as store:
-        assert store.assemble_selected().variants.size == 0
 
 
 def test_a_part_is_named_by_its_variants_and_written_once(path):
     with PartStore(path, "key") as store:
-        first = store.write(*chunk([1, 2]))
+        first = store.write(*part([1, 2]))
         content = first.read_bytes()
-        assert store.write(*chunk([1, 2])) == first
+        assert store.write(*part([1, 2])) == first
         assert first.read_bytes() == content
-        assert store.write(*chunk([2, 1])) != first
+        assert store.write(*part([2, 1])) != first
 
 
-def test_what_is_not_computed_yet_is_not_assembled(path):
+def test_parts_are_counted_from_outside(path):
+    assert finished_so_far(path) is None
     with PartStore(path, "key") as store:
-        store.write(*chunk([0, 2]))
-        with pytest.raises(ArchiveError, match="expected 3 finished variants, received 2"):
-            store.assemble(3)
-        with pytest.raises(ArchiveError, match="does not have"):
-            store.assemble(2)
-
-
-def test_parts_with_other_results_are_refused(path):
-    with PartStore(path, "key") as store:
-        store.write(*chunk([0]))
-        store.write(np.array([1]), {"peak": np.ones(1)})
-        with pytest.raises(ArchiveError, match="different results"):
-            store.assemble(2)
+        store.write(*part([0, 2]))
+        assert [found.tolist() for found in finished_so_far(path)] == [[0, 2]]
+        assert assemble(store, 3).finished.tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize(
-    ("variants", "arrays"),
+    ("variants", "columns"),
     [
         ([], {"x": np.empty(0)}),
         ([-1], {"x": np.ones(1)}),
@@ -97,11 +105,11 @@ def test_parts_with_other_results_are_refused(path):
         ([1], {"variants": np.ones(1)}),
     ],
 )
-def test_arrays_that_do_not_fit_are_refused(path, variants, arrays):
+def test_arrays_that_do_not_fit_are_refused(path, variants, columns):
     with PartStore(path, "key") as store:
         with pytest.raises(ValueError, match=r"variants|x: expected"):
-            store.write(np.array(variants, np.int64), arrays)
-        assert store.finished().size == 0
+            store.write(*part(variants, **columns))
+        assert finished(store).size == 0
 
 
 def flip(part):
@@ -128,48 +136,47 @@ DAMAGE = {
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=list(DAMAGE))
 def test_damaged_parts_are_found_and_computed_again(path, damage):
     with PartStore(path, "key") as store:
-        store.write(*chunk([0, 1]))
-        damage(store.write(*chunk([2, 3])))
+        store.write(*part([0, 1]))
+        damage(store.write(*part([2, 3])))
     (folder(path) / ".x.nc.1.wanderlast-tmp").write_text("left over")
     (path.parent / ".a.nc.1.wanderlast-tmp").write_text("left over")
     with PartStore(path, "key") as store:
-        np.testing.assert_array_equal(store.finished(), [0, 1])
+        np.testing.assert_array_equal(finished(store), [0, 1])
         assert len(list(folder(path).iterdir())) == 3  # key, part, sidecar
-        store.write(*chunk([2, 3]))
-        np.testing.assert_array_equal(store.assemble(4)["peak"], np.sqrt(np.arange(4.0)))
+        store.write(*part([2, 3]))
+        np.testing.assert_array_equal(assemble(store, 4).arrays["peak"], np.sqrt(np.arange(4.0)))
     assert sorted(p.name for p in path.parent.iterdir()) == ["a.nc.parts"]
 
 
 def test_damage_while_assembling_names_the_part_and_deletes_it(path):
     with PartStore(path, "key") as store:
-        part = store.write(np.arange(5000), {"x": np.random.default_rng(0).random(5000)})
-        store.finished()
-        flip(part)
-        with pytest.raises(ArchiveError, match=part.name) as caught:
-            store.assemble(5000)
+        path_of_part = store.write(*part(np.arange(5000), x=np.random.default_rng(0).random(5000)))
+        flip(path_of_part)
+        with pytest.raises(ArchiveError, match=path_of_part.name) as caught:
+            store.read(path_of_part.stem)
         assert caught.value.exit_code == 4
-        assert store.finished().size == 0
+        assert finished(store).size == 0
 
 
 def test_parts_of_another_study_are_refused_until_discarded(path):
     with PartStore(path, "one") as store:
-        store.write(*chunk([0]))
+        store.write(*part([0]))
     with pytest.raises(BadInput, match="expected key two, received key one"), PartStore(path, "two"):
         pass
     with PartStore(path, "one") as store:
-        assert store.finished().size == 1
-    with PartStore.discard_foreign(path, "one") as store:
-        assert store.finished().size == 1
-    with PartStore.discard_foreign(path, "two") as store:
-        assert store.finished().size == 0
+        assert finished(store).size == 1
+    with PartStore(path, "one", discard=True) as store:
+        assert finished(store).size == 1
+    with PartStore(path, "two", discard=True) as store:
+        assert finished(store).size == 0
 
 
 def test_a_folder_without_a_key_is_not_trusted(path):
     with PartStore(path, "key") as store:
-        store.write(*chunk([0]))
+        store.write(*part([0]))
     (folder(path) / "key").write_text("")
     with PartStore(path, "key") as store:
-        assert store.finished().size == 0
+        assert finished(store).size == 0
 
 
 def test_a_file_in_the_way_of_the_parts_is_refused(path):
@@ -184,9 +191,9 @@ def test_a_second_run_is_refused_at_once_and_the_first_goes_on(path):
         with pytest.raises(ArchiveBusy) as caught, PartStore(path, "key"):
             pass
         assert caught.value.exit_code == 75
-        store.write(*chunk([0]))
+        store.write(*part([0]))
     with PartStore(path, "key") as store:
-        assert store.finished().size == 1
+        assert finished(store).size == 1
 
 
 HOLDER = """
@@ -209,7 +216,7 @@ def test_a_lock_held_by_another_process_ends_with_it_even_when_killed(path):
         holder.wait()
     assert path.with_name("a.nc.lock").exists()
     with PartStore(path, "key") as store:
-        assert store.finished().size == 0
+        assert finished(store).size == 0
 
 
 def test_a_full_disk_at_any_operation_keeps_finished_chunks_whole(path, monkeypatch):
@@ -219,14 +226,13 @@ def test_a_full_disk_at_any_operation_keeps_finished_chunks_whole(path, monkeypa
         try:
             with PartStore(path, "key") as store:
                 for first in (0, 4):
-                    store.write(*chunk(range(first, first + 4)))
+                    store.write(*part(range(first, first + 4)))
                     kept.append(first)
         except OutputFailed as error:
             assert error.free_bytes is not None
         monkeypatch.setattr(files, "FAULTS", files.Faults())
         with PartStore(path, "key") as store:
-            finished = store.finished()
-            assert set(finished[::4]) >= set(kept)
+            assert set(finished(store)[::4]) >= set(kept)
             store.remove()
         if len(kept) == 2:
             assert number > 20

@@ -25,7 +25,7 @@ MOST_RESULTS = 18  # that are shown: first those that are nearest to their toler
 
 def pictures(results: Results) -> list[Figure]:
     """The told errors by result; none where there are none, or there is no sweep."""
-    if not is_marched(results) or "estimated_error" not in results.dataset or results.size < 2:
+    if not is_marched(results.dataset) or "estimated_error" not in results.dataset or results.size < 2:
         return []
     error = results.dataset["estimated_error"].transpose(*results.dims, "result").values[results.kept.values]
     asked = zip(results.dataset["result"].values, error.T, results.dataset["tolerance"].values, strict=True)

@@ -49,7 +49,7 @@ VECTOR_CELLS = 1000  # of one map
 def pictures(results: Results) -> list[Figure]:
     """The choice over the sweep; nothing of what is the same in all variants."""
     varied = [name for name in NOUNS if np.unique(known(of_variants(results, name))).size > 1]
-    if not varied or not is_marched(results):
+    if not varied or not is_marched(results.dataset):
         return []
     seen = chosen_view(results)
     alike = [_alike(results, name) for name in NOUNS if name not in varied]

@@ -1,0 +1,270 @@
+"""The work of a study, cut into parts: chunks of variants of a march, or pieces by name. Parts are kept as they finish,
+so a killed run goes on from there, and put together at the end.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from results_schema.errors import BadInput, Interrupted, OutputFailed
+from results_schema.store.rows import Chunk, Collector, joined
+from results_schema.store.tables import Table, from_dataset, to_dataset
+from results_schema.variables import declarations
+from studies.protocol.stopping import Stop
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.batch.execution import Progress
+    from engine.scene.study import Study
+    from studies.protocol.study import Kind, PiecedKind
+
+PIECES_BYTES = 64 * 2**20  # more than what studies that measure leave on the disk
+GRACE_SECONDS = 1.0  # for a piece to end by itself when it is to stop
+SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
+
+
+class Work:
+    """How parts are computed: on how many threads, who is told of the progress, and whether somebody asked to stop.
+
+    chunk: variants of a task where that is fixed, as of `engine.run`.
+    """
+
+    def __init__(
+        self,
+        threads: int | None = None,
+        stop: Stop | None = None,
+        progress: Progress | None = None,
+        chunk: int | None = None,
+    ) -> None:
+        self.threads = (os.cpu_count() or 1) if threads is None else threads
+        self.stop = stop or Stop()
+        self.progress: Progress = progress or (lambda finished, total: None)
+        self.chunk = chunk
+
+    def halted(self) -> bool:
+        """Whether somebody has asked to stop; as the `halted` of `engine.march.march.march`."""
+        return self.stop.event.is_set()
+
+    def check(self) -> None:
+        """Raise Interrupted if somebody has asked to stop."""
+        self.stop.check()
+
+
+class Store(Protocol):
+    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory."""
+
+    def write(self, name: str, part: Mapping[str, Table]) -> object:
+        """Keep one part."""
+
+    def finished(self) -> dict[str, np.ndarray]:
+        """The variants of every part by name, none in a piece."""
+
+    def read(self, name: str) -> Mapping[str, Table]:
+        """One part."""
+
+
+class Memory:
+    """Parts of a run that writes no archive."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, Mapping[str, Table]] = {}
+
+    def write(self, name: str, part: Mapping[str, Table]) -> None:
+        """Keep one part."""
+        self._parts[name] = part
+
+    def finished(self) -> dict[str, np.ndarray]:
+        """Which parts there are."""
+        return dict.fromkeys(self._parts, np.empty(0, np.int64))
+
+    def read(self, name: str) -> Mapping[str, Table]:
+        """One part, which is handed over."""
+        return self._parts.pop(name)
+
+
+class Parts(Protocol):
+    """The work of one study.
+
+    noun: what is counted. names: of the parts, where they are known beforehand. words, disk_bytes: what it leaves on
+    the disk, at most. remarks: what is worth knowing about the study.
+    """
+
+    noun: str
+    names: Sequence[str]
+    words: str
+    disk_bytes: int
+    remarks: Sequence[str]
+
+    def compute(self, store: Store, work: Work) -> int:
+        """Compute what the store does not hold yet; the number of those that it held. Raises Interrupted."""
+
+    def gather(self, store: Store) -> xr.Dataset:
+        """The study's dataset from its finished parts. Raises ArchiveError where one is damaged."""
+
+
+class Variants:
+    """All variants of a march's plan, in chunks. Raises BadInput where there can be no plan."""
+
+    noun = "variant"
+    names: Sequence[str] = ()
+    remarks: Sequence[str]
+
+    def __init__(self, kind: Kind, study: Study) -> None:
+        from engine.batch.plan import make_plan
+        from engine.batch.plausibility import remarks
+
+        if study.output.unreduced:
+            from engine.unreduced.comparison import check_unreduced
+
+            check_unreduced(study)
+        self.kind = kind
+        self.plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
+        self.words = f"the parts and the archive of {self.plan.size} variants"
+        self.disk_bytes = 2 * self.plan.disk_bytes
+        self.remarks = tuple(remarks(self.plan))
+
+    def compute(self, store: Store, work: Work) -> int:
+        """March what the store does not hold yet."""
+        from engine.batch.execution import execute
+
+        done = np.unique(np.concatenate([np.empty(0, np.int64), *store.finished().values()]))
+        work.progress(int(done.size), self.plan.size)
+        if done.size < self.plan.size:
+            how: dict[str, Any] = {"threads": work.threads, "chunk": work.chunk, "stop": work.stop.event}
+            try:
+                with Gatherer(lambda chunk: store.write(chunk.name, chunk.tables)) as parts:
+                    execute(self.plan, parts.add, progress=work.progress, done=done, **how)
+            except Interrupted:
+                work.check()
+                raise
+        return int(done.size)
+
+    def gather(self, store: Store) -> xr.Dataset:
+        """The march's dataset with the study's own results."""
+        from engine.batch.dataset import build
+        from results_schema.variables import expand
+        from studies.results.results import envelope_units, sensor_units
+
+        study, found = self.plan.study, Collector(self.plan.size)
+        for name in store.finished():
+            found.add(Chunk.of(store.read(name)))
+        assert found.finished.all(), "variants are missing"
+        dataset = self.kind.summarise(build(self.plan, found.arrays, found.selected), study)
+        declared = expand(self.kind.name, sensor_units(study), tuple(study.carriage), envelope_units(study))
+        # The engine offers static values to every summary; they are results only where the kind says so.
+        offered = [name for sensor in study.sensor if (name := f"{sensor}_static") not in declared]
+        return dataset.drop_vars(offered, errors="ignore")
+
+
+class Gatherer:
+    """Takes finished chunks and writes them, joined, about twice a second (a part costs as much time as a small chunk);
+    the last ones when the block ends. A process that is killed loses no more than the chunks of the last half second.
+    """
+
+    def __init__(self, write: Callable[[Chunk], object]) -> None:
+        self._write = write
+        self._chunks: list[Chunk] = []
+        self._bytes, self._started = 0, time.monotonic()
+
+    def __enter__(self) -> Gatherer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # Work that is finished is kept, whatever stopped the rest; a failed write would only fail again.
+        if kind is None or not issubclass(kind, OutputFailed | MemoryError):
+            self.flush()
+
+    def add(self, chunk: Chunk) -> None:
+        """Take one chunk; as the sink of `engine.batch.execution.execute`."""
+        self._chunks.append(chunk)
+        self._bytes += sum(array.nbytes for array in chunk.rows.arrays.values())
+        if time.monotonic() - self._started >= SECONDS_PER_PART or self._bytes >= BYTES_PER_PART:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has gathered."""
+        chunks, self._chunks, self._bytes = self._chunks, [], 0
+        rows = joined([chunk.rows for chunk in chunks])
+        if rows is not None:
+            self._write(Chunk(rows, joined([chunk.selected for chunk in chunks if chunk.selected is not None])))
+        self._started = time.monotonic()
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of a study's work, about 1 to 20 s of it, which depends on no other piece.
+
+    name: small letters, digits and dashes, unique in its study. words: what it does. seconds: expected on two cores.
+    size: bytes on the disk, where they are many.
+    """
+
+    name: str
+    words: str
+    compute: Callable[[Work], xr.Dataset]
+    seconds: float = 1.0
+    size: int = 0
+
+
+class Pieces:
+    """Pieces by name, computed one after another. Raises BadInput where the study asks for what only variants have."""
+
+    noun, words = "piece", "the pieces and the archive"
+    remarks: Sequence[str] = ()
+
+    def __init__(self, kind: PiecedKind, study: Study) -> None:
+        if study.output.unreduced:
+            where = study.source.where("output.unreduced")
+            raise BadInput("a study that measures has no variants to compute again", where=where, expected="0")
+        if study.solver.audit not in ("auto", 0):
+            where = study.source.where("solver.audit")
+            raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
+        self.kind, self.study = kind, study
+        self.pieces = kind.pieces(study)
+        self.names: Sequence[str] = [piece.name for piece in self.pieces]
+        self.disk_bytes = PIECES_BYTES + 2 * sum(piece.size for piece in self.pieces)
+
+    def compute(self, store: Store, work: Work) -> int:
+        """Compute the pieces that the store does not hold, each beside this thread, so that a request to stop is heard
+        while it is in a kernel."""
+        from engine.batch.execution import share_out
+
+        done = [name for name in self.names if name in store.finished()]
+        work.progress(len(done), len(self.names))
+        left = [piece for piece in self.pieces if piece.name not in done]
+        for count, piece in enumerate(left, len(done) + 1):
+            work.check()
+            try:
+                jobs, keep = [partial(_compute, piece, work)], partial(_keep, store, piece)
+                share_out(jobs, 1, keep, stop=work.stop.event, grace=GRACE_SECONDS)
+            except Interrupted:
+                work.check()
+                raise
+            work.progress(count, len(self.names))
+        return len(done)
+
+    def gather(self, store: Store) -> xr.Dataset:
+        """The study's dataset from all pieces."""
+        return self.kind.gather({name: to_dataset(store.read(name)["/"]) for name in self.names}, self.study)
+
+
+def _compute(piece: Piece, work: Work, halted: Callable[[], bool]) -> xr.Dataset:
+    return piece.compute(work)
+
+
+def _keep(store: Store, piece: Piece, found: xr.Dataset) -> None:
+    store.write(piece.name, {"/": from_dataset(found)})
+
+
+def usual(dims: Sequence[str], **values: Any) -> dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]]:
+    """What every kind has, over the kind's own grid: status, fidelity, modes and steps, all four of the same shape."""
+    names = {"status": "status", "fidelity": "fidelity_used", "modes": "modes_used", "steps": "steps_used"}
+    declared = {variable.name: variable for variable in declarations("*")}
+    return {names[key]: declared[names[key]].holding(value, dims) for key, value in values.items()}
