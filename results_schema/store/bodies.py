@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from results_schema.errors import ArchiveError
 from results_schema.store import files
 from results_schema.store.reading import check_sizes, opened, read_tables
 from results_schema.store.tables import Column, Table, canonical, seal
 from results_schema.store.writing import write_tables
-
-Array = NDArray[np.float64]
 
 BODY_VERSION = 1
 _VERSION = "body_version"

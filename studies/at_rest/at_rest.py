@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.scene.carriages import MAX_CONTACTS
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.at_rest.labelling import Gathering, asked_coordinates
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from results_schema.status import Fidelity
 
-Array = NDArray[np.float64]
 Named = Mapping[str, NDArray[Any]]
 
 AT_ONCE = 40_000  # variants times positions of one piece

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.results.formatting import listed, percent
 from studies.results.results import Results
-
-Array = NDArray[np.float64]
 
 FREQUENCY_WANTED = 0.002  # relative error of frequencies for which the sentences name a number of modes
 READING_WANTED = 1e-4  # the same of readings, over the largest reading

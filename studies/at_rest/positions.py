@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, Strict, Tag
 
 from engine.study_file.spec import LIST, NUMBER, Spec, by_form
 from engine.study_file.units import Length, fault
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from studies.results.findings_common import first_carriage
 from studies.results.results import spread
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 CORRECTED: Sequence[Mapping[str, Any]] = ({"solver.static_correction": True}, {"solver.static_correction": False})
 

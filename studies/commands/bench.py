@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.batch.execution import execute, march_seconds, warm_up
 from engine.batch.plan import make_plan
 from engine.march.step_rules import allow_any_steps
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.store.rows import Chunk
 
@@ -160,7 +160,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
     )
 
 
-def largest_deflections(scene: Scene) -> NDArray[np.float64]:
+def largest_deflections(scene: Scene) -> Array:
     """(variants,) largest magnitude of the midspan deflection, m: what the march that `measure` times computes."""
     found = np.empty(scene.variants)
 

@@ -6,19 +6,16 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.groups import Found, MarchGroup
 from engine.accuracy.results import results_of, tolerances
 from engine.batch.plan import Plan
 from engine.march.outcome import Flat, used
+from results_schema.arrays import Array
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.findings.numerics_used import NAMES
 from studies.results.formatting import number, percent, scientific
 from studies.results.results import spread
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 HEADINGS = (
     "variants",

@@ -17,6 +17,7 @@ from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases, expand
+from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
@@ -25,7 +26,6 @@ from studies.results.formatting import counted, number, unit_text
 if TYPE_CHECKING:
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 FREQUENCIES_SHOWN = 6
 

@@ -10,11 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.cycle_sums import add_legs
-
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 FLAT = 1e-8  # of its largest value, below which a range is rounding
 HARMONICS = 16

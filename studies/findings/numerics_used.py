@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results
@@ -15,7 +15,6 @@ from studies.results.results import Results
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 MODEL, MODES, STEPS, SCHEME = "fidelity_used", "modes_used", "steps_used", "scheme_used"
 WORK, ERROR = "work", "error_estimate"
@@ -74,7 +73,7 @@ def as_json(results: Results) -> list[dict[str, Any]]:
     ]
 
 
-def _entry(results: Results, model: Fidelity, which: NDArray[np.bool_]) -> dict[str, Any]:
+def _entry(results: Results, model: Fidelity, which: Mask) -> dict[str, Any]:
     """A model with the ranges of its modes and steps, its largest estimated error and its mean work."""
     modes, steps, errors, work = (of_variants(results, name)[which] for name in (MODES, STEPS, ERROR, WORK))
     return {

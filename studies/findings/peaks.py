@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts, Mask
 from studies.findings.indices import FLAT
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 PROMINENCE = 0.02  # of the cycle's range: smaller bumps are no peaks
 KINK = 8.0  # times the bends beside it: a sharper one is a kink

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.results.formatting import MINUS
 from studies.results.results import Results
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from engine.model.scene_model import SceneModel
 
-Array = NDArray[np.float64]
 CYCLE_POINTS = 720
 ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 ONE_PEAK = 1 / 8

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from studies.pictures.common.figures import Figure
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
-Array = NDArray[np.float64]
 
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
 THRESHOLDS = (0.01, 0.05)
@@ -83,7 +82,7 @@ class AsymmetryReduction:
     def sizes(self, study: Study) -> Mapping[str, int]:
         return {"sensor": len(study.sensor)}
 
-    def __call__(self, cycle: Cycle) -> dict[str, indices.Array]:
+    def __call__(self, cycle: Cycle) -> dict[str, Array]:
         """The indices, each (V, J)."""
         way = cycle.motion.legs
         assert way is not None
@@ -190,7 +189,7 @@ def _start(results: Results, left: Array) -> str:
     return f"{count} {told}: {advice}.{unknown}"
 
 
-def _where_late(results: Results, late: NDArray[np.bool_]) -> str:
+def _where_late(results: Results, late: Mask) -> str:
     """From which speed on and up to which damping ratio variants have not settled."""
     said = ""
     for ending, pick, words in ((".motion.speed", np.min, "from {} on"), (".damping_ratio", np.max, "up to {}")):
@@ -201,7 +200,7 @@ def _where_late(results: Results, late: NDArray[np.bool_]) -> str:
     return said
 
 
-def _answer(results: Results, settled: NDArray[np.bool_]) -> str:
+def _answer(results: Results, settled: Mask) -> str:
     """Yes or no, by the largest odd part of all sensors in the variants that have settled, or in all if none has."""
     odd = np.asarray(results.dataset["odd_rms"].transpose(*results.dims, "sensor").values, dtype=np.float64)
     if extreme(odd) is None:
@@ -261,7 +260,7 @@ def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
     return f"{said} (theory: {quantity(abs(float(expected[place])), 'm')})" if expected[place] else said
 
 
-def _first_beyond(results: Results, sensor: str, settled: NDArray[np.bool_]) -> str:
+def _first_beyond(results: Results, sensor: str, settled: Mask) -> str:
     """Where the odd part exceeds each threshold first, in the variants that have settled, or in all if none has."""
     odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
     some = settled.any() and not settled.all()

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import AXES, MARCH, Variable, declare
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
-Array = NDArray[np.float64]
 
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 MOST_SENSORS = 3
@@ -248,7 +247,7 @@ def _answer(results: Results, sensor: str) -> str:
     )
 
 
-def _slowest(results: Results, ratio: Array) -> NDArray[np.bool_]:
+def _slowest(results: Results, ratio: Array) -> Mask:
     """Variants at the lowest frequency of the motion."""
     axis = results.axis(*PACES)
     along = ratio if axis is None else results.everywhere(results.dataset[axis.name])
@@ -277,7 +276,7 @@ def _group_label(results: Results, group: Axis, value: float) -> str:
     return group.at(place)
 
 
-def _break(results: Results, ratio: Array, counts: Array, among: NDArray[np.bool_]) -> str:
+def _break(results: Results, ratio: Array, counts: Array, among: Mask) -> str:
     """Where among some variants the pattern of two peaks breaks, beside the nearest harmonic of the cycle."""
     other = among & (counts != EXPECTED)
     if not other.any():

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import AtRestKind
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
-Array = NDArray[np.float64]
 
 SHOWN = 3  # frequencies that a sentence lists
 STILL = 1e-3  # relative change along the way below which a frequency counts as constant

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Mask
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.protocol.study import Kind
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
 
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5
@@ -106,7 +105,7 @@ def _contact(results: Results, carriage: str) -> list[str]:
     return [_onset(results, carriage, opened, known)]
 
 
-def _onset(results: Results, carriage: str, opened: NDArray[np.bool_], known: NDArray[np.bool_]) -> str:
+def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
     """From which speed on the contact opens, for up to five masses."""
     shown = f"{carriage}: the contact opens in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
     speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
@@ -124,7 +123,7 @@ def _onset(results: Results, carriage: str, opened: NDArray[np.bool_], known: ND
     return f"{shown} ({listed(parts)}). {BEYOND}"
 
 
-def _worst(results: Results, carriage: str, opened: NDArray[np.bool_]) -> str:
+def _worst(results: Results, carriage: str, opened: Mask) -> str:
     """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
     weight = results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
     ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight)
@@ -133,7 +132,7 @@ def _worst(results: Results, carriage: str, opened: NDArray[np.bool_]) -> str:
     return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"
 
 
-def _first_speed(results: Results, speed: Axis, opened: NDArray[np.bool_], known: NDArray[np.bool_]) -> str:
+def _first_speed(results: Results, speed: Axis, opened: Mask, known: Mask) -> str:
     """The lowest speed at which the contact opens, with its ratio to the critical speed where that is known."""
     along = results.everywhere(results.dataset[speed.name])
     if not known.any():

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.maps.methods import hht
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 FEW, MANY, SAFE = (0.3, 0.9), 1.1, 1.5  # times the rule's steps
 MASSES = (0.25, 0.5, 1.0)  # mass ratios: heavy enough to show it, and light enough for passages not to grow

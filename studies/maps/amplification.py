@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 
 def newmark(x: Array, beta: float, gamma: float) -> Array:

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.results.formatting import counted, number, percent
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 STEPS = 2000  # per passage
 SLOWEST, FASTEST = 0.3, 1.2  # speed ratio times the root of the mass ratio
@@ -97,7 +96,7 @@ def frozen_growth(scene: MapScene, mass: float, number_of: Array) -> Grown:
 def divergence(scene: MapScene) -> float:
     """Where the frozen station begins to grow without swinging; NaN where it never does or does all along."""
 
-    def grows(number_of: Array) -> NDArray[np.bool_]:
+    def grows(number_of: Array) -> Mask:
         return frozen_growth(scene, 1.0, number_of).straight > 1.0 + GROWS
 
     return math.nan if grows(np.array([SLOWEST]))[0] else threshold(grows, SLOWEST, FASTEST)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
 from studies.results.formatting import listed, number
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 LIGHTEST, HEAVIEST = 0.01, 3.0  # mass ratios
 SHOWN = (1, 3, 5, 10, 20)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts, Mask
+
 if TYPE_CHECKING:
     from engine.march.march import Marched
     from engine.march.tables import SceneTables
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 CARRIAGE = "load"
 AVERAGE: Mapping[str, Any] = {"scheme": "average-acceleration"}
@@ -195,7 +195,7 @@ class MapScene:
         return SceneTables(self.model, steps, "whole")
 
 
-def threshold(grows: Callable[[Array], NDArray[np.bool_]], low: float, high: float) -> float:
+def threshold(grows: Callable[[Array], Mask], low: float, high: float) -> float:
     """The value between low > 0 and high at which something begins to grow, to nine digits; NaN where it does not.
 
     grows: says so for 15 values at once, which a march has lanes for.

@@ -8,16 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from results_schema.arrays import Array
 from studies.maps import amplification
 from studies.maps.map_scene import AVERAGE
 
 if TYPE_CHECKING:
     from engine.methods.comparison import ComparisonScheme
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

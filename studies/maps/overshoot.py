@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
 from studies.maps.methods import LABELS, METHODS, Method
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 FIRST_STEPS = 20
 FREQUENCY_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # omega h

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.maps.methods import METHODS, Method, generalized, hht
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 MODES, STEPS, COUNTED = 8, 400, 0.98
 INERTIAL = "as inertia"

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
 from studies.maps.methods import LABELS, METHODS, Method
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 STEPS = 50  # marched for the measured growth
 SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to where a limit is looked for

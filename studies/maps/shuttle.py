@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, axis, dataset_of, result
 from studies.results.formatting import listed, number, percent
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from studies.protocol.parts import Work
 
-Array = NDArray[np.float64]
 
 MODES, STEPS = 3, 600
 SLOWEST, FASTEST, HEAVIEST = 0.3, 1.4, 1.0  # frequency ratios, mass ratio

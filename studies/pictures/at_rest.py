@@ -11,14 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, printed
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
 from studies.results.formatting import quantity
 from studies.results.results import Results, spread
-
-Array = NDArray[np.float64]
 
 MOST_CURVES = 6
 FLOOR = 1e-9  # below it an error is drawn at the floor: what is left there is rounding

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.findings import theory
 from studies.pictures.common.figures import (
@@ -29,8 +28,6 @@ from studies.pictures.common.sweep_view import MASSES, SPEEDS, View, along_axis,
 from studies.pictures.common.traces import picked
 from studies.results.formatting import scale_for
 from studies.results.results import Index, Results, chosen
-
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 3
 MOST_CYCLES = 3

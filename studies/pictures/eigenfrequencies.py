@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors
 from studies.pictures.at_rest import (
@@ -23,8 +22,6 @@ from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, lege
 from studies.pictures.common.sweep_view import View
 from studies.results.formatting import number, quantity
 from studies.results.results import Results
-
-Array = NDArray[np.float64]
 
 SWEPT_MODES = 3  # with a panel over the sweep
 SHAPES = 4  # modes whose shapes are drawn

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.at_rest.findings import READING_WANTED, contacts_vary, reading_errors
 from studies.pictures.at_rest import (
@@ -23,8 +22,6 @@ from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_besi
 from studies.pictures.common.sweep_view import Curve
 from studies.results.formatting import quantity, scale_for
 from studies.results.results import Results, chosen, spread
-
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 5
 PANELS = 4  # of errors

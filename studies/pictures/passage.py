@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.findings.theory import body_mass
 from studies.pictures.common.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.common.sweep_view import (
@@ -26,8 +26,6 @@ from studies.pictures.common.sweep_view import (
 from studies.pictures.common.traces import over_position, picked
 from studies.results.formatting import scale_for
 from studies.results.results import Index, Results, chosen, extreme
-
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 3
 MANY = 6  # values of the second axis from which on a map says more than curves

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.pictures.common.figures import (
     BLUE,
@@ -31,8 +30,6 @@ from studies.results.formatting import counted, number
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:

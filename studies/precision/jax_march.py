@@ -11,14 +11,12 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
 from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
 from engine.model.variant_values import VariantValues, lane_table
-
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 BATCH = 256
 BEST_OF = 3

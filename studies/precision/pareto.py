@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts
+
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 FORMAL_ORDERS = {"richardson": 4, "rk4": 4, "lagged-inertia": 1, "lagged-convective": 1}  # of all others 2
 SLOPES_ALIKE = 0.3  # of three or more errors, where their slope is the scheme's own within NEAR

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.batch.execution import seconds_of, seconds_of_jobs
 from engine.kernels.layout import LANES, LARGEST, SMALLEST
@@ -29,11 +28,9 @@ from engine.model.timeline import Segment
 from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from studies.protocol.parts import Work
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 QUANTITIES = ("history", "extremes", "contact_force")
 RICHARDSON = "richardson"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity
@@ -15,8 +15,6 @@ from studies.results.results import Index, Results, extreme, statuses
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
-
-Array = NDArray[np.float64]
 
 
 def first_carriage(study: Study) -> tuple[str, Carriage]:

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from results_schema.status import Status, label
 from results_schema.variables import sensor_unit
 from studies.results.formatting import axis_title, quantity
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 VARIANT = "variant"
 PACES = (".motion.frequency", ".motion.speed")
 Index = tuple[int, ...]
@@ -156,12 +155,12 @@ class Results:
         return self.dataset["status"] < int(Status.NOT_CONVERGED)
 
     @cached_property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Mask:
         """Where values are kept and the contact holds, in the sweep's shape: beyond, the equations say no more."""
         return np.asarray(self.kept.values & (self.dataset["status"].values != int(Status.SEPARATED)))
 
     @cached_property
-    def with_values(self) -> NDArray[np.bool_]:
+    def with_values(self) -> Mask:
         """Which variants speak for all, in the sweep's shape: those whose contact holds, or all with values if none."""
         return self.held if self.held.any() else np.asarray(self.kept.values)
 
@@ -197,7 +196,7 @@ class Results:
         axes.sort(key=lambda axis: not axis.sets(".mass"))
         return max(axes, key=lambda axis: float((values.max(axis.dim) - values.min(axis.dim)).fillna(0.0).mean()))
 
-    def holds_up_to(self, axis: Axis, holds: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+    def holds_up_to(self, axis: Axis, holds: Mask, known: Mask) -> float | None:
         """The largest value of an axis up to which something holds in every known variant; None if nowhere.
 
         holds, known: in the sweep's shape.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from engine.batch.audit import Audit
     from engine.batch.plan import Plan
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 GROUP = "/audit"
 NONE_AUDITED = (

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from results_schema.status import Status
 from results_schema.variables import axes, declarations, sensor_unit
 from studies.results.formatting import counted, listed, percent
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from engine.batch.plan import Plan
     from engine.unreduced.comparison import Compared
 
-Array = NDArray[np.float64]
 
 GROUP = "/unreduced"
 FLAT = 1e-9  # of the largest value: a smaller range is rounding

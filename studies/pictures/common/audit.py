@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
 from studies.results.formatting import axis_title, counted
 from studies.results.results import PACES, Axis, Results
@@ -17,7 +17,6 @@ from studies.runs.audit import relative_errors
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 HEIGHT = 3.0
 LEAST = 1e-6  # an observed error of nothing has no place on a logarithmic axis
 

@@ -7,13 +7,10 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.pictures.common.figures import HAIR, INK, Figure, draw, legend_of_all, shades, zero_line
 from studies.results.formatting import counted, scale_for
 from studies.results.results import Index, Results, chosen, spread
-
-Array = NDArray[np.float64]
 
 MOST_ENVELOPES = 4
 MOST_CURVES = 4

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Mask
 from studies.findings.numerics_used import is_marched, known
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
 from studies.results.formatting import counted, number, percent
@@ -17,7 +17,6 @@ from studies.results.results import Results
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
 MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one
@@ -95,7 +94,7 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
     return [draw("estimated-observed", title, caption, 3.9, fill)]
 
 
-def _draw_compared(pairs: Array, held: NDArray[np.bool_], tolerances: Array, drawing: Drawing) -> None:
+def _draw_compared(pairs: Array, held: Mask, tolerances: Array, drawing: Drawing) -> None:
     axes = drawing.subplots()
     ends = pairs.min() / 1.8, max(pairs.max(), *tolerances, LEAST) * 1.8
     axes.plot(ends, ends, color=INK, linewidth=0.9, label="equal")

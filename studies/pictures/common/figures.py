@@ -19,8 +19,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.results.formatting import number
 
 INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
@@ -156,7 +156,7 @@ def printed(value: float) -> str:
     return number(value).replace("-", "\N{MINUS SIGN}")
 
 
-def is_logarithmic(values: NDArray[np.float64]) -> bool:
+def is_logarithmic(values: Array) -> bool:
     """Whether positive values span more than a decade in steps that grow with them."""
     values = np.unique(values[np.isfinite(values)])
     if len(values) < 3 or values[0] <= 0.0 or values[-1] / values[0] < 10.0:
@@ -170,7 +170,7 @@ def zero_line(axes: Axes) -> None:
     axes.axhline(0.0, color=MUTED, linewidth=0.7, zorder=1.5)
 
 
-def widen(axes: Axes, values: Sequence[NDArray[np.float64]]) -> None:
+def widen(axes: Axes, values: Sequence[Array]) -> None:
     """A vertical axis on which values that differ by rounding alone look constant, with short numbers at its ticks."""
     known = np.concatenate([row[np.isfinite(row)] for row in values])
     largest = float(np.abs(known).max(initial=0.0))

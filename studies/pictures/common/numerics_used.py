@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from results_schema.status import Fidelity
 from studies.findings.numerics_used import MODEL, MODES, NAMES, STEPS, WORK, is_marched, known, models, of_variants
 from studies.pictures.common.figures import (
@@ -29,8 +29,6 @@ from studies.pictures.common.figures import (
 from studies.pictures.common.sweep_view import DAMPING, MASSES, View, along_axis, draw_map, view
 from studies.results.formatting import counted, listed
 from studies.results.results import PACES, VARIANT, Results, spread
-
-Array = NDArray[np.float64]
 
 NOTHING = "#bcc3cb"  # where no step was marched
 COLOURS = {

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from studies.pictures.common.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades, widen
 from studies.results.formatting import listed
@@ -19,7 +19,6 @@ from studies.results.results import VARIANT, Axis, Results, spread, statuses
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 MOST_CURVES = 6
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
@@ -128,7 +127,7 @@ def alone(seen: View) -> View:
     return View(seen.results, seen.x, None, {**seen.held, seen.y.dim: len(seen.y.values) // 2})
 
 
-def _order(axis: Axis) -> NDArray[np.int64]:
+def _order(axis: Axis) -> Counts:
     """Places along an axis in ascending order; a sample stays as it is."""
     return np.arange(len(axis.values)) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.results.results import Index, Results
-
-Array = NDArray[np.float64]
 
 
 class Way(NamedTuple):

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
-from numpy.typing import NDArray
 
 from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, zero_line
 from studies.results.formatting import counted, scale_for
@@ -17,7 +16,6 @@ from studies.runs.unreduced import compared_variants
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 MOST_SENSORS = 4
 STYLES = (("unreduced", "unreduced model", VERMILION, "-", 2.6), ("marched", "march of modes", BLUE, (0, (4, 2)), 1.2))
