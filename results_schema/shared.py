@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from results_schema.status import Fidelity, SchemeUsed, Status
-from results_schema.variable import AXES, EVERY_KIND, Variable, declare
-
-
-def _axis(name: str, long_name: str, units: str = "", dtype: str = "float64", meaning: str = "") -> Variable:
-    return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
+from results_schema.variable import AXES, EVERY_KIND, Variable, axis, declare
 
 
 def _planned(name: str, long_name: str, units: str = "", dtype: str = "float64") -> Variable:
-    return replace(_axis(name, long_name, units, dtype), planned=True)
+    return replace(axis(name, long_name, units, dtype), planned=True)
 
 
 declare(
@@ -25,9 +21,9 @@ declare(
         required=False,
     ),
     Variable("mass_ratio", long_name="mass ratio", meaning="carriage mass over body mass", required=False),
-    _axis("position", "position of the first carriage on its track", "m"),
-    _axis("phase", "phase of the last cycle", meaning="0 to 1, 0 where the motion's formula starts"),
-    _axis("station", "number of the recorded instant", dtype="int64"),
+    axis("position", "position of the first carriage on its track", "m"),
+    axis("phase", "phase of the last cycle", meaning="0 to 1, 0 where the motion's formula starts"),
+    axis("station", "number of the recorded instant", dtype="int64"),
     Variable(
         "elapsed",
         ("position|phase|station",),
@@ -36,20 +32,20 @@ declare(
         required=False,
         lead="history",
     ),
-    _axis("history", "flat number of the variant in the sweep's grid, last axis fastest", dtype="int64"),
-    _axis("variant", "number of the variant of a sampled or zipped sweep", dtype="int64"),
-    _axis("direction", "direction of travel", dtype="str", meaning="forward is from start to end"),
-    _axis("sensor", "sensor", dtype="str"),
+    axis("history", "flat number of the variant in the sweep's grid, last axis fastest", dtype="int64"),
+    axis("variant", "number of the variant of a sampled or zipped sweep", dtype="int64"),
+    axis("direction", "direction of travel", dtype="str", meaning="forward is from start to end"),
+    axis("sensor", "sensor", dtype="str"),
     Variable("sensor_unit", ("sensor",), "str", long_name="unit of the sensor", required=False, lead="none"),
-    _axis("result", "reported number", dtype="str"),
-    _axis("peak", "number of the peak in the cycle", dtype="int64"),
-    _axis("mode", "number of the mode, from 1", dtype="int64"),
-    _axis("sample", "flat number of the variant that was run again", dtype="int64"),
-    _axis("scheme", "time integration scheme", dtype="str"),
-    _axis("step_count", "steps over one passage or cycle", dtype="int64"),
-    _axis("mode_count", "number of modes", dtype="int64"),
-    _axis("quantity", "measured quantity", dtype="str"),
-    _axis("relative_step", "omega_1 times the time step"),
+    axis("result", "reported number", dtype="str"),
+    axis("peak", "number of the peak in the cycle", dtype="int64"),
+    axis("mode", "number of the mode, from 1", dtype="int64"),
+    axis("sample", "flat number of the variant that was run again", dtype="int64"),
+    axis("scheme", "time integration scheme", dtype="str"),
+    axis("step_count", "steps over one passage or cycle", dtype="int64"),
+    axis("mode_count", "number of modes", dtype="int64"),
+    axis("quantity", "measured quantity", dtype="str"),
+    axis("relative_step", "omega_1 times the time step"),
     _planned("robot", "robot", dtype="str"),
     _planned("component", "component of the vector", dtype="str"),
 )

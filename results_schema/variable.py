@@ -63,6 +63,18 @@ class Variable:
         return own, array if self.dtype == "str" else array.astype(self.dtype), self.attributes()
 
 
+def axis(name: str, long_name: str, units: str = "", dtype: str = "float64", meaning: str = "") -> Variable:
+    """A coordinate along a dimension of its own, where a dataset has that."""
+    return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
+
+
+def beside(
+    name: str, dims: tuple[str, ...], long_name: str, meaning: str = "", units: str = "", *, nan_allowed: bool = True
+) -> Variable:
+    """A number that some studies have, over dimensions of its own beside the sweep."""
+    return Variable(name, dims, "float64", units, long_name, meaning, None, False, nan_allowed, lead="none")
+
+
 REGISTRY: dict[str, dict[str, Variable]] = {}
 
 

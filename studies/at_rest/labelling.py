@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.variable import axis
 from results_schema.variables import Variable
 from studies.at_rest.positions import Asked, Positions, positions_of
 from studies.protocol.parts import usual
@@ -23,39 +24,11 @@ if TYPE_CHECKING:
 BODY_PLACES = 101  # along every body, of its shapes
 
 COORDINATES = (
-    Variable("on_body", ("on_body",), "str", long_name="body", required=False, lead="none"),
-    Variable(
-        "body_place",
-        ("body_place",),
-        long_name="place along the body over the length of its track",
-        required=False,
-        lead="none",
-    ),
-    Variable(
-        "checked_position",
-        ("checked_position",),
-        units="m",
-        long_name="position at which numbers of modes are compared",
-        required=False,
-        lead="none",
-    ),
-    Variable(
-        "unreduced_position",
-        ("unreduced_position",),
-        units="m",
-        long_name="position at which the unreduced model is computed",
-        required=False,
-        lead="none",
-    ),
-    Variable(
-        "correction",
-        ("correction",),
-        "int8",
-        long_name="whether the static correction is on",
-        meaning="1 with, 0 without",
-        required=False,
-        lead="none",
-    ),
+    axis("on_body", "body", dtype="str"),
+    axis("body_place", "place along the body over the length of its track"),
+    axis("checked_position", "position at which numbers of modes are compared", units="m"),
+    axis("unreduced_position", "position at which the unreduced model is computed", units="m"),
+    axis("correction", "whether the static correction is on", dtype="int8", meaning="1 with, 0 without"),
 )
 
 

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
+from results_schema.variable import beside
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import AtRestKind
 from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors
@@ -66,33 +67,24 @@ RESULTS = (
         lead="none",
         nan_allowed=True,
     ),
-    Variable(
+    beside(
         "frequency_by_mode_count",
         ("correction", "mode_count", "checked_position", "mode"),
+        "natural frequency with other numbers of modes of every body",
+        "of the scene without sweep",
         units="Hz",
-        long_name="natural frequency with other numbers of modes of every body",
-        meaning="of the scene without sweep",
-        required=False,
-        lead="none",
-        nan_allowed=True,
     ),
-    Variable(
+    beside(
         "frequency_unreduced",
         ("unreduced_position", "mode"),
+        "natural frequency of the unreduced finite-element model",
+        "of the scene without sweep",
         units="Hz",
-        long_name="natural frequency of the unreduced finite-element model",
-        meaning="of the scene without sweep",
-        required=False,
-        lead="none",
-        nan_allowed=True,
     ),
-    Variable(
+    beside(
         "frequency_difference",
         ("unreduced_position", "mode"),
-        long_name="relative difference of the natural frequency from that of the unreduced model",
-        required=False,
-        lead="none",
-        nan_allowed=True,
+        "relative difference of the natural frequency from that of the unreduced model",
     ),
 )
 declare("eigenfrequencies", *RESULTS, *COORDINATES)

@@ -11,6 +11,7 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
+from results_schema.variable import axis, beside
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import AtRestKind, check_held
 from studies.at_rest.findings import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
@@ -65,51 +66,44 @@ RESULTS = (
         meaning=f"{_AT_REST}, as displacement sensors count it",
         lead="none",
     ),
-    Variable(
+    beside(
         "{sensor}_by_mode_count",
         ("correction", "mode_count", "checked_position"),
+        "static reading of {sensor} with other numbers of modes of every body",
+        "of the scene without sweep",
         units="{sensor}",
-        long_name="static reading of {sensor} with other numbers of modes of every body",
-        meaning="of the scene without sweep",
-        required=False,
-        lead="none",
+        nan_allowed=False,
     ),
-    Variable(
+    beside(
         "{sensor}_unreduced",
         ("unreduced_position",),
+        "static reading of {sensor} by the unreduced finite-element model",
+        "of the scene without sweep",
         units="{sensor}",
-        long_name="static reading of {sensor} by the unreduced finite-element model",
-        meaning="of the scene without sweep",
-        required=False,
-        lead="none",
+        nan_allowed=False,
     ),
-    Variable(
+    beside(
         "{sensor}_difference",
         ("unreduced_position",),
-        long_name="difference of {sensor} from the unreduced model",
-        meaning="over the largest reading at these positions",
-        required=False,
-        lead="none",
+        "difference of {sensor} from the unreduced model",
+        "over the largest reading at these positions",
+        nan_allowed=False,
     ),
-    Variable(
+    beside(
         "contact_force_unreduced",
         ("unreduced_position", "contact"),
+        "static force at every contact by the unreduced finite-element model",
         units="N",
-        long_name="static force at every contact by the unreduced finite-element model",
-        required=False,
-        lead="none",
+        nan_allowed=False,
     ),
-    Variable(
+    beside(
         "contact_force_difference",
         ("unreduced_position", "contact"),
-        long_name="difference of contact forces from the unreduced model",
-        meaning="over the largest force at these positions",
-        required=False,
-        lead="none",
+        "difference of contact forces from the unreduced model",
+        "over the largest force at these positions",
+        nan_allowed=False,
     ),
-    Variable(
-        "contact", ("contact",), "str", long_name="carriage, or carriage and contact", required=False, lead="none"
-    ),
+    axis("contact", "carriage, or carriage and contact", dtype="str"),
 )
 declare("influence", *RESULTS, *COORDINATES)
 

@@ -12,28 +12,12 @@ from pydantic import AfterValidator, Field, Strict
 from engine.study_file.document import shortened
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import fault
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
 from studies.precision.checks import slug_of
-from studies.precision.variables import (
-    AUTOMATIC,
-    COMPARISON_ONLY,
-    COORDINATES,
-    ERROR,
-    JAX_ERROR,
-    JAX_SECONDS,
-    ON_FRONT,
-    ORDER,
-    REFERENCE_ERROR,
-    RESULTS,
-    SECONDS,
-    SOLVER_ERROR,
-    SOLVER_SECONDS,
-    TOTAL_ERROR,
-    TOTAL_REFERENCE_ERROR,
-    TOTAL_SECONDS,
-)
+from studies.precision.variables import COORDINATES, RESULTS
 from studies.protocol.parts import Piece, Work, usual
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.findings_common import check_sensors, first_carriage
@@ -224,57 +208,57 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     from studies.precision.pareto import fitted_order, formal_order, fronts
     from studies.precision.precision import COMPARED, MARCHED, QUANTITIES
 
-    steps, solvers, modes = (
-        [pieces[f"{part}-{slug_of(name)}"] for name in asked.scenes] for part in ("steps", "solvers", "modes")
-    )
-    error = np.stack([piece["error"].values for piece in steps])
-    floors = np.stack([piece["reference_error"].values for piece in steps])
+    def stacked(part: str, name: str) -> Array:
+        return np.stack([pieces[f"{part}-{slug_of(scene)}"][name].values for scene in asked.scenes])
+
+    error, floors = stacked("steps", "error"), stacked("steps", "reference_error")
     marched = [place for place, scheme in enumerate(asked.schemes) if scheme in MARCHED]
-    total = np.full((len(modes), len(asked.mode_counts), 2, *error.shape[1:]), np.nan)
-    total[:, :, :, marched] = np.stack([piece["error"].values for piece in modes])
-    seconds = np.full((len(modes), len(asked.mode_counts), *error.shape[1:3]), np.nan)
-    seconds[:, :, marched] = np.stack([piece["seconds"].values for piece in modes])
+    total = np.full((len(asked.scenes), len(asked.mode_counts), 2, *error.shape[1:]), np.nan)
+    total[:, :, :, marched] = stacked("modes", "error")
+    seconds = np.full((*total.shape[:2], *error.shape[1:3]), np.nan)
+    seconds[:, :, marched] = stacked("modes", "seconds")
     order = np.empty((*error.shape[:2], len(QUANTITIES)))
     for place in np.ndindex(order.shape):
         s, i, q = place
         formal = formal_order(asked.schemes[i], QUANTITIES[q])
         order[place] = fitted_order(asked.step_counts, error[s, i, :, q], float(FLOOR * floors[s, q]), formal)
+    values = {
+        "error": error,
+        "seconds_per_variant": stacked("steps", "seconds"),
+        "fitted_order": order,
+        "comparison_only": [int(scheme in COMPARED) for scheme in asked.schemes],
+        "reference_error": floors,
+        "total_error": total,
+        "total_seconds_per_variant": seconds,
+        "total_reference_error": stacked("modes", "reference_error"),
+        "on_front": fronts(total, seconds),
+        "solver_error": stacked("solvers", "error"),
+        "solver_seconds_per_variant": stacked("solvers", "seconds"),
+        **_automatic(pieces, asked),
+    }
+    told = {"jax": "not installed, so there are no points of jax.vmap"}
+    if any(name.startswith("jax-") for name in pieces):
+        told = {"jax": "measured"}
+        values |= {"jax_error": stacked("jax", "error"), "jax_seconds_per_variant": stacked("jax", "seconds")}
+    threads = sorted({int(count) for count in stacked("steps", "threads")})
+    told["threads"] = " to ".join(str(count) for count in dict.fromkeys((threads[0], threads[-1])))
     grid = ("scene", "scheme", "step_count")
     diverged = np.isnan(error).all(axis=-1)
-    counts = np.array(asked.step_counts)
-    only = [int(scheme in COMPARED) for scheme in asked.schemes]
-    data = {
-        ERROR: ((*grid, "quantity"), error),
-        SECONDS: (grid, np.stack([piece["seconds"].values for piece in steps])),
-        ORDER: (ORDER.dims, order),
-        COMPARISON_ONLY: (COMPARISON_ONLY.dims, only),
-        REFERENCE_ERROR: (REFERENCE_ERROR.dims, floors),
-        TOTAL_ERROR: (TOTAL_ERROR.dims, total),
-        TOTAL_SECONDS: (TOTAL_SECONDS.dims, seconds),
-        TOTAL_REFERENCE_ERROR: (REFERENCE_ERROR.dims, np.stack([piece["reference_error"].values for piece in modes])),
-        ON_FRONT: (ON_FRONT.dims, fronts(total, seconds)),
-        SOLVER_ERROR: (SOLVER_ERROR.dims, np.stack([piece["error"].values for piece in solvers])),
-        SOLVER_SECONDS: (SOLVER_SECONDS.dims, np.stack([piece["seconds"].values for piece in solvers])),
-    }
-    used = np.stack([np.full(error.shape[1:3], int(piece["modes"])) for piece in steps])
     shared = usual(
         grid,
         status=np.where(diverged, int(Status.DIVERGED), int(Status.OK)),
         fidelity=np.full(diverged.shape, int(Fidelity.MASS)),
-        modes=used,
-        steps=np.broadcast_to(counts, diverged.shape).copy(),
+        modes=np.broadcast_to(stacked("steps", "modes")[:, None, None], diverged.shape),
+        steps=np.broadcast_to(asked.step_counts, diverged.shape),
     )
-    found = {variable.name: variable.holding(values, dims) for variable, (dims, values) in data.items()}
-    by_jax = [pieces[name] for scene in asked.scenes if (name := f"jax-{slug_of(scene)}") in pieces]
-    for variable, name in ((JAX_ERROR, "error"), (JAX_SECONDS, "seconds")) if by_jax else ():
-        found[variable.name] = variable.holding(np.stack([piece[name].values for piece in by_jax]))
-    found |= _automatic(pieces, asked)
-    threads = sorted({int(piece["threads"]) for piece in steps})
-    told = {
-        "jax": "measured" if by_jax else "not installed, so there are no points of jax.vmap",
-        "threads": " to ".join(str(count) for count in dict.fromkeys((threads[0], threads[-1]))),
+    own = {
+        variable.name: variable.holding(
+            values[variable.name], (*grid, *variable.dims) if variable.lead == "grid" else variable.dims
+        )
+        for variable in RESULTS
+        if variable.name in values
     }
-    return xr.Dataset(shared | found, coords=_coordinates(asked, QUANTITIES), attrs=told)
+    return xr.Dataset(shared | own, coords=_coordinates(asked, QUANTITIES), attrs=told)
 
 
 def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, Any]:
@@ -282,12 +266,11 @@ def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, A
     names = [[_automatic_name(scene, tolerance) for tolerance in asked.tolerances] for scene in asked.scenes]
     if not any(name in pieces for row in names for name in row):
         return {}
-    found = {}
-    for name, variable in AUTOMATIC.items():
-        missing = np.nan if variable.nan_allowed else 0
-        values = [[float(pieces[piece][name]) if piece in pieces else missing for piece in row] for row in names]
-        found[variable.name] = variable.holding(values)
-    return found
+    missing = {"error": np.nan, "seconds_per_variant": np.nan, "modes": 0, "steps": 0}
+    return {
+        f"automatic_{own}": [[float(pieces[name][own]) if name in pieces else none for name in row] for row in names]
+        for own, none in missing.items()
+    }
 
 
 def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:

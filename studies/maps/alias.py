@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import hht
 from studies.results.formatting import counted, number, percent
 
@@ -38,11 +39,11 @@ AXES = (
     axis("step_multiple", "steps over the steps of the alias rule"),
 )
 VARIABLES = (
-    result("growth", tuple(a.name for a in AXES), "growth per passage",
+    beside("growth", tuple(a.name for a in AXES), "growth per passage",
            "spectral radius of its transition matrix "
-           "on modal displacements and velocities over omega", nan_allowed=True),
-    result("alias_steps", ("alias_mode_count", "alias_speed_ratio"), "steps per passage of the alias rule",
-           "k_N v h = 2 atan(2/(omega_N h))"),
+           "on modal displacements and velocities over omega"),
+    beside("alias_steps", ("alias_mode_count", "alias_speed_ratio"), "steps per passage of the alias rule",
+           "k_N v h = 2 atan(2/(omega_N h))", nan_allowed=False),
 )  # fmt: skip
 
 

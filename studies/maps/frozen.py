@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import counted, number, percent
 
 if TYPE_CHECKING:
@@ -32,16 +33,16 @@ AXES = (
 )
 _OVER = tuple(a.name for a in AXES)
 VARIABLES = (
-    result("frozen_growth", _OVER, "growth during the time of one passage, frozen", "mass held at midspan, with the "
-           "terms of its speed; a property of the frozen station, not of a passage", nan_allowed=True),
-    result("frozen_flutter", _OVER, "the same of what swings alone", "0 where nothing swings", nan_allowed=True),
-    result("passage_growth", _OVER, "growth per passage", "the mass crosses", nan_allowed=True),
-    result("frozen_divergence", ("held_mode_count",), "speed ratio times root of mass ratio where the frozen station "
+    beside("frozen_growth", _OVER, "growth during the time of one passage, frozen", "mass held at midspan, with the "
+           "terms of its speed; a property of the frozen station, not of a passage"),
+    beside("frozen_flutter", _OVER, "the same of what swings alone", "0 where nothing swings"),
+    beside("passage_growth", _OVER, "growth per passage", "the mass crosses"),
+    beside("frozen_divergence", ("held_mode_count",), "speed ratio times root of mass ratio where the frozen station "
            "diverges", "begins to grow without swinging, by bisection on the march itself; NaN where it does not up to "
-           "1.2, or does from 0.3 on", nan_allowed=True),
-    result("frozen_divergence_theory", ("held_mode_count",), "the same from the modes' sum",
-           "m v^2 times the sum of phi phi'' / omega^2 is -1; NaN where that cannot be", nan_allowed=True),
-    result("frozen_limit", (), "the same with all modes", "2/pi, pinned beams only"),
+           "1.2, or does from 0.3 on"),
+    beside("frozen_divergence_theory", ("held_mode_count",), "the same from the modes' sum",
+           "m v^2 times the sum of phi phi'' / omega^2 is -1; NaN where that cannot be"),
+    beside("frozen_limit", (), "the same with all modes", "2/pi, pinned beams only", nan_allowed=False),
 )  # fmt: skip
 
 

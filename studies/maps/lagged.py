@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
+from studies.maps.mapping import Asked, Map, dataset_of, shared
 from studies.results.formatting import listed, number
 
 if TYPE_CHECKING:
@@ -26,12 +27,12 @@ AXES = (
     axis("lagged_mass_ratio", "carriage mass over body mass"),
 )
 VARIABLES = (
-    result("critical_mass_ratio", ("mode_count", "relative_step"), "mass ratio from which on lagged inertia grows",
-           "frozen at midspan, by bisection on the march itself; NaN where there is none up to 3", nan_allowed=True),
-    result("critical_mass_ratio_theory", ("mode_count",), "mass ratio where m phi.phi = 1",
-           "for average acceleration, whatever the step"),
-    result("lagged_growth", ("mode_count", "relative_step", "lagged_mass_ratio"), "growth per step of lagged inertia",
-           "frozen at midspan", nan_allowed=True),
+    beside("critical_mass_ratio", ("mode_count", "relative_step"), "mass ratio from which on lagged inertia grows",
+           "frozen at midspan, by bisection on the march itself; NaN where there is none up to 3"),
+    beside("critical_mass_ratio_theory", ("mode_count",), "mass ratio where m phi.phi = 1",
+           "for average acceleration, whatever the step", nan_allowed=False),
+    beside("lagged_growth", ("mode_count", "relative_step", "lagged_mass_ratio"), "growth per step of lagged inertia",
+           "frozen at midspan"),
 )  # fmt: skip
 
 

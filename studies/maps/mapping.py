@@ -73,19 +73,9 @@ class Map:
     sentences: Callable[[xr.Dataset], list[str]]
 
 
-def axis(name: str, long_name: str, units: str = "", dtype: str = "float64") -> Variable:
-    """The declaration of an axis of a map."""
-    return Variable(name, (name,), dtype, units, long_name, required=False, lead="none")
-
-
 def shared(name: str) -> Variable:
     """The declaration of an axis that several kinds of study have."""
     return axes()[name]
-
-
-def result(name: str, dims: tuple[str, ...], long_name: str, meaning: str = "", nan_allowed: bool = False) -> Variable:
-    """The declaration of a number over the axes of a map."""
-    return Variable(name, dims, "float64", "", long_name, meaning, required=False, nan_allowed=nan_allowed, lead="none")
 
 
 def dataset_of(

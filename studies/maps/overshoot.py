@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
+from studies.maps.mapping import Asked, Map, dataset_of, shared
 from studies.maps.methods import LABELS, METHODS, Method
 from studies.results.formatting import listed, number
 
@@ -26,10 +27,10 @@ LONG, LONGER = 20.0, 100.0  # omega h of the sentences
 AXES = (shared("scheme"), axis("overshoot_step", "omega h: natural frequency times the time step"))
 _MEANING = "of an undamped oscillator released at rest, over its first 20 steps; NaN beyond the scheme's limit"
 VARIABLES = (
-    result("displacement_overshoot", ("scheme", "overshoot_step"), "overshoot in displacement",
-           "largest over the first, " + _MEANING, nan_allowed=True),
-    result("velocity_overshoot", ("scheme", "overshoot_step"), "overshoot in velocity",
-           "largest over omega times the first displacement, " + _MEANING, nan_allowed=True),
+    beside("displacement_overshoot", ("scheme", "overshoot_step"), "overshoot in displacement",
+           "largest over the first, " + _MEANING),
+    beside("velocity_overshoot", ("scheme", "overshoot_step"), "overshoot in velocity",
+           "largest over omega times the first displacement, " + _MEANING),
 )  # fmt: skip
 
 

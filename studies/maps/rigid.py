@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import Ground
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import METHODS, Method, generalized, hht
 from studies.results.formatting import listed, number, percent
 
@@ -38,12 +39,12 @@ AXES = (
     axis("passage_fraction", "place of the mass over the length"),
 )
 VARIABLES = (
-    result("contact_force", ("tie", "passage_fraction"), "contact force", "over the weight; NaN "
-           "beyond a million", nan_allowed=True),
-    result("contact_ringing", ("tie",), "ringing of the contact force", "over the weight: rms of the part that changes "
-           "its sign from step to step, (F[n+1] - 2 F[n] + F[n-1])/4; NaN where it blows up", nan_allowed=True),
-    result("contact_departure", ("tie",), "largest departure of the contact force from that of the mass as inertia",
-           "over the weight; NaN where it blows up", nan_allowed=True),
+    beside("contact_force", ("tie", "passage_fraction"), "contact force", "over the weight; NaN "
+           "beyond a million"),
+    beside("contact_ringing", ("tie",), "ringing of the contact force", "over the weight: rms of the part that changes "
+           "its sign from step to step, (F[n+1] - 2 F[n] + F[n-1])/4; NaN where it blows up"),
+    beside("contact_departure", ("tie",), "largest departure of the contact force from that of the mass as inertia",
+           "over the weight; NaN where it blows up"),
 )  # fmt: skip
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result, shared
+from studies.maps.mapping import Asked, Map, dataset_of, shared
 from studies.maps.methods import LABELS, METHODS, Method
 from studies.results.formatting import listed, number
 
@@ -24,13 +25,15 @@ SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to whe
 
 AXES = (shared("scheme"), axis("frequency_step", "omega h: natural frequency times the time step"))
 VARIABLES = (
-    result("critical_step", ("scheme",), "omega h at which a scheme's amplification leaves 1", "omega h, by bisection "
-           "on the march itself; NaN where there is none up to 1000", nan_allowed=True),
-    result("critical_step_theory", ("scheme",), "the same by the closed form", "omega h; NaN without "
-           "limit", nan_allowed=True),
-    result("scheme_radius", ("scheme", "frequency_step"), "spectral radius of one step of the march"),
-    result("scheme_radius_theory", ("scheme", "frequency_step"), "spectral radius of the closed amplification matrix"),
-    result("scheme_growth", ("scheme", "frequency_step"), "growth per step over 50 marched steps"),
+    beside("critical_step", ("scheme",), "omega h at which a scheme's amplification leaves 1", "omega h, by bisection "
+           "on the march itself; NaN where there is none up to 1000"),
+    beside("critical_step_theory", ("scheme",), "the same by the closed form", "omega h; NaN without "
+           "limit"),
+    beside("scheme_radius", ("scheme", "frequency_step"), "spectral radius of one step of the march",
+           nan_allowed=False),
+    beside("scheme_radius_theory", ("scheme", "frequency_step"), "spectral radius of the closed amplification matrix",
+           nan_allowed=False),
+    beside("scheme_growth", ("scheme", "frequency_step"), "growth per step over 50 marched steps", nan_allowed=False),
 )  # fmt: skip
 
 

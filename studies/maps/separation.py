@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import counted, listed, number, percent
 
 if TYPE_CHECKING:
@@ -27,13 +28,12 @@ AXES = (
     axis("separation_speed_ratio", "speed over omega_1 L / pi"),
 )
 VARIABLES = (
-    result("smallest_contact_force", tuple(a.name for a in AXES), "smallest contact force over the weight",
-           "over the weight, on 0-98 % of the span; NaN where the march overflows", nan_allowed=True),
-    result("separation_onset", ("separation_mass_ratio",), "onset of separation",
-           "lowest speed ratio at which the contact opens; it may hold again at higher ones; NaN where it always holds",
-           nan_allowed=True),
-    result("separation_place", ("separation_mass_ratio",), "place of separation", "in lengths, at that speed",
-           nan_allowed=True),
+    beside("smallest_contact_force", tuple(a.name for a in AXES), "smallest contact force over the weight",
+           "over the weight, on 0-98 % of the span; NaN where the march overflows"),
+    beside("separation_onset", ("separation_mass_ratio",), "onset of separation",
+           "lowest speed ratio at which the contact opens; it may hold again at higher ones; NaN where it always "
+           "holds"),
+    beside("separation_place", ("separation_mass_ratio",), "place of separation", "in lengths, at that speed"),
 )  # fmt: skip
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.variable import axis, beside
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, axis, dataset_of, result
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import listed, number, percent
 
 if TYPE_CHECKING:
@@ -34,13 +35,12 @@ AXES = (
     axis("shuttle_frequency_ratio", "frequency of the shuttle over omega_1"),
 )
 VARIABLES = (
-    result("multiplier", tuple(a.name for a in AXES), "largest Floquet multiplier", "of one period, in magnitude",
-           nan_allowed=True),
-    result("tongue_low", ("shuttle_mass_ratio",), "lower end of the main tongue", "of the main unstable interval "
-           "without damping, frequency over omega_1; NaN where there is none", nan_allowed=True),
-    result("tongue_high", ("shuttle_mass_ratio",), "upper end of the main tongue", "as tongue_low", nan_allowed=True),
-    result("tongue_theory", ("shuttle_mass_ratio",), "centre of the main tongue by theory", "by the first mode alone, "
-           "frequency over omega_1"),
+    beside("multiplier", tuple(a.name for a in AXES), "largest Floquet multiplier", "of one period, in magnitude"),
+    beside("tongue_low", ("shuttle_mass_ratio",), "lower end of the main tongue", "of the main unstable interval "
+           "without damping, frequency over omega_1; NaN where there is none"),
+    beside("tongue_high", ("shuttle_mass_ratio",), "upper end of the main tongue", "as tongue_low"),
+    beside("tongue_theory", ("shuttle_mass_ratio",), "centre of the main tongue by theory", "by the first mode alone, "
+           "frequency over omega_1", nan_allowed=False),
 )  # fmt: skip
 
 

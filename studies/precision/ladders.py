@@ -135,7 +135,7 @@ def automatic(study: Study, overrides: Mapping[str, Any], asked: Ladder, toleran
     error = reference.errors(precision.run_scheme(tables, scheme, work))[precision.QUANTITIES.index("history")]
     seconds = precision.seconds_per_variant(tables, scheme, work)
     return xr.Dataset(
-        {"error": error, "seconds": seconds, "modes": tables.model.body_modes, "steps": tables.steps},
+        {"error": error, "seconds_per_variant": seconds, "modes": tables.model.body_modes, "steps": tables.steps}
     )
 
 

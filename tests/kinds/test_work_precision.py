@@ -24,7 +24,7 @@ from studies.precision import findings as advice
 from studies.precision import ladders
 from studies.precision import pareto as trade
 from studies.precision import precision as measured
-from studies.precision.variables import AUTOMATIC
+from studies.precision.variables import RESULTS
 from studies.protocol.parts import Work
 from studies.reporting import answers
 from tests.bodies.frames import PINNED, straight
@@ -137,7 +137,7 @@ def test_the_total_error_is_that_against_a_reference_of_more_modes_and_steps() -
 
 def test_the_automatic_choice_is_in_the_archive() -> None:
     dataset = precision.small()
-    for variable in AUTOMATIC.values():
+    for variable in (one for one in RESULTS if one.name.startswith("automatic")):
         assert dataset[variable.name].dims == ("scene", "asked_tolerance")
     assert (dataset.automatic_error > 0.0).all() and (dataset.automatic_error <= dataset.asked_tolerance).all()
     assert (dataset.automatic_seconds_per_variant > 0.0).all() and (dataset.automatic_steps >= 32).all()
