@@ -11,20 +11,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
 from studies.findings import theory
-from studies.pictures.common.figures import (
-    BESIDE,
-    BLUE,
-    HAIR,
-    INK,
-    MUTED,
-    VERMILION,
-    Figure,
-    banded,
-    colour_bar,
-    draw,
-    logarithmic,
-    zero_line,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, banded, colour_bar, draw, logarithmic, zero_line
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MASSES,
@@ -102,14 +90,16 @@ def _draw_ways(results: Results, sensor: str, index: Index, axes: Sequence[Axes]
     assert way is not None
     scale = scale_for(float(np.abs(out.values).max()), units)
     small = scale_for(float(np.abs(odd.values).max()), units)
-    axes[0].plot(out.position, out.values * scale.factor, color=BLUE, label="forward")
-    axes[0].plot(back.position, back.values * scale.factor, color=VERMILION, linestyle=(0, (4, 1.5)), label="backward")
-    axes[1].plot(odd.position, odd.values * small.factor, color=INK, linewidth=1.2)
+    axes[0].plot(out.position, out.values * scale.factor, color=look.BLUE, label="forward")
+    axes[0].plot(
+        back.position, back.values * scale.factor, color=look.VERMILION, linestyle=(0, (4, 1.5)), label="backward"
+    )
+    axes[1].plot(odd.position, odd.values * small.factor, color=look.INK, linewidth=1.2)
     zero_line(axes[1])
     depth = way.turn * (way.end - way.start)
     for ax in axes:
         for edge, inner in ((way.start, way.start + depth), (way.end, way.end - depth)):
-            ax.axvspan(edge, inner, color=HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
+            ax.axvspan(edge, inner, color=look.HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
         ax.set_xlim(min(way.start, way.end), max(way.start, way.end))
     if units == "m":
         axes[0].invert_yaxis()
@@ -171,8 +161,8 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
 def _name_theory(axes: Axes, formula: str, seen: View) -> None:
     """The dashed lines in the legend too."""
     handles, labels = axes.get_legend_handles_labels()
-    dashes = Line2D([], [], color=MUTED, linestyle=(0, (4, 2)), linewidth=0.9)
-    place = {**BESIDE, "title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
+    dashes = Line2D([], [], color=look.MUTED, linestyle=(0, (4, 2)), linewidth=0.9)
+    place = {**look.BESIDE, "title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
     axes.legend([*handles, dashes], [*labels, formula], **place)
 
 
@@ -198,7 +188,7 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
             if any((curve.y > 0.0).any() for curve in curves):
                 logarithmic(axes.yaxis)
             for threshold in THRESHOLDS:
-                axes.axhline(100.0 * threshold, color=MUTED, linestyle=":", linewidth=0.9)
+                axes.axhline(100.0 * threshold, color=look.MUTED, linestyle=":", linewidth=0.9)
             axes.set_title(f"{title}, {sensor}")
         row[0].set_ylabel("% of the static range")
     for axes in grid[-1]:

@@ -11,19 +11,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings import theory
-from studies.pictures.common.figures import (
-    BLUE,
-    HAIR,
-    INK,
-    MUTED,
-    VERMILION,
-    Figure,
-    colour_bar,
-    draw,
-    legend_beside,
-    logarithmic,
-    shades,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, logarithmic, shades
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
 from studies.pictures.common.traces import picked
 from studies.results.formatting import scale_for
@@ -105,13 +94,13 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
     kept = np.isfinite(trace.values)
     values = np.append(trace.values[kept], trace.values[kept][:1])
     scale = scale_for(float(np.abs(values).max()), results.sensors[sensor])
-    axes.plot(np.linspace(0.0, 1.0, len(values)), values * scale.factor, color=BLUE)
+    axes.plot(np.linspace(0.0, 1.0, len(values)), values * scale.factor, color=look.BLUE)
     place = dict(zip(results.dims, index, strict=True))
     phase, peak = (results.of_sensor(name, sensor).isel(place).values for name in ("peak_phase", "peak_value"))
-    axes.plot(phase, peak * scale.factor, "o", color=VERMILION, zorder=3)
+    axes.plot(phase, peak * scale.factor, "o", color=look.VERMILION, zorder=3)
     if results.carriage.motion.is_harmonic:
         for end in (0.25, 0.75):
-            axes.axvline(end, color=MUTED, linewidth=0.7, zorder=1)
+            axes.axvline(end, color=look.MUTED, linewidth=0.7, zorder=1)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylabel(scale.unit)
 
@@ -172,7 +161,7 @@ def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
         if ratio.max() < left or ratio.min() > right:
             continue
         axes.plot(ratio, along, color="white", linewidth=2.6, alpha=0.8)
-        axes.plot(ratio, along, color=INK, linewidth=1.1)
+        axes.plot(ratio, along, color=look.INK, linewidth=1.1)
         if left < ratio[-1] < right:
             above: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "bottom"}
             axes.annotate(f"{order} Ω", (ratio[-1], along[-1]), (0, 2), **above)
@@ -198,7 +187,7 @@ def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
     way, title = _ratio(seen)
     (curve,) = seen.curves(seen.results.of_sensor("peaks_per_cycle", sensor), way)
     order = np.argsort(curve.x)
-    axes.plot(curve.x[order], curve.y[order], "o-", color=BLUE, drawstyle="steps-mid", markersize=3)
+    axes.plot(curve.x[order], curve.y[order], "o-", color=look.BLUE, drawstyle="steps-mid", markersize=3)
     axes.set_ylim(0.0, max(5.0, float(np.nanmax(curve.y, initial=0.0)) + 1.0))
     along_axis(axes, seen, title, curve.x)
     axes.set_ylabel("peaks per cycle")
@@ -262,4 +251,4 @@ def _draw_harmonics(results: Results, sensor: str, shown: list[Index], drawing: 
         axes.set_ylim(bottom=1e-4 * float(np.nanmax(rows)) * scale.factor)
     if results.at(shown[0]):
         legend_beside(axes)
-    axes.axhline(0.0, color=HAIR)
+    axes.axhline(0.0, color=look.HAIR)

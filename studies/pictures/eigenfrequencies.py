@@ -8,16 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors
-from studies.pictures.at_rest import (
-    Errors,
-    carriage_marks,
-    error_figure,
-    held_words,
-    places,
-    position_title,
-    sweep_curves,
-    swept,
-)
+from studies.pictures import at_rest
 from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
 from studies.results.formatting import number, quantity
@@ -31,7 +22,7 @@ GAP = 1.3  # of the largest amplitude, between a body that rides and what it rid
 def pictures(results: Results) -> list[Figure]:
     """All figures that the dataset allows."""
     found = [_over_position(results)]
-    seen = swept(results)
+    seen = at_rest.swept(results)
     if seen is not None and not seen.is_sampled:
         found.append(_over_sweep(seen))
     found.append(_shapes(results))
@@ -42,7 +33,7 @@ def pictures(results: Results) -> list[Figure]:
         words = f"Largest relative error of the frequencies up to the {modes}th, against {against}."
         if np.isnan(error).any():
             words += " Where there is no point, modes are too few to have them all."
-        found.append(error_figure(results, [Errors("", counts, error)], FREQUENCY_WANTED, words))
+        found.append(at_rest.error_figure(results, [at_rest.Errors("", counts, error)], FREQUENCY_WANTED, words))
     return found
 
 
@@ -74,13 +65,15 @@ def _draw_over_position(results: Results, drawing: Drawing) -> None:
             full = results.dataset["frequency_unreduced"].isel(mode=mode)
             axes.plot(full["unreduced_position"], full, "o", markersize=4.5, markerfacecolor="none", color=INK)
     axes.set_ylim(0.0, None)
-    axes.set(xlabel=position_title(results), ylabel="natural frequency (Hz)")
+    axes.set(xlabel=at_rest.position_title(results), ylabel="natural frequency (Hz)")
 
 
 def _over_sweep(seen: View) -> Figure:
     assert seen.x is not None
     shown = min(SWEPT_MODES, seen.results.dataset.sizes["mode"])
-    caption = " ".join(text for text in (f"One panel for each of the lowest {shown}.", held_words(seen)) if text)
+    caption = " ".join(
+        text for text in (f"One panel for each of the lowest {shown}.", at_rest.held_words(seen)) if text
+    )
     title = f"Frequencies over the position and {seen.x.noun}"
     return draw("sweep", title, caption, 0.7 + 1.9 * shown, partial(_draw_over_sweep, seen, shown))
 
@@ -88,12 +81,12 @@ def _over_sweep(seen: View) -> Figure:
 def _draw_over_sweep(seen: View, shown: int, drawing: Drawing) -> None:
     rows = drawing.subplots(shown, 1, squeeze=False, sharex=True)[:, 0]
     for mode, axes in enumerate(rows):
-        curves = sweep_curves(seen, seen.results.dataset["frequency"].isel(mode=mode))
+        curves = at_rest.sweep_curves(seen, seen.results.dataset["frequency"].isel(mode=mode))
         for curve, colour in zip(curves, shades(len(curves)), strict=True):
             axes.plot(curve.x, curve.y, color=colour, label=f"{seen.x.noun if seen.x else ''} {curve.label}")
         widen(axes, [curve.y for curve in curves])
         axes.set_ylabel(f"frequency {mode + 1} (Hz)")
-    rows[-1].set_xlabel(position_title(seen.results))
+    rows[-1].set_xlabel(at_rest.position_title(seen.results))
     legend_of_all(drawing, rows[0])
 
 
@@ -102,7 +95,7 @@ def _shapes(results: Results) -> Figure:
     caption = (
         f"The lowest {count} shapes with the carriage at the beginning, in the middle and at the end of its way, each "
         "scaled to its own largest motion. Grey: at rest."
-        + (" What rides is drawn above what it rides." if any(p.rides for p in places(results)) else "")
+        + (" What rides is drawn above what it rides." if any(p.rides for p in at_rest.places(results)) else "")
     )
     height = 0.4 + 1.35 * count
     return draw("shapes", "Shapes of the coupled system", caption, height, partial(_draw_shapes, results, count))
@@ -113,7 +106,7 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
     size = base.sizes["position"]
     columns = sorted({0, size // 2, size - 1})
     grid = drawing.subplots(count, len(columns), squeeze=False, sharex=True, sharey=True)
-    bodies = places(results)
+    bodies = at_rest.places(results)
     riding = {carriage.riding_body for carriage in results.study.carriage.values()}
     for mode in range(count):
         for column, place in enumerate(columns):
@@ -125,7 +118,7 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
                 axes.plot(x, np.full_like(x, level), color=HAIR, linewidth=1.0, zorder=1.5)
                 axes.plot(x, level + line / largest, color=colour, label=body.name)
                 if body.name == results.carriage.on:
-                    carriage_marks(axes, results, position, float(np.interp(position, x, line)) / largest)
+                    at_rest.carriage_marks(axes, results, position, float(np.interp(position, x, line)) / largest)
             axes.set_title(f"{number(float(base[place, mode]), 4)} Hz", color=MUTED, fontsize=8.0, pad=2.0)
             axes.set_yticks([])
             axes.grid(visible=False)

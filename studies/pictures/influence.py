@@ -8,16 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.at_rest.findings import READING_WANTED, contacts_vary, reading_errors
-from studies.pictures.at_rest import (
-    Errors,
-    carriage_marks,
-    error_figure,
-    held_words,
-    places,
-    position_title,
-    sweep_curves,
-    swept,
-)
+from studies.pictures import at_rest
 from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve
 from studies.results.formatting import quantity, scale_for
@@ -36,36 +27,36 @@ def pictures(results: Results) -> list[Figure]:
     if "mode_count" in results.dataset.dims:
         counts = [int(count) for count in results.dataset["mode_count"].values]
         errors = {name: reading_errors(results, name) for name in chosen(list(results.sensors), PANELS)}
-        panels = [Errors(name.replace("_", " "), counts, error) for name, (error, _) in errors.items()]
+        panels = [at_rest.Errors(name.replace("_", " "), counts, error) for name, (error, _) in errors.items()]
         against = next(words for _, words in errors.values())
         words = f"Difference from {against}, over the largest reading."
-        found.append(error_figure(results, panels, READING_WANTED, words))
+        found.append(at_rest.error_figure(results, panels, READING_WANTED, words))
     return found
 
 
 def _curves(results: Results, name: str) -> list[Curve]:
     """One curve without a sweep, else some along its first axis."""
-    found, seen = results.dataset[name], swept(results)
+    found, seen = results.dataset[name], at_rest.swept(results)
     if seen is not None and not seen.is_sampled:
-        return sweep_curves(seen, found)
+        return at_rest.sweep_curves(seen, found)
     flat = np.asarray(found.values).reshape(-1, found.sizes["position"])
     return [Curve("", found["position"].values, flat[i]) for i in spread(len(flat), 6)]
 
 
 def _readings(results: Results, sensors: list[str]) -> Figure:
-    seen = swept(results)
+    seen = at_rest.swept(results)
     texts = ["Everything at rest: displacements point down, as gravity does."]
     if any(f"{name}_unreduced" in results.dataset for name in sensors):
         texts.append("Circles are the unreduced finite-element model" + (", without the sweep." if seen else "."))
     if seen is not None:
-        texts.append(held_words(seen))
+        texts.append(at_rest.held_words(seen))
     height = 0.7 + 1.7 * len(sensors)
     caption = " ".join(text for text in texts if text)
     return draw("readings", "Static readings over the position", caption, height, partial(_draw, results, sensors))
 
 
 def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
-    rows, seen = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0], swept(results)
+    rows, seen = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0], at_rest.swept(results)
     for axes, name in zip(rows, sensors, strict=True):
         curves = _curves(results, name)
         scale = scale_for(float(np.nanmax([np.abs(curve.y).max() for curve in curves])), results.sensors[name])
@@ -81,7 +72,7 @@ def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
         axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
         if results.sensors[name] == "m":
             axes.invert_yaxis()
-    rows[-1].set_xlabel(position_title(results))
+    rows[-1].set_xlabel(at_rest.position_title(results))
     drawing.align_ylabels()
     if len(rows[0].lines) > 2:
         legend_of_all(drawing, rows[0])
@@ -101,13 +92,13 @@ def _draw_contacts(results: Results, drawing: Drawing) -> None:
     for name, colour in zip(names, shades(len(names)), strict=True):
         axes.plot(middle["position"], middle.sel(contact=name) * scale.factor, color=colour, label=name)
     widen(axes, list(np.asarray(middle.values).T * scale.factor))
-    axes.set(xlabel=position_title(results), ylabel=f"contact force ({scale.unit})")
+    axes.set(xlabel=at_rest.position_title(results), ylabel=f"contact force ({scale.unit})")
     if len(names) > 1:
         legend_beside(axes)
 
 
 def _shapes(results: Results) -> Figure:
-    bodies = places(results)
+    bodies = at_rest.places(results)
     positions = len(spread(results.dataset.sizes["position"], SHAPES))
     caption = (
         f"With the carriage at {positions} positions, down as gravity points"
@@ -119,7 +110,7 @@ def _shapes(results: Results) -> Figure:
 
 
 def _draw_shapes(results: Results, drawing: Drawing) -> None:
-    found, bodies = results.dataset["deflection"], places(results)
+    found, bodies = results.dataset["deflection"], at_rest.places(results)
     rows = drawing.subplots(len(bodies), 1, squeeze=False, sharex=True)[:, 0]
     chosen_places = spread(found.sizes["position"], SHAPES)
     for number, (axes, body) in enumerate(zip(rows, bodies, strict=True)):
@@ -131,7 +122,7 @@ def _draw_shapes(results: Results, drawing: Drawing) -> None:
             label = f"{results.carriage_name} at {quantity(position, 'm')}"
             axes.plot(x, y, color=colour if len(chosen_places) > 1 else BLUE, label=label)
             if body.name == results.carriage.on:
-                carriage_marks(axes, results, position, float(np.interp(position, x, y)))
+                at_rest.carriage_marks(axes, results, position, float(np.interp(position, x, y)))
         axes.set_ylabel(f"{body.name}\n({scale.unit})")
         axes.invert_yaxis()
     rows[-1].set_xlabel("along the way (m)")

@@ -9,13 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from studies.pictures.common import figures as look
 from studies.pictures.common.figures import (
-    BLUE,
-    DISTINCT,
-    HAIR,
-    INK,
-    MUTED,
-    VERMILION,
     Figure,
     banded,
     colour_bar,
@@ -48,17 +43,19 @@ def _schemes(dataset: xr.Dataset, drawing: Drawing) -> None:
     for axes, chosen, title in zip(rows, (limited, ~limited), ("with a limit", "without a limit"), strict=True):
         x = dataset["frequency_step"].values
         labels = dataset["scheme"].values[chosen]
-        for place, (label, colour) in enumerate(zip(labels, (*DISTINCT, MUTED), strict=False)):
+        for place, (label, colour) in enumerate(zip(labels, (*look.DISTINCT, look.MUTED), strict=False)):
             one = dataset.sel(scheme=label)
             axes.plot(x, one["scheme_growth"], color=colour, label=str(label))
-            axes.plot(x[place % 5 :: 5], one["scheme_radius_theory"].values[place % 5 :: 5], ".", color=INK, ms=3.0)
-        axes.plot([], [], ".", color=INK, ms=3.0, label="theory")
-        axes.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+            axes.plot(
+                x[place % 5 :: 5], one["scheme_radius_theory"].values[place % 5 :: 5], ".", color=look.INK, ms=3.0
+            )
+        axes.plot([], [], ".", color=look.INK, ms=3.0, label="theory")
+        axes.axhline(1.0, color=look.MUTED, linewidth=0.7, zorder=1.5)
         axes.set(ylim=(0.85, 2.0) if title == "with a limit" else (0.0, 1.1), ylabel="growth per step", title=title)
         legend_beside(axes)
         logarithmic(axes.xaxis)
     for value in dataset["critical_step"].values[limited]:
-        rows[0].axvline(value, color=HAIR, linewidth=0.8, zorder=1.0)
+        rows[0].axvline(value, color=look.HAIR, linewidth=0.8, zorder=1.0)
     rows[1].set_xlabel("ω h: natural frequency times the step")
 
 
@@ -69,8 +66,8 @@ def _lagged(dataset: xr.Dataset, drawing: Drawing) -> None:
     for step, marker, size in zip(steps, "os^vD", (7.0, 4.5, 3.0, 2.5, 2.0), strict=False):
         critical = dataset["critical_mass_ratio"].sel(relative_step=step)
         style = {"mfc": "none", "linestyle": "none", "marker": marker, "ms": size}
-        left.plot(counts, critical, color=BLUE, label=f"run, ω₁ h = {printed(step)}", **style)
-    left.plot(counts, dataset["critical_mass_ratio_theory"], color=VERMILION, lw=1.0, label="theory m φ·φ = 1")
+        left.plot(counts, critical, color=look.BLUE, label=f"run, ω₁ h = {printed(step)}", **style)
+    left.plot(counts, dataset["critical_mass_ratio_theory"], color=look.VERMILION, lw=1.0, label="theory m φ·φ = 1")
     left.set(xlabel="number of modes", ylabel="mass ratio from which on it grows")
     logarithmic(left.yaxis)
     left.legend()
@@ -78,7 +75,7 @@ def _lagged(dataset: xr.Dataset, drawing: Drawing) -> None:
     shown = counts[np.unique(np.linspace(0, len(counts) - 1, 5).round().astype(int))]
     for count, colour in zip(shown, shades(len(shown)), strict=True):
         right.plot(dataset["lagged_mass_ratio"], middle.sel(mode_count=count), color=colour, label=str(count))
-    right.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+    right.axhline(1.0, color=look.MUTED, linewidth=0.7, zorder=1.5)
     right.set(ylim=(0.8, 3.0), xlabel="mass ratio", ylabel="growth per step")
     logarithmic(right.xaxis)
     right.legend(title="modes")
@@ -94,11 +91,11 @@ def _alias(dataset: xr.Dataset, drawing: Drawing) -> None:
             curves = worst.sel(alias_scheme=scheme, alias_mode_count=count).transpose("step_multiple", ...)
             lines = axes.plot(dataset["step_multiple"], curves.values, color=colour, lw=0.8)
             lines[0].set_label(str(count))
-        axes.axvline(1.0, color=VERMILION, linewidth=1.5)
-        axes.axhline(1.0, color=MUTED, linewidth=0.7, zorder=1.5)
+        axes.axvline(1.0, color=look.VERMILION, linewidth=1.5)
+        axes.axhline(1.0, color=look.MUTED, linewidth=0.7, zorder=1.5)
         axes.set(ylabel="growth per passage", title=str(scheme))
     legend_beside(rows[0], "modes")
-    rows[0].annotate("the alias rule", (1.02, 0.92), xycoords=("data", "axes fraction"), color=VERMILION, va="top")
+    rows[0].annotate("the alias rule", (1.02, 0.92), xycoords=("data", "axes fraction"), color=look.VERMILION, va="top")
     logarithmic(rows[1].xaxis)
     ticks = [t for t in (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0) if t <= float(dataset["step_multiple"].max())]
     rows[1].set_xticks(ticks)
@@ -115,7 +112,7 @@ def _shuttle(dataset: xr.Dataset, drawing: Drawing) -> None:
         axes.grid(visible=False)
         frequency = dataset["shuttle_frequency_ratio"].values
         mesh = axes.pcolormesh(frequency, mass, grid, shading="nearest", rasterized=True, **banded(edges))
-        axes.plot(dataset["tongue_theory"], mass, color=VERMILION, linewidth=1.8, label="formula for one mode")
+        axes.plot(dataset["tongue_theory"], mass, color=look.VERMILION, linewidth=1.8, label="formula for one mode")
         axes.set(xlabel="frequency over ω₁", title=f"damping {printed(100.0 * damping)} %", xlim=(frequency[0], None))
         axes.set_ylim(mass[0] - 0.5 * (mass[1] - mass[0]), mass[-1])
     rows[0].set_ylabel("mass ratio")
@@ -135,12 +132,14 @@ def _frozen(dataset: xr.Dataset, drawing: Drawing) -> None:
         for count, colour in zip(counts, shades(len(counts)), strict=True):
             held = one["frozen_growth"].sel(held_mode_count=count)
             axes.plot(x, held, color=colour, lw=1.0, ls="--", label=f"frozen, {counted(int(count), 'mode')}")
-        axes.plot(x, one["passage_growth"].isel(held_mode_count=-1), color=BLUE, label=f"passage, {counts[-1]} modes")
+        axes.plot(
+            x, one["passage_growth"].isel(held_mode_count=-1), color=look.BLUE, label=f"passage, {counts[-1]} modes"
+        )
         axes.set(ylim=(low, 20.0), xlabel="speed ratio · √(mass ratio)", title=f"mass ratio {printed(mass)}")
         logarithmic(axes.yaxis)
         if "frozen_limit" in dataset:
             limit = float(dataset["frozen_limit"])
-            axes.axvline(limit, color=VERMILION, linewidth=1.0, label=f"frozen, all modes: {number(limit, 4)}")
+            axes.axvline(limit, color=look.VERMILION, linewidth=1.0, label=f"frozen, all modes: {number(limit, 4)}")
     np.atleast_1d(rows)[0].set_ylabel("growth in the time of one passage")
     legend_beside(np.atleast_1d(rows)[-1])
 

@@ -9,19 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.maps.rigid import INERTIAL, STEPS
-from studies.pictures.common.figures import (
-    BLUE,
-    DISTINCT,
-    HAIR,
-    INK,
-    MUTED,
-    VERMILION,
-    legend_beside,
-    logarithmic,
-    printed,
-    shades,
-    zero_line,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import legend_beside, logarithmic, printed, shades, zero_line
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,8 +40,8 @@ def _separation(dataset: xr.Dataset, drawing: Drawing) -> None:
         solid = np.append(speed[held], opens), np.append(force[held], [0.0 for _ in opens])
         axes.plot(*solid, color=colour, label=printed(mass))
         if opens:
-            axes.plot(opens, 0.0, "o", color=VERMILION, ms=5.0, zorder=3.0)
-    axes.plot([], [], "o", color=VERMILION, ms=5.0, label="opens first")
+            axes.plot(opens, 0.0, "o", color=look.VERMILION, ms=5.0, zorder=3.0)
+    axes.plot([], [], "o", color=look.VERMILION, ms=5.0, label="opens first")
     zero_line(axes)
     axes.set(
         ylim=(-2.0, 1.05), xlim=(0.0, None), xlabel="speed ratio v/(ω₁ L/π)", ylabel="smallest contact force / weight"
@@ -67,17 +56,17 @@ def _overshoot(dataset: xr.Dataset, drawing: Drawing) -> None:
     both = np.fmax(dataset["displacement_overshoot"].values, dataset["velocity_overshoot"].values)
     largest = np.nanmax(both, axis=1)
     notable = [str(label) for label, value in zip(dataset["scheme"].values, largest, strict=True) if value > NOTABLE]
-    colours = dict(zip(notable, (*DISTINCT, INK), strict=False))
+    colours = dict(zip(notable, (*look.DISTINCT, look.INK), strict=False))
     for axes, name in zip(rows, ("displacement", "velocity"), strict=True):
         for label in dataset["scheme"].values:
             values = dataset[f"{name}_overshoot"].sel(scheme=label)
             known = str(label) in colours
-            style = {"color": colours[str(label)], "zorder": 3.0} if known else {"color": HAIR, "zorder": 2.0}
+            style = {"color": colours[str(label)], "zorder": 3.0} if known else {"color": look.HAIR, "zorder": 2.0}
             axes.plot(x, values, marker="o", ms=3.0, label=str(label) if known else "_others", **style)
         axes.set(xlabel="ω h", title=f"largest {name} over the true one")
         logarithmic(axes.xaxis)
         logarithmic(axes.yaxis)
-    rows[1].plot([], [], color=HAIR, label="all others")
+    rows[1].plot([], [], color=look.HAIR, label="all others")
     legend_beside(rows[1])
 
 
@@ -86,7 +75,7 @@ def _rigid(dataset: xr.Dataset, drawing: Drawing) -> None:
     left, right = drawing.subplots(1, 2, width_ratios=(1.7, 1.0))
     ties = [str(name) for name in dataset["tie"].values]
     calm = _calmest(dataset)
-    colours = dict.fromkeys(ties, MUTED) | {INERTIAL: INK, ties[1]: BLUE, calm: VERMILION}
+    colours = dict.fromkeys(ties, look.MUTED) | {INERTIAL: look.INK, ties[1]: look.BLUE, calm: look.VERMILION}
     x = dataset["passage_fraction"]
     shown = {ties[1]: {"lw": 0.4, "alpha": 0.6}, INERTIAL: {"lw": 1.8}, calm: {"lw": 0.9}}
     for name, style in shown.items():
@@ -99,7 +88,7 @@ def _rigid(dataset: xr.Dataset, drawing: Drawing) -> None:
     low = right.get_xlim()[0]
     for place, value in zip(places, ringing, strict=True):
         if not np.isfinite(value):
-            right.text(low * 1.3, place, "blows up", va="center", color=MUTED)
+            right.text(low * 1.3, place, "blows up", va="center", color=look.MUTED)
     right.set_yticks(places, ties)
     right.yaxis.tick_right()
     right.tick_params(axis="y", length=0.0)

@@ -12,18 +12,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from studies.pictures.common.figures import (
-    DISTINCT,
-    HAIR,
-    INK,
-    MUTED,
-    VERMILION,
-    Figure,
-    draw,
-    legend_beside,
-    logarithmic,
-    shades,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, shades
 from studies.precision.findings import QUANTITY_WORDS, scheme_words, short_time
 from studies.precision.pareto import automatic_choices, choices
 
@@ -34,7 +24,7 @@ COLUMNS = 2
 LARGEST_SHOWN = 1.0
 TIME = "time per variant"
 DIAMOND: dict[str, Any] = {
-    "color": VERMILION,
+    "color": look.VERMILION,
     "marker": "D",
     "markersize": 5.0,
     "markeredgecolor": "white",
@@ -133,7 +123,7 @@ def _orders(dataset: xr.Dataset, drawing: Drawing) -> None:
     axes = drawing.subplots()
     schemes, scenes = ([str(name) for name in dataset[dim].values] for dim in ("scheme", "scene"))
     rows = np.arange(len(schemes))
-    for scene, colour, marker in zip(scenes, cycle(DISTINCT), cycle("os^Dv<>")):
+    for scene, colour, marker in zip(scenes, cycle(look.DISTINCT), cycle("os^Dv<>")):
         order = dataset["fitted_order"].sel(scene=scene, quantity="history").values
         label = scene if np.isfinite(order).any() else "_none"
         axes.plot(order, rows, marker=marker, color=colour, linewidth=0.0, alpha=0.8, label=label)
@@ -148,13 +138,13 @@ def _styles(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Look of every scheme: colours for those of the march, dashed greys for the others."""
     found: dict[str, dict[str, Any]] = {}
     only = {str(s): bool(c) for s, c in zip(dataset["scheme"].values, dataset["comparison_only"].values, strict=True)}
-    colours = iter((*DISTINCT, INK))
+    colours = iter((*look.DISTINCT, look.INK))
     dashes = iter(DASHES)
     for scheme, compared in only.items():
         if compared:
-            found[scheme] = {"color": MUTED, "dashes": next(dashes, (4, 2)), "linewidth": 1.0}
+            found[scheme] = {"color": look.MUTED, "dashes": next(dashes, (4, 2)), "linewidth": 1.0}
         else:
-            found[scheme] = {"color": next(colours, INK), "marker": "o", "markersize": 3.0, "linewidth": 1.3}
+            found[scheme] = {"color": next(colours, look.INK), "marker": "o", "markersize": 3.0, "linewidth": 1.3}
     return found
 
 
@@ -178,10 +168,12 @@ def _draw_cost(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
         chosen = [str(name) for name in own["solver"].values if str(name).startswith(method)]
         error = own["solver_error"].sel(solver=chosen, quantity="history").values
         seconds = own["solver_seconds_per_variant"].sel(solver=chosen).values
-        (line,) = axes.plot(seconds, error, marker=marker, color=MUTED, markerfacecolor="white", linewidth=0.8)
+        (line,) = axes.plot(seconds, error, marker=marker, color=look.MUTED, markerfacecolor="white", linewidth=0.8)
         handles[f"SciPy {method}"] = line
     if "jax_error" in own:
-        (line,) = axes.plot(own["jax_seconds_per_variant"], own["jax_error"], marker="x", color=MUTED, linewidth=0.8)
+        (line,) = axes.plot(
+            own["jax_seconds_per_variant"], own["jax_error"], marker="x", color=look.MUTED, linewidth=0.8
+        )
         handles["jax.vmap"] = line
     axes.set_xlabel(TIME)
     return handles
@@ -195,7 +187,7 @@ def _draw_steps(axes: Axes, own: xr.Dataset, scene: str, quantity: str) -> dict[
     if known.size and steps.size > 1:
         for order in (1, 2, 4):
             line = min(LARGEST_SHOWN, float(known.max())) * (steps / steps[0]) ** -order
-            axes.plot(steps, np.where(line > known.min(), line, np.nan), color=HAIR, linewidth=3.0, zorder=1)
+            axes.plot(steps, np.where(line > known.min(), line, np.nan), color=look.HAIR, linewidth=3.0, zorder=1)
     axes.set_xlabel("steps over one passage or cycle")
     return handles
 
@@ -213,7 +205,7 @@ def _draw_trade(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
         name = f"{count} mode{'s' if count > 1 else ''}"
         handles[name] = Line2D([], [], color=colour, marker="o", markersize=3.5, linewidth=0.0)
     hollow: dict[str, Any] = {
-        "color": MUTED,
+        "color": look.MUTED,
         "marker": "o",
         "markersize": 3.5,
         "linewidth": 0.0,
@@ -222,9 +214,13 @@ def _draw_trade(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
     handles["hollow: without\nstatic correction"] = Line2D([], [], **hollow)
     best = np.minimum.accumulate([point.error for point in points]) if points else np.zeros(0)
     times = [point.seconds for point in points]
-    (handles["best there is"],) = axes.plot(times, best, color=INK, linewidth=1.2, drawstyle="steps-post", zorder=4)
+    (handles["best there is"],) = axes.plot(
+        times, best, color=look.INK, linewidth=1.2, drawstyle="steps-post", zorder=4
+    )
     handles |= _draw_automatic(axes, own.expand_dims(scene=[scene]))
-    axes.axhspan(1e-16, float(own["total_reference_error"].sel(quantity="history")), color=HAIR, alpha=0.5, zorder=0)
+    axes.axhspan(
+        1e-16, float(own["total_reference_error"].sel(quantity="history")), color=look.HAIR, alpha=0.5, zorder=0
+    )
     if len(best):
         axes.set_ylim(0.5 * min(best.min(), float(own["total_reference_error"].sel(quantity="history"))), None)
     axes.set(xscale="log", yscale="log", xlabel=TIME)
@@ -237,7 +233,7 @@ def _draw_automatic(axes: Axes, own: xr.Dataset) -> dict[str, Any]:
         return {}
     found = [point for asked in own["asked_tolerance"].values for point in automatic_choices(own, float(asked))]
     for point in found:
-        axes.plot([point.seconds] * 2, [point.error, point.asked], color=VERMILION, linewidth=1.0, zorder=5)
-        axes.plot(point.seconds, point.asked, marker="_", markersize=9.0, color=VERMILION, zorder=5)
+        axes.plot([point.seconds] * 2, [point.error, point.asked], color=look.VERMILION, linewidth=1.0, zorder=5)
+        axes.plot(point.seconds, point.asked, marker="_", markersize=9.0, color=look.VERMILION, zorder=5)
         axes.plot(point.seconds, point.error, zorder=6, **DIAMOND)
     return {"automatic choice,\nbar: error asked": Line2D([], [], **DIAMOND)} if found else {}

@@ -14,18 +14,8 @@ from matplotlib.patches import Patch
 from results_schema.arrays import Array
 from results_schema.status import Fidelity
 from studies.findings.numerics_used import MODEL, MODES, NAMES, STEPS, WORK, is_marched, known, models, of_variants
-from studies.pictures.common.figures import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SEQUENTIAL,
-    SKY,
-    Figure,
-    colour_bar,
-    draw,
-    logarithmic,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, colour_bar, draw, logarithmic
 from studies.pictures.common.sweep_view import DAMPING, MASSES, View, along_axis, draw_map, view
 from studies.results.formatting import counted, listed
 from studies.results.results import PACES, VARIANT, Results, spread
@@ -33,11 +23,11 @@ from studies.results.results import PACES, VARIANT, Results, spread
 NOTHING = "#bcc3cb"  # where no step was marched
 COLOURS = {
     Fidelity.STATIC: NOTHING,
-    Fidelity.FORCE: SKY,
-    Fidelity.MASS_WITHOUT_CONVECTIVE: GREEN,
-    Fidelity.MASS: BLUE,
-    Fidelity.TIED: PURPLE,
-    Fidelity.FRAME: ORANGE,
+    Fidelity.FORCE: look.SKY,
+    Fidelity.MASS_WITHOUT_CONVECTIVE: look.GREEN,
+    Fidelity.MASS: look.BLUE,
+    Fidelity.TIED: look.PURPLE,
+    Fidelity.FRAME: look.ORANGE,
 }
 NOUNS = {MODEL: "model", MODES: "modes", STEPS: "steps"}
 MOST_TICKS = 4
@@ -116,7 +106,7 @@ def _draw_numbers(axes: Axes, seen: View, values: Array, label: str, side: str) 
 def _map(axes: Axes, seen: View, values: Array, colours: list[str] | LogNorm) -> Any:
     """A map of numbers in the sweep's shape; in a list of colours of 0, 1, ... . Large ones are pictures, as there are
     several in one figure."""
-    style: dict[str, Any] = {"cmap": SEQUENTIAL, "norm": colours}
+    style: dict[str, Any] = {"cmap": look.SEQUENTIAL, "norm": colours}
     if isinstance(colours, list):
         places = np.arange(len(colours) + 1) - 0.5
         style = {"cmap": ListedColormap(colours), "norm": BoundaryNorm(places, len(colours))}
@@ -137,7 +127,7 @@ def _draw_lines(seen: View, varied: list[str], drawing: Drawing) -> None:
             values = np.where(np.isfinite(values), np.searchsorted(used, np.nan_to_num(values)), np.nan)
             axes.set_yticks(range(len(used)), [NAMES[model].replace(" without", "\nwithout") for model in used])
             axes.set_ylim(-0.5, len(used) - 0.5)
-        axes.plot(seen.along(seen.x), values, color=BLUE, marker="o", markersize=3.0, **style)
+        axes.plot(seen.along(seen.x), values, color=look.BLUE, marker="o", markersize=3.0, **style)
         axes.set_ylabel("" if name == MODEL else NOUNS[name])
         if name != MODEL and not (values == 0.0).any():
             logarithmic(axes.yaxis)
