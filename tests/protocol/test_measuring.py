@@ -24,7 +24,7 @@ from results_schema.store.parts import PartStore, finished_so_far
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from studies.commands.cli import main
 from studies.protocol.options import RunOptions
-from studies.protocol.parts import Memory, Piece, Pieces, Work, usual
+from studies.protocol.parts import Memory, Piece, Pieces, Work
 from studies.protocol.stopping import Stop
 from studies.protocol.study import PiecedKind, question_of
 from studies.runs.runner import run_to_archive
