@@ -27,7 +27,6 @@ from results_schema.store.archive import FILES, open_archive
 from results_schema.store.parts import PartStore
 from results_schema.store.tables import Table
 from studies.commands.cli import main
-from studies.protocol import parts as gathering
 from studies.protocol.options import RunOptions
 from studies.protocol.study import KINDS_FOLDER
 from studies.runs import identity
