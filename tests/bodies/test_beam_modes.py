@@ -170,13 +170,6 @@ def test_springs_keep_their_units_and_dampers_are_listed() -> None:
     assert body.dampers == ((0.5, 40.0), (4.0, 7.0))
 
 
-def test_springs_at_one_place_act_as_one() -> None:
-    together = on_springs(((0.3, 5.0, 0.0), (0.9, 7.0, 2.0)), 6)
-    nudged = math.nextafter(0.3, 1.0)
-    apart = on_springs(((0.3, 2.0, 0.0), (nudged, 3.0, 0.0), (0.9, 7.0, 0.0), (0.9, 0.0, 2.0)), 6)
-    np.testing.assert_allclose(apart.omega, together.omega, rtol=1e-13)
-
-
 def test_jumps_are_taken_from_the_right_and_at_the_end_from_the_left() -> None:
     body = on_springs(((0.4, 80.0, 5.0), (1.0, 60.0, 0.0)), 5)
     before, at, after = (body.shape([0.4 + step], 2)[0] for step in (-1e-9, 0.0, 1e-9))

@@ -132,12 +132,6 @@ def test_points_at_the_track_are_places_of_it() -> None:
     )
 
 
-def test_rigid_modes_can_be_dropped() -> None:
-    kept, dropped = body(portal(supports={})), body(portal(supports={}, rigid_body_modes="drop"))
-    assert kept.rigid_modes == 6 and dropped.rigid_modes == 0
-    assert np.array_equal(dropped.omega, kept.omega[6:])
-
-
 def test_groups_of_equal_frequencies_are_whole() -> None:
     """A square tube: every bending mode comes twice, the one that moves the track first."""
     tube = straight(CLAMPED_FREE, elements=6, modes=3, section=TUBE)

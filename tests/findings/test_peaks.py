@@ -86,14 +86,6 @@ def test_a_kink_between_stations_is_found(at: float, left: float) -> None:
     assert errors[0] < 2e-5 and errors[1] < 2e-6
 
 
-@pytest.mark.parametrize("stations_per_period", [4.7, 6.3, 8.1, 25.3])
-def test_what_rings_has_no_kinks(stations_per_period: float) -> None:
-    """Parabolas through crests of ringing miss less than a tenth of what stations alone do where they are resolved."""
-    angle = 2.0 * np.pi * np.arange(2001) / stations_per_period
-    highest = float(np.nanmax(evenly_spaced(np.sin(angle)[:, None]).value))
-    assert highest == pytest.approx(1.0, abs=0.1 * (1.0 - np.cos(np.pi / stations_per_period)) + 1e-9)
-
-
 @pytest.mark.parametrize(("height", "count"), [(0.019, 1), (0.021, 2)])
 def test_a_bump_counts_from_two_percent_of_the_range_on(height: float, count: int) -> None:
     """A triangle from 0 to 1 with a bump on its falling side."""

@@ -221,59 +221,6 @@ def test_an_unwritable_cache_folder(tmp_path: Path, place: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-ROWS_SCRIPT = """
-import sys
-sys.path.insert(0, sys.argv[1])
-sys.path.insert(0, sys.argv[2])
-import numpy as np
-import some_rows
-given = np.random.default_rng(0).uniform(1.0, 2.0, (4, 3, 16))
-found = np.zeros((2, 16))
-some_rows.combine(given, 3.0, found)
-one, two, three = given[0, 1], given[1, 2], given[3, 0]
-expected = 2.0 * one - two * three / one + (three - 1.5) / 4.0 + (one * 0.5 + 1.0 / two) - 3.0
-assert np.abs(found[1] - expected).max() < 1e-14 and (found[0] == 0.0).all(), found
-given[0, 1, ::5] = np.nan  # with which no comparison is true
-some_rows.compare(given, found)
-np.testing.assert_array_equal(found[0], np.where((given[0, 1] <= two) & (two > 1.5), given[0, 1], 0.0))
-try:
-    some_rows.combine(given[:3].copy(), 3.0, found)
-except IndexError:
-    sys.exit(0)
-sys.exit("nothing was noticed")
-"""
-
-
-@pytest.mark.parametrize("plain", ["0", "1"])
-def test_rows_of_lanes(tmp_path: Path, plain: str) -> None:
-    """All that can be done with them, with the compiler and without, and an index out of range."""
-    source = """
-        from engine.kernels.jit import kernel
-        from engine.kernels.vector import all_lanes, choose, lanes_at, put_lanes
-
-        @kernel
-        def combine(given, number, found):
-            one, two, three = lanes_at(given, (0, 1)), lanes_at(given, (1, 2)), lanes_at(given, (3, 0))
-            row = 2.0 * one - two * three / one + (three - 1.5) / 4.0 + (one * 0.5 + 1.0 / two)
-            put_lanes(found, (1,), row - all_lanes(number))
-
-        @kernel
-        def compare(given, found):
-            one, two = lanes_at(given, (0, 1)), lanes_at(given, (1, 2))
-            put_lanes(found, (0,), choose((one <= two) & (two > 1.5), one, 0.0))
-        """
-    (tmp_path / "some_rows.py").write_text(textwrap.dedent(source))
-    done = subprocess.run(
-        [sys.executable, "-c", ROWS_SCRIPT, str(ROOT), str(tmp_path)],
-        env=os.environ | {"WANDERLAST_CACHE": str(tmp_path), "NUMBA_BOUNDSCHECK": "1", "NUMBA_DISABLE_JIT": plain},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-
-
 @pytest.mark.parametrize("name", ["one", "quiet", "turning"])
 def test_one_tie_is_many_with_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = numbers_of(small(name))

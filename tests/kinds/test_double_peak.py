@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.batch.execution import run
 from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared
 from studies.findings.indices import harmonics
 from studies.findings.peaks import peaks
-from studies.kinds.double_peak import KIND, SAME_PEAK, DoublePeakReduction
+from studies.kinds.double_peak import SAME_PEAK, DoublePeakReduction
 from tests.engine.build import beam, mass, study, swing
 
 Array = NDArray[np.float64]
@@ -87,19 +86,6 @@ def test_a_peak_that_is_missing_is_told_by_harmonics() -> None:
     compared = Compared(one, other, np.ones((1, 1)), np.zeros((1, 1)), VariantValues(scene, {}, 1))
     found = DoublePeakReduction().differences(compared)
     assert found["harmonic"][0, 0] == pytest.approx(2.0 * 0.1 * 0.05 * np.sqrt(np.pi), rel=0.05)
-
-
-def test_every_step_of_a_cycle_that_rings_is_seen() -> None:
-    """A slow light mass on a beam that rings without damping: 200 periods in the cycle, of which 400 stations would
-    tell nothing. The highest peak is the largest value of all steps, the march's own."""
-    pace = mass(0.01, swing(0.5, 0.4, np.pi / 400.0, 1))
-    given = study(beam(modes=1, damping_ratio=0.0), pace, kind="double-peak", initial="rest", solver={"steps": 6400})
-    found = run(given, reduction=KIND.reduction(given))
-    static, highest = float(found.midspan_static), float(np.nanmax(found.peak_value.values))
-    assert highest >= float(found.midspan_max) - 1e-12 * static
-    assert highest == pytest.approx(
-        float(found.midspan_max), abs=6e-3 * static
-    )  # 32 stations per period: 1 - cos(pi/32)
 
 
 def test_peaks_are_told_no_less_than_half_of_what_histories_differ_by() -> None:

@@ -147,6 +147,22 @@ def test_flutter_of_the_frozen_station_is_told_from_divergence(supports: str) ->
         assert (swinging**frozen.STEPS > 1.01) == (supports != "pinned-pinned")
 
 
+def test_a_girder_that_flutters_at_any_speed_diverges_where_theory_says() -> None:
+    asked = study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-pinned", "damping_ratio": 0.01})
+    dataset = studies.run(asked)
+    assert np.allclose(dataset["frozen_divergence"], dataset["frozen_divergence_theory"], rtol=3e-4)
+    (said,) = frozen.sentences(dataset)
+    assert "flutter" in said and "from 0.3 on, the slowest tried, in 100 %" in said
+    most = dataset.isel(held_mode_count=-1)
+    grown = most["passage_growth"].values[most["frozen_growth"].values > 1.01]
+    assert f"of {grown.size} real passages where it grows, {(grown <= 1.01).sum()} do not grow at all" in said
+    free = studies.run(study({"maps": ["frozen"], "fineness": 0.1}, {"supports": "clamped-free"}))
+    assert free["frozen_divergence"].isnull().all()
+    (said,) = frozen.sentences(free)
+    assert "no speed at which it begins to diverge" in said and "flutter" in said
+    assert "flutter" not in frozen.sentences(studies.run(study({"maps": ["frozen"], "fineness": 0.1})))[0]
+
+
 @pytest.mark.parametrize(("mass", "wanted"), [(0.1, 1.275), (0.25, 0.47), (0.5, 0.325), (1.0, 0.245), (2.0, 0.175)])
 def test_onset_of_separation(mass: float, wanted: float) -> None:
     scene, speed = GROUND.passage(20), np.arange(0.055, wanted + 0.05, 0.01)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from studies.maps import alias, rigid, separation, shuttle
+from studies.maps import alias, frozen, rigid, separation, shuttle
 
 
 def alias_said(*growth: tuple[float, float, float]) -> str:
@@ -86,3 +86,11 @@ def test_the_swinging_mass_names_a_main_band_and_the_share_of_the_map() -> None:
     assert "near the formula for one mode nothing grows; of the whole map" in same
     assert "50 % is unstable without damping and about as much with 2 %" in same and "shrinks" not in same
     assert "nothing grows; of the whole map" in shuttle_said([1.0, 1.0], [1.0, 1.0], math.nan)
+
+
+def test_what_passages_do_beside_the_frozen_station_follows_from_them() -> None:
+    assert "of 3 real passages where it grows, 2 do not grow at all" in frozen._passages(np.array([1.0, 1.0, 3.0]))
+    all_grow = frozen._passages(np.array([1.5, 4.8]))
+    assert "property of the frozen station" not in all_grow and "all do, 1.5 to 4.8 times" in all_grow
+    assert "1.5 to beyond all numbers" in frozen._passages(np.array([1.5, np.inf]))
+    assert frozen._passages(np.zeros(0)) == ""

@@ -143,3 +143,20 @@ def test_the_best_found_stands_where_it_belongs() -> None:
         "1e-3 cannot be judged, as the reference itself is good to 0.0012 only (the best found: 0.0013, P); "
         "1e-6 is not reached"
     )
+
+
+def test_the_automatic_choice_is_not_compared_with_what_is_not_there() -> None:
+    dataset = precision.small().copy(deep=True)
+    assert with_automatic(dataset, 0.01, (1.0, 1.0), (0.5, 0.5)) == (
+        "The automatic choice at 0.01 cannot be compared with the front, where no point surely errs so little. "
+        "Its histories err 0.5 times what was asked."
+    )
+    light = dataset.total_error.sel(scene="light")
+    dataset.total_error.loc[{"scene": "light"}] = light.where(light.isnull(), 1e-3)
+    said = with_automatic(dataset, 0.01, (1.2, 1.0), (0.5, 0.5))
+    assert "1.2 times the front at the error asked (light), in 1 of 2 scenes; in the others no point" in said
+    dataset.automatic_steps.loc[{"scene": "heavy and slow"}] = 0
+    assert "(light), in the one scene." in with_automatic(dataset, 0.01, (1.2, 1.0), (0.5, 0.5))
+    without = dataset.drop_vars([name for name in dataset if str(name).startswith("automatic_")])
+    assert advice.automatic(without) == []
+    assert not any("automatic" in text for text in advice.findings(without, [1e-3]))

@@ -28,19 +28,6 @@ def shuttling(turn: float, cycles: int) -> OutAndBack:
 PASSAGE = Cruise(kind="cruise", start=-0.5, end=1.5, speed=1.0)
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.1])
-def test_a_carriage_that_stands_does_not_move(turn: float) -> None:
-    """Whatever rounding does to its delay and pace: before it sets off and after it has stopped."""
-    rng = np.random.default_rng(3)
-    for _ in range(500):
-        rider = Rider(shuttling(turn, 1), 1.0, float(rng.uniform(0.1, 5.0)), float(rng.uniform(0.01, 3.0)))
-        for start, end in ((0.0, rider.delay), (rider.end, rider.end + 1.0)):
-            path = rider.path(np.linspace(start, end, 5), start, end)
-            np.testing.assert_allclose(path.S, 0.5, rtol=1e-14)
-            assert not path.dS.any()
-            assert not path.ddS.any()
-
-
 def test_sides_of_a_reversal() -> None:
     """On each side of an instant turn the speed is that side's, whatever rounding does to delay and pace."""
     rng = np.random.default_rng(4)

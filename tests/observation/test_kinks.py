@@ -60,16 +60,3 @@ def test_the_steps_of_a_cycle_do_not_jump_over_a_kink(steps: int) -> None:
     assert float(found.numbers["moment_max_position"][0]) == pytest.approx(AT, abs=1e-9)
     ends = sorted(float(abs(found.numbers[f"shear_{end}"][0])) for end in ("max", "min"))
     assert ends == pytest.approx([AT, 1.0 - AT], rel=2e-3)
-
-
-def test_weights_beside_a_kink_are_those_of_parabolas() -> None:
-    given = study(beam(), force(1.0, shuttle(0.1, 0.9, 1.0, 0.2, 2)), sensor=MOMENT)
-    tables = SceneTables(make_plan(given).base, 64, "last-cycle")
-    first, last = tables.timeline.window
-    assert len(tables.kinks) == 4
-    for side in tables.kinks:
-        tau, times = (tables.timeline.moments(np.atleast_1d(at))[1] for at in (side.at, side.counts))
-        assert side.weights @ (3.0 - times + 7.0 * times**2) == pytest.approx(
-            3.0 - tau[0] + 7.0 * tau[0] ** 2, rel=1e-9
-        )
-        assert first <= side.counts[0] and side.counts[-1] <= last and np.abs(side.counts - side.at).min() < 1.0

@@ -10,9 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_hex
 
-from results_schema.status import Fidelity
 from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from results_schema.variables import axes as coordinates
 from results_schema.variables import declarations
@@ -80,20 +78,6 @@ def drawn(dataset: xr.Dataset) -> dict[str, Figure]:
     return {figure.name: figure for figure in (*choice.pictures(results), *estimates.pictures(results))}
 
 
-def cells(axes: Any) -> dict[str, list[tuple[float, float]]]:
-    """Middles of a map's coloured cells by their colour."""
-    found: dict[str, list[tuple[float, float]]] = {}
-    for mesh in (collection for collection in axes.collections if hasattr(collection, "get_coordinates")):
-        corners = mesh.get_coordinates()
-        middles = 0.25 * (corners[1:, 1:] + corners[:-1, 1:] + corners[1:, :-1] + corners[:-1, :-1])
-        values = np.ma.masked_invalid(mesh.get_array())
-        colours = mesh.to_rgba(values).reshape(*values.shape, 4)
-        for place in np.argwhere(~np.ma.getmaskarray(values)):
-            x, y = middles[tuple(place)]
-            found.setdefault(to_hex(colours[tuple(place)]), []).append((round(float(x), 6), round(float(y), 6)))
-    return {colour: sorted(places) for colour, places in found.items()}
-
-
 def legend_of(axes: Any) -> dict[str, Any]:
     handles, labels = axes.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))
@@ -134,49 +118,11 @@ def test_any_sweep_can_be_drawn(kind: str, shape: str) -> None:
         assert "nan" not in ElementTree.tostring(ElementTree.fromstring(text), "unicode")
 
 
-def test_models_are_cells_in_their_colours(plane: xr.Dataset) -> None:
-    figure = drawn(put(plane, **KNOWN))["choice"]
-    model, modes, steps, *_ = figure.drawing.axes
-    grey = to_hex(choice.NOTHING)
-    static = [(4.0, 10.0), (6.0, 10.0)]
-    assert cells(model) == {
-        grey: static,
-        to_hex(choice.COLOURS[Fidelity.FORCE]): [(6.0, 20.0)],
-        to_hex(choice.COLOURS[Fidelity.MASS]): [(2.0, 10.0), (2.0, 20.0), (4.0, 20.0)],
-    }
-    marched = [[(2.0, 10.0), (2.0, 20.0)], [(4.0, 20.0)], [(6.0, 20.0)]]
-    for axes in (modes, steps):
-        found = cells(axes)
-        assert found.pop(grey) == static and sorted(found.values()) == marched
-    (legend,) = figure.drawing.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["statics", "moving force", "moving mass"]
-    bars = {axes.get_xlabel(): [t.get_text() for t in axes.get_xticklabels()] for axes in figure.drawing.axes[3:]}
-    assert bars == {"modes": ["4", "8", "10"], "steps": ["400", "800", "1,600"]}
-
-
 def test_what_is_the_same_everywhere_is_told_and_not_drawn(plane: xr.Dataset) -> None:
     figure = drawn(put(plane, modes_used=np.full((3, 2), 12), steps_used=STEPS))["choice"]
     assert figure.caption == "Steps of every variant shown. All: moving mass and 12 modes."
     alike = put(plane, modes_used=np.full((3, 2), 12), steps_used=np.full((3, 2), 400), work=np.full((3, 2), 4800))
     assert drawn(alike) == {}
-
-
-def test_one_axis_is_drawn_as_steps_in_order() -> None:
-    dataset = put(
-        scenes.run("passage", SPEEDS),
-        fidelity_used=[3, 0, 1],
-        modes_used=[8, 0, 4],
-        steps_used=[800, 0, 800],
-        work=[6400, 0, 3200],
-    )
-    found = drawn(dataset)
-    model, modes, steps = found["choice"].drawing.axes
-    assert [label.get_text() for label in model.get_yticklabels()] == ["statics", "moving force", "moving mass"]
-    for axes, expected in ((model, [0, 1, 2]), (modes, [0, 4, 8]), (steps, [0, 800, 800])):
-        (line,) = axes.get_lines()
-        np.testing.assert_array_equal(line.get_xdata(), [2, 4, 6])
-        np.testing.assert_array_equal(line.get_ydata(), expected)
-    assert found["choice"].title == "Half of the variants took 3,200 modes × steps or fewer, none more than 6,400"
 
 
 def rows_of(figure: Figure) -> dict[str, tuple[str, list[float], float]]:

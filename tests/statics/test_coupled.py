@@ -122,15 +122,6 @@ def test_residual_flexibility_stands_for_the_modes_left_out() -> None:
     assert np.abs(few / whole - 1.0).max() < 5e-5 < 1e-3 < np.abs(plain / whole - 1.0).max()
 
 
-def test_variants_are_what_they_are_alone() -> None:
-    masses, wheels = [0.2, 0.5, 1.5], [0.0, 0.1, 0.0]
-    case = study(beam(modes=5), oscillator(0.5, 40.0, WAY, wheel_mass=0.1))
-    found = frequencies(case, [0.3, 0.8], 5, carriage__car__mass=masses, carriage__car__wheel_mass=wheels)
-    for variant, (own, wheel) in enumerate(zip(masses, wheels, strict=True)):
-        alone = case.with_values({"carriage.car.mass": own, "carriage.car.wheel_mass": wheel})
-        assert found[variant] == pytest.approx(frequencies(alone, [0.3, 0.8], 5)[0], rel=1e-8)
-
-
 def test_other_carriages_stand_where_they_start_and_forces_have_no_inertia() -> None:
     second = study(beam(modes=8), {"car": mass(0.3, WAY), "other": mass(0.6, swing(0.4, 0.1, 1.0, 1))})
     plain = frequencies(second, [0.2], 2)[0, 0]
