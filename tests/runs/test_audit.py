@@ -25,11 +25,11 @@ from studies.runs.audit import (
     Verdict,
     as_json,
     audit_group,
-    refuse_audit,
     relative_errors,
     told_audit,
 )
 from tests.engine.build import beam
+from tests.studies import at_rest
 from tests.studies.audits import FINE, POOR, RICH, by_hand, crossing, group_of, outcome
 from tests.studies.small import SMALL, write
 
@@ -177,10 +177,8 @@ def test_it_is_said_that_no_audit_was_worth_its_time() -> None:
 
 
 def test_what_marches_nothing_refuses_it() -> None:
-    given = crossing(RICH, {"audit": 3}).without_sweep().with_values({"kind": "influence"})
     with pytest.raises(BadInput, match=r"solver\.audit"):
-        refuse_audit(given)
-    refuse_audit(given.with_values({"solver.audit": "auto"}))
+        studies.run(at_rest.study("influence").with_values({"solver.audit": 3}))
 
 
 def test_one_held_result_without_a_number_is_not_held(tmp_path: Path) -> None:
