@@ -17,9 +17,7 @@ from engine.march.tables import Missed, SceneTables, SegmentTable
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.timeline import Segment, coarsened
-from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
-from engine.observation.signals import Signal
 from engine.scene.sensors import MOST_PLACES
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -75,9 +73,9 @@ class EnvelopeTables(SceneTables):
     places: tuple[Place, ...] = ()
 
     @cached_property
-    def signals(self) -> tuple[Signal, ...]:
-        """The places, then all contact forces."""
-        return (*self.places, *contact_forces(self.model))
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The places."""
+        return self.places
 
     @cached_property
     def static_scales(self) -> Array:

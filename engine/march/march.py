@@ -118,7 +118,7 @@ class March:
 
     def _board(self, segment: Segment) -> None:
         """Sprung masses that arrive were at rest on level ground, whatever they did where they did not matter."""
-        arriving = {blow.rider for blow in segment.strikes if blow.kind == "arrival"}
+        arriving = {blow.rider for blow in segment.strikes if blow.arrives}
         for spring in self.tables.model.sprung:
             if spring.carriage in arriving:
                 self.state.q[:, spring.mode], self.state.v[:, spring.mode] = 0.0, 0.0

@@ -23,8 +23,6 @@ from engine.march.march import Marched
 from engine.march.tables import SceneTables
 from engine.model.station_path import StationPath
 from engine.model.variant_values import VariantValues, weights
-from engine.observation.contact_forces import ContactForce, ContactSensor
-from engine.observation.readings import Sensor
 from engine.observation.signals import Signal
 from engine.statics.static_response import static_readings
 from results_schema.status import Status
@@ -68,14 +66,8 @@ def quasistatic_extremes(
 def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
     """(S, J, C + 1) readings of all signals per unit weight of each carriage, and last per unit gravity."""
     model = tables.model
-    readers = [signal if isinstance(signal, Sensor) else _reader(tables, signal) for signal in tables.signals]
+    readers = [signal.as_sensor(model) for signal in tables.signals]
     return static_readings(model, readers, tables.ways_at(counts))
-
-
-def _reader(tables: SceneTables, contact: ContactForce) -> Sensor:
-    """A contact force as a sensor."""
-    body, carriage = tables.model.carriages[contact.carriage].body, contact.carriage
-    return ContactSensor("", "contact_force", body, 0.0, carriage, carriage, contact.contact)
 
 
 def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[StationPath, ...]) -> Flags:

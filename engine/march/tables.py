@@ -20,9 +20,9 @@ from engine.model.ties import Attachment
 from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import tabulate_ties
 from engine.observation import kinks
-from engine.observation.contact_forces import ContactForce
+from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
-from engine.observation.signals import Signal, build_signals, last_signals, tabulate_missed, tabulate_watch
+from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
 from engine.statics.static_response import static_readings
 
 Array = NDArray[np.float64]
@@ -96,8 +96,7 @@ class SceneTables:
     def signals(self) -> tuple[Signal, ...]:
         """Sensors, then contact forces unless only sensors are read; between them every carriage's acceleration across,
         where that is read."""
-        signals = build_signals(self.model, self.model.carriages if self.readings == "accelerations" else ())
-        return tuple(s for s in signals if self.readings != "sensors" or isinstance(s, Sensor))
+        return self.sensors if self.readings == "sensors" else (*self.sensors, *contact_forces(self.model))
 
     @cached_property
     def coarser(self) -> SceneTables:
@@ -108,10 +107,10 @@ class SceneTables:
         found.timeline = coarsened(self.timeline, 2)
         return found
 
-    @property
+    @cached_property
     def sensors(self) -> tuple[Sensor, ...]:
-        """The study's sensors."""
-        return tuple(signal for signal in self.signals if isinstance(signal, Sensor))
+        """The sensors among the signals, the study's first."""
+        return build_sensors(self.model, self.model.carriages if self.readings == "accelerations" else ())
 
     @cached_property
     def kinks(self) -> tuple[kinks.Side, ...]:
@@ -157,7 +156,7 @@ class SceneTables:
         else:
             found = missed[0], missed[1]
         watch = tabulate_watch(self.model, self.signals, along, found[1])
-        contacts = sum(isinstance(signal, ContactForce) for signal in self.signals)
+        contacts = len(self.signals) - len(self.sensors)
         unrecorded = last_signals(watch, contacts) if contacts else watch
         return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, unrecorded)
 

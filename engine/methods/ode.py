@@ -22,7 +22,6 @@ from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Segment, build_timeline
 from engine.model.variant_values import VariantValues, lane_table, moving_mass, weight
-from engine.observation.contact_forces import ContactForce
 from results_schema.errors import BadInput, Interrupted
 
 Array = NDArray[np.float64]
@@ -165,12 +164,11 @@ class ModalEquations:
         force = self.forces(tables, counts, states)
         found = np.zeros((counts.size, len(tables.signals)))
         for number, signal in enumerate(tables.signals):
-            if isinstance(signal, ContactForce):
-                found[:, number] = np.where(signal.counted(self.model, along), force, np.nan)
-            else:
-                for channel in signal.channels(self.model, along):
-                    found[:, number] += np.sum(channel.rows * states[:modes].T, axis=1)
-                found[:, number] += signal.missed(self.model, along)[:, 0] * force
+            for channel in signal.channels(self.model, along):
+                found[:, number] += np.sum(channel.rows * states[:modes].T, axis=1)
+            found[:, number] += signal.missed(self.model, along)[:, 0] * force
+            if not signal.is_summed:
+                found[~signal.counted(self.model, along), number] = np.nan
         return found
 
     def forces(self, tables: SceneTables, counts: Counts, states: Array) -> Array:

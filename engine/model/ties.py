@@ -93,6 +93,11 @@ class SpringTie:
     rigid: bool = False
 
     @property
+    def damping_key(self) -> str:
+        """The dotted key of the damper's N s/m."""
+        return f"{self.key}.damping"
+
+    @property
     def attachments(self) -> tuple[Attachment, ...]:
         """Where its force acts, what it stands on first."""
         below = Attachment(1.0, self.body, self.rider)
@@ -106,6 +111,11 @@ class DamperTie:
     body: int
     at: float | str
     key: str
+
+    @property
+    def damping_key(self) -> str:
+        """The dotted key of c."""
+        return self.key
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

@@ -147,7 +147,7 @@ class Impact(NamedTuple):
     """A carriage that arrives at the beginning of a segment with a speed, or whose speed jumps there (m per tau)."""
 
     rider: int
-    kind: Literal["arrival", "reversal"]
+    arrives: bool
     speed: float
 
 
@@ -418,10 +418,10 @@ def _strikes(
             continue
         if not before[number]:
             if start > 0.0:
-                yield Impact(number, "arrival", float(rider.path(np.array([start]), start, stop).dS[0]))
+                yield Impact(number, True, float(rider.path(np.array([start]), start, stop).dS[0]))
             continue
         times, jumps = rider.speed_jumps
         place = int(np.searchsorted(times, start))
         for near in range(max(0, place - 1), min(place + 1, times.size)):
             if abs(times[near] - start) <= _SAME * rider.end:
-                yield Impact(number, "reversal", float(jumps[near]))
+                yield Impact(number, False, float(jumps[near]))

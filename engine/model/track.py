@@ -155,7 +155,7 @@ def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: 
         if strike.rider >= len(model.carriages):  # a contact on a spring meets no shock
             continue
         inertia = model.carriages[strike.rider].inertia
-        arrives[strike.rider] = float(strike.kind == "arrival" and inertia != "force")
+        arrives[strike.rider] = float(strike.arrives and inertia != "force")
         if inertia == "mass":
             speed[:, strike.rider] = strike.speed / time_scale
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)

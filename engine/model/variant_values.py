@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.beam.beam import Rayleigh
 from engine.kernels.layout import LANES, Lanes
 from engine.model.scene_model import SceneModel
 from engine.model.ties import DamperTie, SpringTie
@@ -84,7 +83,7 @@ class VariantValues:
 
     def damping(self, tie: SpringTie | DamperTie) -> Array:
         """(V,) N s/m of a damper, or of that beside a spring."""
-        return self._of(tie.key if isinstance(tie, DamperTie) else f"{tie.key}.damping")
+        return self._of(tie.damping_key)
 
     @property
     def padded(self) -> VariantValues:
@@ -133,11 +132,11 @@ class VariantValues:
     def damping_rates(self, body: str, omega: Array) -> Array:
         """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
         key = f"body.{body}.damping_ratio"
-        spec = self.study.body[body].damping_ratio
-        if isinstance(spec, Rayleigh):
+        spec = self.study.body[body]
+        if spec.rayleigh is not None:
             return self._of(f"{key}.rayleigh.0") + self._of(f"{key}.rayleigh.1") * omega[:, None] ** 2
-        if isinstance(spec, tuple):
-            last = len(spec) - 1  # goes on for modes beyond the list
+        if spec.modal_ratios:
+            last = len(spec.modal_ratios) - 1  # goes on for modes beyond the list
             return np.stack([2.0 * self._of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
         return 2.0 * self._of(key) * omega[:, None]
 

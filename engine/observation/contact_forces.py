@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,15 @@ class ContactForce:
     """The force (N) between a carriage (its number) and its body, or at one contact of a body that rides (the number of
     its rider)."""
 
+    is_summed: ClassVar[bool] = False
+
     carriage: int
     contact: int | None = None
+
+    def as_sensor(self, model: SceneModel) -> Sensor:
+        """The same as a sensor."""
+        body = model.carriages[self.carriage].body
+        return ContactSensor("", "contact_force", body, 0.0, self.carriage, self.carriage, self.contact)
 
     def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
         return []

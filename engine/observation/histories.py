@@ -24,7 +24,7 @@ def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "no
     first, last = timeline.window
     if wanted == "none":
         return np.zeros(0, dtype=np.int64)
-    if isinstance(wanted, Every):
+    if not isinstance(wanted, str):
         return np.arange(first, last + 1, wanted.every)
     if wanted == "all":
         return np.arange(first, last + 1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,12 @@ class Sensor:
     body: int
     at: float
     under: int | None
+
+    is_summed: ClassVar[bool] = True  # its squares
+
+    def as_sensor(self, model: SceneModel) -> Sensor:
+        """Itself."""
+        return self
 
     @property
     def reads(self) -> Quantity:

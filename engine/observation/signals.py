@@ -9,7 +9,7 @@ from engine.kernels.layout import Observation
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.ties import CarriageTie
-from engine.observation.contact_forces import ContactForce, ContactSensor, contact_forces
+from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.readings import Sensor, SpotSensor, SprungSensor
 
 Array = NDArray[np.float64]
@@ -17,17 +17,17 @@ Array = NDArray[np.float64]
 Signal = Sensor | ContactForce
 
 
-def build_signals(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Signal, ...]:
-    """The sensors in the study's order, the acceleration across of some carriages, then all contact forces."""
+def build_sensors(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Sensor, ...]:
+    """The sensors in the study's order, then the acceleration across of some carriages."""
     names = [carriage.name for carriage in model.carriages]
-    sensors: list[Signal] = [_sensor(model, name, names) for name in model.study.sensor]
+    sensors = [_sensor(model, name, names) for name in model.study.sensor]
     for carriage in accelerated:
         name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
         if carriage.rides is None:
             sensors.append(Sensor(name, "acceleration", carriage.body, 0.0, under))
         else:
             sensors.append(Sensor(name, "acceleration", carriage.rides, carriage.reference, None))
-    return (*sensors, *contact_forces(model))
+    return tuple(sensors)
 
 
 def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
@@ -76,7 +76,7 @@ def tabulate_watch(
         offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
         counted=counted,
-        summed=np.array([isinstance(s, Sensor) for s in signals], dtype=np.bool_) & counted.all(axis=0),
+        summed=np.array([s.is_summed for s in signals], dtype=np.bool_) & counted.all(axis=0),
     )
 
 

@@ -13,7 +13,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import ContactForce, contact_forces, contact_row
 from engine.observation.readings import Sensor
-from engine.observation.signals import build_signals
+from engine.observation.signals import build_sensors
 from engine.statics.equilibrium import static_state
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
 
 def static_values(model: SceneModel, values: VariantValues, along: Along) -> StaticReadings:
     """Static readings of the study's sensors and of all contacts, for some variants of a scene."""
-    sensors = [signal for signal in build_signals(model) if isinstance(signal, Sensor)]
+    sensors = build_sensors(model)
     unit, loads = static_readings(model, sensors, along), _loads(model, values)
     force = static_state(model, along).force
     parts = np.array([contact_row(model, c.carriage, c.contact) for c in contact_forces(model)])

@@ -111,21 +111,25 @@ class FullBody:
 
 def full_body(study: Study, name: str) -> FullBody:
     """The whole model of a body of a study. Raises BadInput for one that has none."""
-    body = study.body[name]
-    if isinstance(body, Rigid):
-        return _full_rigid(study, name, body)
-    if isinstance(body, Beam):
-        frame = frame_of_beam(study, name, body)
-        return _full_frame(study, name, frame, _only_bending(assemble(frame)))
-    if isinstance(body, Frame):
-        _check(study, name, body)
-        return _full_frame(study, name, body, assemble(body))
+    whole = study.body[name].whole
+    if whole is not None:
+        return _FULL[whole.kind](study, name, whole)
     raise BadInput(
         "this body has no whole finite-element model to compare with",
         where=study.source.where(f"body.{name}.kind"),
         expected='"frame", "beam" or "rigid"',
         received=f'"{study.value(f"body.{name}.kind")}"',
     )
+
+
+def _whole_beam(study: Study, name: str, beam: Beam) -> FullBody:
+    frame = frame_of_beam(study, name, beam)
+    return _full_frame(study, name, frame, _only_bending(assemble(frame)))
+
+
+def _whole_frame(study: Study, name: str, frame: Frame) -> FullBody:
+    _check(study, name, frame)
+    return _full_frame(study, name, frame, assemble(frame))
 
 
 def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEMENTS) -> Frame:
@@ -246,8 +250,8 @@ def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibil
     rates = np.array([rate for _, rate in points])
     wide = csc_array(rows)
     viscous = (wide.T * rates[None, :]) @ wide if points else csc_array(assembly.stiffness.shape)
-    if hasattr(body.damping_ratio, "rayleigh"):
-        by_mass, by_stiffness = body.damping_ratio.rayleigh
+    if body.rayleigh is not None:
+        by_mass, by_stiffness = body.rayleigh.rayleigh
         viscous = viscous + by_mass * assembly.mass + by_stiffness * assembly.stiffness
         return Damping(csc_array(viscous), np.zeros((len(assembly.free), 0)), np.zeros(0))
     omega, shapes = _kept(body, frame, assembly, flexibility)
@@ -258,7 +262,7 @@ def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibil
 
 def _kept(body: Body, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:
     """omega (k,) and shapes (n, k) of the modes that the reduced body has."""
-    if isinstance(body, Frame):
+    if body is frame:
         omega, shapes = frame_modes(frame, assembly, flexibility)
         kept = kept_modes(frame, omega)
         return omega[kept], shapes[:, kept]
@@ -285,3 +289,11 @@ def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:
         track=RigidTrack(body.centre_of_mass),
         points={},
     )
+
+
+#: How the whole model of each kind of body is made.
+_FULL: Mapping[str, Callable[[Study, str, Any], FullBody]] = {
+    "beam": _whole_beam,
+    "frame": _whole_frame,
+    "rigid": _full_rigid,
+}

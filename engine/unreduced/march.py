@@ -295,7 +295,7 @@ class _March:
                     continue
                 speed = strike.speed / self.course.time_scale
                 jump[j] = speed * float(slope[j] @ self.u[index[j]])
-                if strike.kind == "arrival":
+                if strike.arrives:
                     jump[j] += float(shape[j] @ self.v[index[j]]) + float(tie.other @ self.v)
                     if tie.carriage in model.sprung:
                         place = model.sprung[tie.carriage]

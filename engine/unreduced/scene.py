@@ -161,6 +161,7 @@ def unreduced_model(
         used |= set(carriage.bodies)
     bodies = {name: full_body(study, name) for name in study.body if name in used}
     _check_weights(study, bodies)
+    _check_quantities(study)
     firsts, first = {}, 0
     for name, body in bodies.items():
         firsts[name], first = first, first + body.size
@@ -187,6 +188,18 @@ def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
                 where=study.source.where(f"carriage.{name}.on"),
                 expected="a track whose loads act along gravity",
                 received=f"{share:.3g} of gravity along it",
+            )
+
+
+def _check_quantities(study: Study) -> None:
+    """What sensors read is a motion, its rates, or what sections carry."""
+    for name, sensor in study.sensor.items():
+        if sensor.reads.derivative and not sensor.reads.of_section:
+            raise BadInput(
+                "the unreduced model does not have this quantity",
+                where=study.source.where(f"sensor.{name}.quantity"),
+                expected="displacement, velocity, acceleration, a section force, stress, strain or contact_force",
+                received=f'"{sensor.quantity}"',
             )
 
 

@@ -47,16 +47,14 @@ def first_omega(results: Results) -> xr.DataArray | float:
 
 def damping_ratio(results: Results) -> Any:
     """Damping ratio of that mode: one for all modes, the first of a list, or Rayleigh's a/(2 omega) + b omega/2."""
-    from engine.bodies.beam.beam import Rayleigh
-
     key = f"body.{results.carriage.on}.damping_ratio"
-    spec = results.study.value(key)
-    if isinstance(spec, Rayleigh) and not _is_swept(results, key):
+    body = results.study.body[results.carriage.on]
+    if body.rayleigh is not None and not _is_swept(results, key):
         omega = first_omega(results)
         mass, stiffness = (results.parameter(f"{key}.rayleigh.{i}") for i in (0, 1))
         return 0.5 * (mass / omega + stiffness * omega)
-    if isinstance(spec, tuple) and not _is_swept(results, key):
-        return results.parameter(f"{key}.{min(_rigid_modes(results), len(spec) - 1)}")
+    if body.modal_ratios and not _is_swept(results, key):
+        return results.parameter(f"{key}.{min(_rigid_modes(results), len(body.modal_ratios) - 1)}")
     return results.parameter(key)
 
 

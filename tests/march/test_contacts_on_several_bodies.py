@@ -14,8 +14,7 @@ from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
 from engine.observation import kinks
 from engine.observation.contact_forces import ContactForce
-from engine.observation.readings import Sensor
-from engine.observation.signals import build_signals
+from engine.observation.signals import build_sensors
 from engine.scene.study import Study, load
 from engine.statics.coupled_modes import coupled_frequencies
 from engine.statics.static_response import static_values
@@ -92,7 +91,7 @@ def test_a_contact_counts_on_its_own_body() -> None:
     free = {"right": beam(modes=4, length=0.9, supports="free-clamped")}
     whole = gantry(more=free, sensor={"moment": {"body": "right", "at": 0.5, "quantity": "bending_moment"}})
     model = make_plan(whole).base
-    (moment,) = (signal for signal in build_signals(model) if isinstance(signal, Sensor))
+    (moment,) = build_sensors(model)
     passing = list(kinks.passes(model, moment))
     assert len(passing) == 4  # two wheels, there and back
     places = np.array([0.3, 0.74])

@@ -132,6 +132,24 @@ def test_a_study_of_them_all_is_run(packages: Path) -> None:
     assert "of the largest reading is static" in page
 
 
+def test_the_unreduced_model_knows_the_body_and_refuses_the_quantity(packages: Path) -> None:
+    (packages.parent / "all.toml").write_text(STUDY)
+    code = """
+import engine
+from engine.unreduced.scene import unreduced_model
+from results_schema.errors import BadInput
+study = engine.load("all.toml")
+try:
+    unreduced_model(study)
+except BadInput as error:
+    print(error)
+print(unreduced_model(study.with_values({"sensor.tilt.quantity": "shear_force"})).size)
+"""
+    refused, size = python(packages, "-c", code).stdout.splitlines()
+    assert "sensor.tilt.quantity" in refused and "slope" in refused
+    assert int(size) == 2 * (64 + 1) - 2
+
+
 def test_another_text_of_any_is_another_run(packages: Path) -> None:
     (packages.parent / "all.toml").write_text(STUDY)
     keys = """

@@ -110,6 +110,10 @@ class Beam(Body):
     def modes_are_open(self) -> bool:
         return self.modes == "auto"
 
+    @property
+    def whole(self) -> Beam:
+        return self
+
     def build(self) -> ModalBody:
         from engine.bodies.beam.modes import uniform_beam
 

@@ -281,6 +281,10 @@ class Frame(Body):
         )
         return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
 
+    @property
+    def whole(self) -> Frame:
+        return self
+
     def build(self) -> ModalBody:
         return self.read_at(())
 

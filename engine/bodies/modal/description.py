@@ -112,6 +112,21 @@ class Body(Spec):
         """The same with gauges at nodes and places of members, where it has such."""
         return self.build()
 
+    @property
+    def whole(self) -> Body | None:
+        """The beam, frame or rigid body whose finite elements are its unreduced model; None where there is none."""
+        return None
+
+    @property
+    def rayleigh(self) -> Rayleigh | None:
+        """Its damping where that is Rayleigh's."""
+        return self.damping_ratio if isinstance(self.damping_ratio, Rayleigh) else None
+
+    @property
+    def modal_ratios(self) -> tuple[float, ...]:
+        """Its damping ratios where they are given mode by mode: the last one goes on for the modes beyond."""
+        return self.damping_ratio if isinstance(self.damping_ratio, tuple) else ()
+
     @abstractmethod
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""

@@ -39,6 +39,10 @@ class Rigid(Body):
         """Itself: it has no modes that bend."""
         return self
 
+    @property
+    def whole(self) -> Rigid:
+        return self
+
     def build(self) -> ModalBody:
         from engine.bodies.rigid.body import rigid_body
 
