@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -31,6 +32,7 @@ ROOMS = (
 # What every room may know of those above it: the public names of a package, by which users know it.
 PUBLIC = {"engine", "studies", "results_schema"}
 MOST_FILES = 15  # of a folder
+LONGEST_CHAIN = 18  # of files that need each other, one after the other
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {
     "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",
 }  # fmt: skip
@@ -58,9 +60,11 @@ def modules() -> dict[str, ast.Module]:
     return found
 
 
-def imports(tree: ast.AST) -> Iterator[str]:
-    """Every module that is imported at run time, anywhere in a module."""
+def imports(tree: ast.AST, besides: tuple[type[ast.AST], ...] = ()) -> Iterator[str]:
+    """Every module that is imported at run time, anywhere in a module ``besides`` in some sorts of statements."""
     for node in ast.iter_child_nodes(tree):
+        if isinstance(node, besides):
+            continue
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
         if isinstance(node, ast.Import):
@@ -69,7 +73,7 @@ def imports(tree: ast.AST) -> Iterator[str]:
             assert node.level == 0 and node.module, "relative imports hide the direction"
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        yield from imports(node)
+        yield from imports(node, besides)
 
 
 MODULES = modules()
@@ -96,6 +100,17 @@ def test_no_module_needs_itself(package: str) -> None:
     graph = {name: own[name] for name in MODULES if name.partition(".")[0] == package and name != package}
     order = list(TopologicalSorter(graph).static_order())  # raises CycleError
     assert set(graph) <= set(order)
+
+
+def test_chains_of_imports_are_short() -> None:
+    """What is imported inside functions or for annotations alone is not needed to load a file."""
+
+    @cache
+    def floors(name: str) -> int:
+        needed = set(imports(MODULES[name], (ast.FunctionDef, ast.AsyncFunctionDef))) & set(MODULES) - {name}
+        return 1 + max(map(floors, needed), default=0)
+
+    assert max(map(floors, MODULES)) <= LONGEST_CHAIN
 
 
 def room(name: str) -> str:

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.schemes import SCHEMES
 from engine.march.envelopes import with_companions
-from engine.march.outcome import Asked
 from engine.march.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
-from engine.march.tables import SceneTables, StaticUnit
-from engine.model.numerics import Numerics, open_bodies
-from engine.model.scene_model import SceneModel, with_numerics
-from engine.model.timeline import Grid, build_grid, refined
-from engine.model.variant_values import VariantValues
+from engine.march.tables import SceneTables
+from engine.model.numerics import open_bodies
+from engine.model.scene_model import with_numerics
+from engine.model.timeline import build_grid, refined
 from engine.observation.kinks import stops
 from engine.scene.sensors import MOST_PLACES
+
+if TYPE_CHECKING:
+    from engine.march.outcome import Asked
+    from engine.march.tables import StaticUnit
+    from engine.model.numerics import Numerics
+    from engine.model.scene_model import SceneModel
+    from engine.model.timeline import Grid
+    from engine.model.variant_values import VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

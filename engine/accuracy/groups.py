@@ -8,25 +8,30 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import lcm
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.choice import Choice
-from engine.accuracy.grids import MOST_COMPARED, SceneGrid
+from engine.accuracy.grids import MOST_COMPARED
 from engine.accuracy.ladder import ladder_of
-from engine.accuracy.reference import USUAL_LEVEL, Halted, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
-from engine.march.outcome import Flat, Outcome, number_of, outcome, used
-from engine.march.tables import SceneTables
-from engine.model.numerics import Numerics
-from engine.model.scene_model import SceneModel
+from engine.march.outcome import number_of, outcome, used
 from engine.model.timeline import MOST_STATIONS
-from engine.model.variant_values import VariantValues
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
 from results_schema.status import Fidelity
+
+if TYPE_CHECKING:
+    from engine.accuracy.choice import Choice
+    from engine.accuracy.grids import SceneGrid
+    from engine.accuracy.reference import Halted
+    from engine.march.outcome import Flat, Outcome
+    from engine.march.tables import SceneTables
+    from engine.model.numerics import Numerics
+    from engine.model.scene_model import SceneModel
+    from engine.model.variant_values import VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.ladder import Measured
 from engine.accuracy.reference import DOUBTED
-from engine.accuracy.results import Result, deciding, results_of, worst_held
+from engine.accuracy.results import deciding, results_of, worst_held
 from engine.kernels.nearest_pilots import nearest
-from engine.march.outcome import Asked
+
+if TYPE_CHECKING:
+    from engine.accuracy.ladder import Measured
+    from engine.accuracy.results import Result
+    from engine.march.outcome import Asked
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int32]

@@ -8,20 +8,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.march.envelopes import envelope_names
-from engine.march.outcome import Asked, Outcome
-from engine.model.scene_model import SceneModel
-from engine.model.variant_values import VariantValues, weights
+from engine.model.variant_values import weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
-from engine.scene.study import Study
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.march.outcome import Asked, Outcome
+    from engine.model.scene_model import SceneModel
+    from engine.model.variant_values import VariantValues
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 

@@ -9,18 +9,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.march.tables import Missed, SceneTables, SegmentTable
-from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
-from engine.model.timeline import Segment, coarsened
+from engine.march.tables import SceneTables
+from engine.model.timeline import coarsened
 from engine.observation.readings import Sensor
 from engine.scene.sensors import MOST_PLACES
-from engine.scene.study import Study
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.march.tables import Missed, SegmentTable
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import StationPath
+    from engine.model.timeline import Segment
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import State
 from engine.model.attachment import rows
-from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.track import rate_rows
-from engine.model.variant_values import LaneTable
-from engine.statics.equilibrium import StaticState, static_state
+from engine.statics.equilibrium import static_state
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.model.variant_values import LaneTable
+    from engine.statics.equilibrium import StaticState
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +19,28 @@ from engine.kernels.layout import (
     SMALLEST,
     SMALLEST_AT,
     STATISTICS,
-    Observation,
     Record,
-    State,
-    Ties,
 )
 from engine.kernels.stepping.march import march_many, march_one
 from engine.kernels.stepping.start import solve_initial_acceleration, strike, watch_start
 from engine.march.initial_state import initial_state
-from engine.march.stepper import Codes, go
-from engine.march.tables import SceneTables, SegmentTable
-from engine.model.timeline import Segment
+from engine.march.stepper import go
 from engine.model.track import tabulate_blow
-from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table
+from engine.model.variant_values import from_blocks, lane_table
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import rows_sampled
 from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.kernels.layout import (
+        Observation,
+        State,
+        Ties,
+    )
+    from engine.march.stepper import Codes
+    from engine.march.tables import SceneTables, SegmentTable
+    from engine.model.timeline import Segment
+    from engine.model.variant_values import LaneTable, VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -6,6 +6,8 @@ nothing and has neither lag nor vibration.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,12 +22,15 @@ from engine.kernels.layout import (
     STATISTICS,
 )
 from engine.march.march import Marched
-from engine.march.tables import SceneTables
-from engine.model.station_path import StationPath
-from engine.model.variant_values import VariantValues, weights
-from engine.observation.signals import Signal
+from engine.model.variant_values import weights
 from engine.statics.static_response import static_readings
 from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.march.tables import SceneTables
+    from engine.model.station_path import StationPath
+    from engine.model.variant_values import VariantValues
+    from engine.observation.signals import Signal
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -13,15 +13,18 @@ most 1.4 with -0.05. Up to omega_c h = 2 pi it was 1.3 at most.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.schemes import Scheme
-from engine.model.scene_model import SceneModel
-from engine.model.ties import CarriageTie, SpringTie
-from engine.model.variant_values import VariantValues
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.kernels.schemes import Scheme
+    from engine.model.scene_model import SceneModel
+    from engine.model.ties import CarriageTie, SpringTie
+    from engine.model.variant_values import VariantValues
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -7,13 +7,16 @@ the residual flexibility, the whole influence line less that.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
 
 Array = NDArray[np.float64]
 Along = tuple[StationPath, ...]

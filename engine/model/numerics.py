@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from engine.bodies.modal.description import Body
-from engine.kernels.schemes import Scheme
-from engine.scene.study import Study
+if TYPE_CHECKING:
+    from engine.bodies.modal.description import Body
+    from engine.kernels.schemes import Scheme
+    from engine.scene.study import Study
+
+
+_SPRUNG = ("auto", "static", "full")  # models that know the springs of carriages
 
 
 class Numerics(NamedTuple):
@@ -15,6 +19,7 @@ class Numerics(NamedTuple):
     fidelity: as `solver.fidelity` ("auto" and "full": all terms that the carriages have). modes: of every body whose
     number is left open; 0: as the study says. more: times the modes of all other bodies, as far as they have them.
 
+    >>> from engine.scene.study import Study
     >>> study = Study(kind="passage", solver={"fidelity": "force"})
     >>> Numerics.of(study).fidelity, Numerics.of(study).scheme.name
     ('force', 'average-acceleration')
@@ -25,6 +30,11 @@ class Numerics(NamedTuple):
     static_correction: bool
     modes: int = 0
     more: int = 1
+
+    @property
+    def knows_springs(self) -> bool:
+        """Whether carriages move on their springs."""
+        return self.fidelity in _SPRUNG
 
     @classmethod
     def of(cls, study: Study) -> Numerics:

@@ -8,24 +8,28 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
-from engine.bodies.modal.description import Body
-from engine.bodies.modal.modal_body import ModalBody
-from engine.kernels.schemes import Scheme
 from engine.model.numerics import Numerics
-from engine.model.support_reactions import Place, SupportReactions, stand
-from engine.model.ties import Attachment, CarriageTie, DamperTie, Inertia, Load, SpringTie
+from engine.model.support_reactions import Place, stand
+from engine.model.ties import CarriageTie, DamperTie, Load, SpringTie
 from engine.model.timeline import Rider
-from engine.scene.carriages import Suspension
-from engine.scene.motion_base import Motion
-from engine.scene.settings import SPRUNG
-from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.description import Body
+    from engine.bodies.modal.modal_body import ModalBody
+    from engine.kernels.schemes import Scheme
+    from engine.model.support_reactions import SupportReactions
+    from engine.model.ties import Attachment, Inertia
+    from engine.scene.carriages import Suspension
+    from engine.scene.motion_base import Motion
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 
@@ -248,7 +252,7 @@ def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]
 
 def _suspension(study: Study, numerics: Numerics, name: str) -> Suspension | None:
     """The spring of a carriage that acts; below the full fidelity it is locked."""
-    return study.carriage[name].suspension if numerics.fidelity in SPRUNG else None
+    return study.carriage[name].suspension if numerics.knows_springs else None
 
 
 def _springs(

@@ -6,13 +6,15 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal.modal_body import ModalBody
-from engine.model.scene_model import SceneModel
-from engine.model.timeline import Rider, Segment
+if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
+    from engine.model.scene_model import SceneModel
+    from engine.model.timeline import Rider, Segment
 
 Array = NDArray[np.float64]
 

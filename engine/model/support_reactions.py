@@ -5,19 +5,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal.modal_body import ModalBody
-from engine.model.numerics import Numerics
-from engine.model.ties import Attachment, CarriageTie, Load, SpringTie
-from engine.model.timeline import AT_END, Rider
-from engine.scene.carriages import Carriage
-from engine.scene.settings import SPRUNG
-from engine.scene.study import Study
+from engine.model.ties import Attachment, Load, SpringTie
+from engine.model.timeline import AT_END
 from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
+    from engine.model.numerics import Numerics
+    from engine.model.ties import CarriageTie
+    from engine.model.timeline import Rider
+    from engine.scene.carriages import Carriage
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 
@@ -76,7 +79,7 @@ def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]
         held = Attachment(-1.0, place.rides, None, contact.place)
         damped = contact.damping > 0.0 or f"{key}.damping" in swept
         springs.append(SpringTie(place.number, load.rider, load.body, key, held, None, damped, contact.is_rigid))
-    acting = tuple(springs) if numerics.fidelity in SPRUNG else ()
+    acting = tuple(springs) if numerics.knows_springs else ()
     reference = carriage.reference_on(modal.length)
     return SupportReactions(place.rides, modal.mass, reference, riders, acting, loads)
 

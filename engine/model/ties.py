@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal.modal_body import ModalBody
-from engine.model.timeline import Rider
+if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
+    from engine.model.timeline import Rider
 
 Array = NDArray[np.float64]
 

@@ -5,19 +5,22 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import FORCE, RATE, Alpha, Impulse, Newmark, Ties
+from engine.kernels.layout import FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
 from engine.model.attachment import holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
-from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
-from engine.model.ties import Attachment, SpringTie
-from engine.model.timeline import Segment
+
+if TYPE_CHECKING:
+    from engine.kernels.layout import Alpha, Newmark
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import StationPath
+    from engine.model.ties import Attachment, SpringTie
+    from engine.model.timeline import Segment
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES, Lanes
-from engine.model.scene_model import SceneModel
-from engine.model.ties import DamperTie, SpringTie
-from engine.scene.study import Study
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.model.ties import DamperTie, SpringTie
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
-from engine.model.ties import Attachment
-from engine.model.timeline import Rider
-from engine.observation.readings import Channel, Sensor
+from engine.observation.readings import Sensor
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.model.station_path import StationPath
+    from engine.model.ties import Attachment
+    from engine.model.timeline import Rider
+    from engine.observation.readings import Channel
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.variant_values import VariantValues
-from engine.scene.motion_base import Motion
-from engine.scene.study import Study
-from results_schema.status import Fidelity
+if TYPE_CHECKING:
+    from engine.model.variant_values import VariantValues
+    from engine.scene.motion_base import Motion
+    from engine.scene.study import Study
+    from results_schema.status import Fidelity
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,15 @@ extrapolated, from either side, by the parabola through three stations.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.scene_model import SceneModel
-from engine.model.timeline import Timeline
-from engine.observation.readings import Sensor
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.model.timeline import Timeline
+    from engine.observation.readings import Sensor
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
 from engine.model.attachment import holds, place
 from engine.model.attachment import rows as shape_rows
-from engine.model.scene_model import BodyPart, SceneModel
-from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
-from results_schema.quantities import QUANTITIES, Quantity
+from results_schema.quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
+    from engine.model.scene_model import BodyPart, SceneModel
+    from engine.model.station_path import StationPath
+    from results_schema.quantities import Quantity
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -22,7 +22,6 @@ ALL_SCHEMES = Pieces(
     missing=no_row_of(SchemeRow),
 )
 FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "full")
-SPRUNG = ("auto", "static", "full")  # those that know the springs of carriages
 MAX_STEPS = 100_000_000
 
 

@@ -12,12 +12,16 @@ lines.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.attachment import Along, modal_flexibility_between, residual, shared, tie_shapes
-from engine.model.scene_model import SceneModel
+from engine.model.attachment import modal_flexibility_between, residual, shared, tie_shapes
+
+if TYPE_CHECKING:
+    from engine.model.attachment import Along
+    from engine.model.scene_model import SceneModel
 
 Array = NDArray[np.float64]
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.attachment import Along
-from engine.model.scene_model import SceneModel
-from engine.model.variant_values import VariantValues, weights
-from engine.observation.contact_forces import ContactForce, contact_forces, contact_row
+from engine.model.variant_values import weights
+from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.readings import Sensor
 from engine.observation.signals import build_sensors
 from engine.statics.equilibrium import static_state
+
+if TYPE_CHECKING:
+    from engine.model.attachment import Along
+    from engine.model.scene_model import SceneModel
+    from engine.model.variant_values import VariantValues
+    from engine.observation.contact_forces import ContactForce
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine.bodies.frame.elements import Beams, consistent_mass, lumped_mass, stiffness
-from engine.bodies.frame.geometry import DIRECTIONS
-from engine.bodies.frame.refusals import member_axes, member_ends
+from engine.bodies.frame.geometry import DIRECTIONS, member_axes, member_ends
 from engine.bodies.modal.modal_body import Array
 
 if TYPE_CHECKING:

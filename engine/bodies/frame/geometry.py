@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
 
 Array = NDArray[np.float64]
 
@@ -57,3 +61,32 @@ def local_axes(along: ArrayLike, up: ArrayLike) -> Array:
 def parallel(one: ArrayLike, other: ArrayLike) -> bool:
     """Whether two directions are the same or opposite."""
     return bool(np.linalg.norm(np.cross(unit(one), unit(other))) < PARALLEL)
+
+
+def member_ends(frame: Frame, name: str) -> Array:
+    """(2, 3) ends of a member's axis, its rigid arms included, m."""
+    member = frame.member[name]
+    found: Array = np.array([frame.place(node) for node in member.nodes]) + np.array(member.offsets)
+    return found
+
+
+def up_of(frame: Frame, name: str) -> Array | None:
+    """The direction that orients a member's section; None where a member along gravity has none."""
+    member = frame.member[name]
+    along: Array = np.diff(member_ends(frame, name), axis=0)[0]
+    if frame.plane is not None:  # bending in the plane is that of `second_moment`
+        across = np.zeros(3)
+        across["xyz".index(frame.still[0])] = 1.0
+        up: Array = np.cross(along, across)
+        return up
+    if member.up is not None:
+        return np.array(member.up)
+    against = -np.array(frame.gravity)
+    return None if parallel(along, against) else against
+
+
+def member_axes(frame: Frame, name: str) -> Array:
+    """(3, 3) local axes of a member, as rows."""
+    up = up_of(frame, name)
+    assert up is not None  # checked
+    return local_axes(np.diff(member_ends(frame, name), axis=0)[0], up)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails
 
-from engine.bodies.frame.geometry import SAME_PLACE, Array, TrackLine, local_axes, parallel, unit
+from engine.bodies.frame.geometry import SAME_PLACE, TrackLine, member_ends, parallel, unit, up_of
 from engine.bodies.modal.description import Spot, check_spot_name
 from engine.study_file.document import shortened
 from engine.study_file.spec import nearest
@@ -42,35 +42,6 @@ def check_frame(frame: Frame) -> None:
     _check_plane(frame)
     _check_track(frame)
     _check_modes(frame)
-
-
-def member_ends(frame: Frame, name: str) -> Array:
-    """(2, 3) ends of a member's axis, its rigid arms included, m."""
-    member = frame.member[name]
-    found: Array = np.array([frame.place(node) for node in member.nodes]) + np.array(member.offsets)
-    return found
-
-
-def up_of(frame: Frame, name: str) -> Array | None:
-    """The direction that orients a member's section; None where a member along gravity has none."""
-    member = frame.member[name]
-    along: Array = np.diff(member_ends(frame, name), axis=0)[0]
-    if frame.plane is not None:  # bending in the plane is that of `second_moment`
-        across = np.zeros(3)
-        across["xyz".index(frame.still[0])] = 1.0
-        up: Array = np.cross(along, across)
-        return up
-    if member.up is not None:
-        return np.array(member.up)
-    against = -np.array(frame.gravity)
-    return None if parallel(along, against) else against
-
-
-def member_axes(frame: Frame, name: str) -> Array:
-    """(3, 3) local axes of a member, as rows."""
-    up = up_of(frame, name)
-    assert up is not None  # checked
-    return local_axes(np.diff(member_ends(frame, name), axis=0)[0], up)
 
 
 def _check_nodes(frame: Frame) -> None:
