@@ -22,9 +22,7 @@ from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
 from engine.model.variant_values import VariantValues
 from engine.scene.sweep import Cases
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 SEED = 20261122  # of the pilots; audits have another
 PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.schemes import SCHEMES
 from engine.march.envelopes import with_companions
@@ -18,6 +17,7 @@ from engine.model.scene_model import with_numerics
 from engine.model.timeline import build_grid, refined
 from engine.observation.kinks import stops
 from engine.scene.sensors import MOST_PLACES
+from results_schema.arrays import Counts
 
 if TYPE_CHECKING:
     from engine.march.outcome import Asked
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from engine.model.timeline import Grid
     from engine.model.variant_values import VariantValues
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 #: Steps of the grid over a passage, or over a cycle. The cheapest march that holds 1e-2 took
 #: 32 to 64 (208 passages), 50 over a cycle of a shuttle; the 200 phases of kept histories are a multiple of those.

@@ -11,7 +11,6 @@ from math import lcm
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.grids import MOST_COMPARED
 from engine.accuracy.ladder import ladder_of
@@ -21,6 +20,7 @@ from engine.kernels.layout import STATISTICS
 from engine.march.outcome import number_of, outcome, used
 from engine.model.timeline import MOST_STATIONS
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
+from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 
 if TYPE_CHECKING:
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.variant_values import VariantValues
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Kept = Literal["numbers", "histories"]
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by
 

@@ -23,10 +23,8 @@ from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues
+from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 MODES = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # each a third to a half more than the one before
 SIMPLER = (("static", Fidelity.STATIC), ("force", Fidelity.FORCE), ("mass", Fidelity.MASS))  # than the carriages' own

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import deciding, results_of, worst_held
 from engine.kernels.nearest_pilots import nearest
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.accuracy.ladder import Measured
     from engine.accuracy.results import Result
     from engine.march.outcome import Asked
 
-Array = NDArray[np.float64]
 Numbers = NDArray[np.int32]
 
 #: Of the estimated errors for pilots that were left out are no smaller than the true ones: 0.993 doubled the work of

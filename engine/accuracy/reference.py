@@ -29,9 +29,8 @@ from engine.march.outcome import Flat, Outcome, outcome, used
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.variant_values import VariantValues
+from results_schema.arrays import Array, Counts
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Halted = Callable[[], bool]
 Share = Callable[[Sequence[Callable[[], object]]], None]
 

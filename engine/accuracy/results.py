@@ -11,12 +11,12 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.march.envelopes import envelope_names
 from engine.model.variant_values import weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
+from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Status
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 EXTREMES = ("max", "min", "rms")
 ENDS = ("max", "min")

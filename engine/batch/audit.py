@@ -9,7 +9,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, Group
@@ -29,10 +28,8 @@ from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.model.variant_values import VariantValues
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred

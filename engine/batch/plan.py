@@ -11,7 +11,6 @@ from functools import cached_property
 from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.choice import PILOTS, Choice, cases_tolerance, choose
 from engine.accuracy.grids import SceneGrid, fixed_steps, unit_steps
@@ -32,12 +31,11 @@ from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import declarations, registered
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 CheckSteps = Callable[[SceneModel, VariantValues, Counts], None]
 
 TASK_SECONDS = 0.4  # of one chunk at most: a stop waits no longer than that

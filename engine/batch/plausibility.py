@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.variant_values import moving_mass, weight
-
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 FAST = 3.0  # times the critical speed
 HEAVY = 2.0  # times the body's mass

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from engine.march.tables import SceneTables
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.cycle_reduction import Cycle, Reduction
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 
 def reduced(

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import DIVERGED, DIVERGED_AT, LANES, LARGEST, SMALLEST, SOUND, STATISTICS, Record
 from engine.kernels.stepping.richardson_pairs import extrapolate, integrate, survey
@@ -22,10 +21,8 @@ from engine.march.tables import SceneTables, SegmentTable
 from engine.model.timeline import Segment
 from engine.model.variant_values import VariantValues, from_blocks
 from engine.observation.histories import rows_sampled
+from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 def march_scheme(

@@ -16,8 +16,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from engine.model.ties import CarriageTie, SpringTie
     from engine.model.variant_values import VariantValues
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 FREE_STEPS = 200  # per first period of free vibration where the study fixes the steps: 8e-5 of phase a period
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit, which a mass on it lowers a little

@@ -13,7 +13,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import (
     CURVE,
@@ -48,10 +47,9 @@ from engine.model.ties import CarriageTie
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_ties
 from engine.model.variant_values import VariantValues, from_blocks
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Rule = Coupling | WilsonTheta | RungeKutta | RigidTie
 
 AVERAGE_ACCELERATION = Newmark(0.25, 0.5)

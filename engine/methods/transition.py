@@ -24,8 +24,7 @@ from engine.model.track import tabulate_ties
 from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table, padded, to_blocks
 from engine.observation.contact_forces import ContactForce
 from engine.observation.signals import tabulate_watch
-
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

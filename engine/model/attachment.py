@@ -10,15 +10,14 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
 
-Array = NDArray[np.float64]
 Along = tuple[StationPath, ...]
 
 

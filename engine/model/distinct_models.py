@@ -11,8 +11,7 @@ from engine.model.scene_model import SceneModel, build_model
 from engine.model.variant_values import LANE_KEYS, VariantValues
 from engine.scene.study import Study
 from engine.scene.sweep import Cases
-
-Counts = NDArray[np.int64]
+from results_schema.arrays import Counts
 
 
 def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:

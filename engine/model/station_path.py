@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array
+
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Rider, Segment
 
-Array = NDArray[np.float64]
 
 NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
 

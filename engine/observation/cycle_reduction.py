@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from results_schema.arrays import Array
+
 if TYPE_CHECKING:
     from engine.model.variant_values import VariantValues
     from engine.scene.motion_base import Motion
     from engine.scene.study import Study
     from results_schema.status import Fidelity
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,15 +11,14 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Timeline
     from engine.observation.readings import Sensor
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 SIDE = np.arange(3)  # stations of a parabola
 AT_STATION = 1e-6  # of a step, by which a station may be off such a moment and still be it

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 
 def spline_at_rest(times: Array, positions: Array) -> Any:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.groups import marches_again
 from engine.batch.plan import Plan
@@ -27,9 +26,7 @@ from engine.unreduced.march import Course, march_unreduced
 from engine.unreduced.rows import Along
 from engine.unreduced.scene import Unreduced, contacts_of, unreduced_model
 from engine.unreduced.statics import statics_at
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 FINER = 8  # steps of the unreduced model for each of the march, so that its many modes do not ring by their steps
 MOST_STEPS = 120_000  # of the unreduced model, unless the march itself takes more

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
-Array = NDArray[np.float64]
 
 PARALLEL = 1e-6  # sine of the angle below which two directions are one
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  # of a node's degrees of freedom

@@ -11,16 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from engine.bodies.frame.elements import deflection_shapes, stiffness
 from engine.bodies.frame.shapes import FORCES, ModeForces
 from engine.bodies.frame.statics import TrackStatics, is_every_pair
 from engine.bodies.frame.track import TrackBeams, track_places
 from engine.bodies.modal.modal_body import Array, refuse_loose
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput
 
-Counts = NDArray[np.int64]
 QUANTITIES = ("bending_moment", "shear_force", "axial_force", "torque", "stress", "strain")
 
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from engine.bodies.frame.assembly import Assembly
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_places
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
 from engine.bodies.modal.modal_body import Array, refuse_loose
+from results_schema.arrays import Counts
 
-Counts = NDArray[np.int64]
 _ENDS = 32  # ends of elements whose loads are solved at a time
 _SAMPLES = 5  # places per element that show every pattern of its cubic shapes
 

@@ -19,11 +19,11 @@ from engine.bodies.beam.statics import stations
 from engine.bodies.frame.assembly import Mesh, cross_matrix
 from engine.bodies.frame.elements import SIGN_Y, SIGN_Z, Beams, deflection_shapes
 from engine.bodies.modal.modal_body import Array
+from results_schema.arrays import Counts
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
-Counts = NDArray[np.int64]
 Members = Sequence[tuple[str, bool]]  # in a row, with whether each runs against it
 _END = 1e-12  # lengths before the end of a track that are its end
 _FELT = 1e-6  # part of a unit load along an axis that counts

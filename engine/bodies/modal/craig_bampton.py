@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bodies.modal.flexibility import factorised
 from engine.bodies.modal.modal_body import Array
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
-
-Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
