@@ -209,18 +209,13 @@ def _march(
     share([partial(go, int(cut)) for cut in np.unique(by)[::-1]])
     if len(marched) == 1:
         return next(iter(marched.values()))[1:]
-    found = _room(next(iter(marched.values()))[1], values.size)
+    found = next(iter(marched.values()))[1].of(np.zeros(values.size, dtype=np.int64))  # as large, yet to be filled
     spent: Flat = {}
     for lanes, now, taken in marched.values():
         found = found.replaced(lanes, now)
         for name, column in taken.items():
             spent.setdefault(name, np.zeros(values.size, dtype=column.dtype))[lanes] = column
     return found, spent
-
-
-def _room(of: Outcome, size: int) -> Outcome:
-    """An outcome of so many variants that is yet to be filled."""
-    return of.of(np.zeros(size, dtype=np.int64))
 
 
 def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Counts:

@@ -116,12 +116,9 @@ def _compared(plan: Plan, group: Group, variants: Counts, truth: Converged, halt
 def joined(audits: Sequence[Audit], plan: Plan, asked: int) -> Audit:
     """Audits of some of the variants that were asked for as one, ascending."""
     none = np.zeros((len(results_of(plan.asked)), 0))
-    if not audits:
-        return Audit(np.zeros(0, dtype=np.int64), none, none, none, asked)
-    found = np.concatenate([np.zeros(0, dtype=np.int64), *(one.variants for one in audits)])
-    order = np.argsort(found)
-    observed, told, doubt = (
-        np.concatenate([none, *columns], axis=1)[:, order]
-        for columns in zip(*((one.observed, one.told, one.doubt) for one in audits), strict=True)
+    parts = [Audit(np.zeros(0, dtype=np.int64), none, none, none, 0), *audits]
+    order = np.argsort(np.concatenate([one.variants for one in parts]))
+    variants, observed, told, doubt = (
+        np.concatenate(column, axis=-1)[..., order] for column in zip(*(one[:4] for one in parts), strict=True)
     )
-    return Audit(found[order], observed, told, doubt, asked - found.size)
+    return Audit(variants, observed, told, doubt, asked - order.size)

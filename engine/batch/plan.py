@@ -81,7 +81,8 @@ class Plan:
     def groups(self) -> tuple[Group, ...]:
         """Variants that are computed alike; those of a large sweep are known when it is chosen for."""
         if not self._groups:
-            self._groups = tuple(self._converging() if self.converges else self._marching())
+            converging = map(ConvergingGroup, self.grids, self.members)
+            self._groups = tuple(converging if self.converges else self._marching())
         return self._groups
 
     @property
@@ -95,10 +96,6 @@ class Plan:
             self.choice = choose(self.asked, self.cases, self.grids, self.members, share, halted, pilots)
             self._groups = ()  # those of before the choice told sizes only
             self.__dict__.pop("seconds", None)
-
-    def _converging(self) -> Iterator[Group]:
-        for grid, members in zip(self.grids, self.members, strict=True):
-            yield ConvergingGroup(grid, members)
 
     def _marching(self) -> Iterator[Group]:
         """Variants of one scene by their rung, of like pace side by side: they rise and fall together."""

@@ -16,8 +16,7 @@ from engine.bodies.files import ansys as import_ansys
 from engine.bodies.files import cards as import_cards
 from engine.bodies.files import optional_packages as import_extras
 from engine.bodies.files import reader as import_files
-from engine.bodies.files.local_directions import turned
-from engine.bodies.files.model import FileModel, checked
+from engine.bodies.files.model import FileModel, checked, turned
 from engine.bodies.files.reader import Request, read_files
 from engine.bodies.files.text import Line, lines_of, read_lines, real, whole
 from results_schema.errors import BadInput

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from engine.bodies.files.cards import Card, cards_of, check_matrices, check_nodes, included, rows_of, scalars
-from engine.bodies.files.local_directions import turned
-from engine.bodies.files.model import Array, FileModel, checked, hashes_of
+from engine.bodies.files.model import Array, FileModel, checked, hashes_of, turned
 from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import file_bytes, read_lines, read_paths, written
 from results_schema.errors import BadInput
