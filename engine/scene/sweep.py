@@ -60,11 +60,6 @@ class Cases:
         """Dotted keys of all swept numbers."""
         return tuple(path for axis in self.axes for path in axis.paths)
 
-    @property
-    def coordinates(self) -> dict[str, Axis]:
-        """Axes by name; several share a dimension where they are zipped or sampled."""
-        return {axis.name: axis for axis in self.axes}
-
     def positions(self, indices: ArrayLike) -> dict[str, Indices]:
         """Index along each dimension of variants given by their flat numbers (V,)."""
         unravelled = np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape) if self.dims else ()

@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
-Verdict = NDArray[np.bool_]
-
 
 @dataclass(frozen=True)
 class Check:
@@ -27,7 +24,7 @@ class Check:
     what: str
     expected: str
 
-    def met(self, values: Mapping[str, Any]) -> Verdict:
+    def met(self, values: Mapping[str, Any]) -> NDArray[np.bool_]:
         """Verdict for values by dotted key, of their broadcast shape."""
         return np.asarray(self.holds(*(values[key] for key in self.needs)), dtype=bool)
 

@@ -106,7 +106,7 @@ def test_zip() -> None:
     )
     assert (cases.dims, cases.shape) == (("variant",), (3,))
     assert cases.values_of(2) == {SPEED: 3.0, MASS: 6.0}
-    assert set(cases.coordinates) == {"a", "b"}
+    assert {axis.name for axis in cases.axes} == {"a", "b"}
 
 
 def test_sobol_is_joint_and_repeatable() -> None:
