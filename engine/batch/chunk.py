@@ -13,11 +13,9 @@ from engine.batch.plan import Plan
 from engine.march.outcome import Flat, histories
 from engine.march.tables import SceneTables
 from engine.observation.histories import counts_shown
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.store.rows import Rows, joined
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 def run_chunk(

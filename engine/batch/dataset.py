@@ -13,14 +13,13 @@ from engine.march.envelopes import envelope_places
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases
+from results_schema.arrays import Array
 from results_schema.store.rows import Rows
 from results_schema.variables import Variable, axes, declarations, expand, sensor_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 SHAPE_STATIONS = 201  # of the mode shapes in the archive

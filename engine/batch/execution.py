@@ -13,7 +13,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Group
@@ -21,6 +20,7 @@ from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.linear_algebra import one_thread
 from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput, Interrupted
 from results_schema.store.rows import Chunk, Collector, Rows
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from engine.march.march import March
 
-Counts = NDArray[np.int64]
 T = TypeVar("T")
 Halted = Callable[[], bool]
 Sink = Callable[[Chunk], object]
