@@ -77,6 +77,12 @@ def held_words(seen: View) -> str:
     return f"Held at {', '.join(axis.at(len(axis.values) // 2) for axis in axes)}." if axes else ""
 
 
+def way_title(results: Results) -> str:
+    """The horizontal axis of what stands over the places of bodies."""
+    across = any(carriage.lies_across for carriage in results.study.carriage.values())
+    return "along the way, and across it (m)" if across else "along the way (m)"
+
+
 def position_title(results: Results) -> str:
     """The horizontal axis of what stands over the first carriage's place."""
     return f"position of {results.carriage_name} (m)"

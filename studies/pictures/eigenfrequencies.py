@@ -91,11 +91,11 @@ def _draw_over_sweep(seen: View, shown: int, drawing: Drawing) -> None:
 
 
 def _shapes(results: Results) -> Figure:
-    count = min(SHAPES, results.dataset.sizes["mode"])
+    count, carriages = min(SHAPES, results.dataset.sizes["mode"]), results.study.carriage.values()
     caption = (
         f"The lowest {count} shapes with the carriage at the beginning, in the middle and at the end of its way, each "
         "scaled to its own largest motion. Grey: at rest."
-        + (" What rides is drawn above what it rides." if any(p.rides for p in at_rest.places(results)) else "")
+        + (" What rides is drawn above what it rides." if any(c.riding_body for c in carriages) else "")
     )
     height = 0.4 + 1.35 * count
     return draw("shapes", "Shapes of the coupled system", caption, height, partial(_draw_shapes, results, count))
@@ -133,6 +133,6 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
         grid[mode, 0].set_ylabel(f"mode {mode + 1}")
     grid[0, 0].invert_yaxis()
     for axes in grid[-1]:
-        axes.set_xlabel("along the way (m)")
+        axes.set_xlabel(at_rest.way_title(results))
     if len(bodies) > 1:
         legend_of_all(drawing, grid[0, 0])

@@ -125,5 +125,5 @@ def _draw_shapes(results: Results, drawing: Drawing) -> None:
                 at_rest.carriage_marks(axes, results, position, float(np.interp(position, x, y)))
         axes.set_ylabel(f"{body.name}\n({scale.unit})")
         axes.invert_yaxis()
-    rows[-1].set_xlabel("along the way (m)")
+    rows[-1].set_xlabel(at_rest.way_title(results))
     legend_of_all(drawing, rows[0])

@@ -6,7 +6,7 @@ accelerations and the ties' forces together:
 
     M x'' + C x' + K x = f + P F
     contact:  F + k (P^T x + level + R (F, P0)) + c d/dt (P^T x + level) = 0, beyond P0, its load on level ground
-    mass:     F + m D^2(p^T x + level) = m g
+    mass:     F + m D^2(p^T x + level) = m g;  rigid contact:  D^2(P^T x + level) = 0
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Tie:
     ahead: float
     rides: str = ""
     place: Place = 0.0
-    stiffness: float = 0.0
+    stiffness: float | str = 0.0
     damping: float = 0.0
     mass: float = 0.0
     at_rest: float = 0.0
@@ -110,7 +110,8 @@ class Twin:
         rigid = rides.omega == 0.0
         free = np.array([self._fixed(spec.body, tie.place)[rigid] for tie in found])
         holds = [Hold(spec.body, tie.place, 1.0) for tie in found]
-        soft = self._flexibility(holds, rest=False) + np.diag([1.0 / tie.stiffness for tie in found])
+        own = [0.0 if tie.stiffness == "rigid" else 1.0 / float(tie.stiffness) for tie in found]
+        soft = self._flexibility(holds, rest=False) + np.diag(own)
         whole = np.block([[soft, -free], [free.T, np.zeros((free.shape[1],) * 2)]])
         right = np.concatenate([np.zeros(len(found)), rides.participation[rigid] * self.study.gravity])
         for tie, force in zip(found, np.linalg.lstsq(whole, right, rcond=1e-13)[0], strict=False):
@@ -147,8 +148,8 @@ class Twin:
             return 0.0
         return float(self.study.gravity * self.body[body].own_weight_deflection([place], derivative)[0])
 
-    def law(self, where: Where) -> Law:
-        """What the ties say with every carriage at s, s', s''."""
+    def law(self, where: Where, still: bool = False) -> Law:
+        """What the ties say with every carriage at s, s', s''; still: of rigid contacts the gap, not how it closes."""
         n, count = self.omega.size, len(self.ties)
         a, v, x, own, right = np.zeros((count, n)), np.zeros((count, n)), np.zeros((count, n)), np.eye(count), []
         loads, dead = np.zeros((n, count)), np.zeros(n)
@@ -167,8 +168,14 @@ class Twin:
                 dead += p0 * tie.at_rest
                 wide = p0.copy()
                 wide[self.part[tie.rides]] -= self._fixed(tie.rides, tie.place)
-                k, c = tie.stiffness, tie.damping
-                v[t], x[t], loads[:, t] = c * wide, k * wide + c * ds * p1, wide
+                loads[:, t] = wide
+                if tie.stiffness == "rigid":
+                    own[t, t] = 0.0
+                    a[t], v[t], x[t] = wide, 2.0 * ds * p1, wide if still else ds**2 * p2 + dds * p1
+                    right.append(-sag if still else -(ds**2) * curve - dds * tilt)
+                    continue
+                k, c = float(tie.stiffness), tie.damping
+                v[t], x[t] = c * wide, k * wide + c * ds * p1
                 own[t] += k * on_force[t]
                 right.append(-k * (sag + on_rest[t]) - c * ds * tilt)
             else:
@@ -192,11 +199,12 @@ class Twin:
         """Coordinates, and the forces of all ties at rest."""
         first = next(iter(self.study.carriage))
         given = places if isinstance(places, dict) else {first: places}
-        law = self.law({name: (s, 0.0, 0.0, True) for name, s in given.items()})
-        back = np.linalg.solve(law.own, np.column_stack([law.right, law.x]))
-        stiff = np.diag(self.omega**2) + law.loads @ back[:, 1:]
-        x = np.linalg.lstsq(stiff, law.dead + law.loads @ back[:, 0], rcond=1e-14)[0]
-        return x, self._total(back[:, 0] - back[:, 1:] @ x)
+        law = self.law({name: (s, 0.0, 0.0, True) for name, s in given.items()}, still=True)
+        size = np.maximum(np.abs(law.x).max(axis=1), 1.0)[:, None]
+        whole = np.block([[np.diag(self.omega**2), -law.loads], [law.x / size, law.own / size]])
+        right = np.concatenate([law.dead, law.right / size[:, 0]])
+        found = np.linalg.lstsq(whole, right, rcond=1e-14)[0]
+        return found[: self.omega.size], self._total(found[self.omega.size :])
 
     def _total(self, force: Array) -> Array:
         return force + self.dead
