@@ -14,6 +14,7 @@ from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.store.rows import Collector
+from tests.batch import test_determinism
 from tests.bodies.frames import straight
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.engine.reading import Reading
@@ -168,18 +169,12 @@ def digest(plan: Plan, chunk: int | None, threads: int) -> dict[str, bytes]:
     return {name: array.tobytes() for name, array in collector.arrays.items()}
 
 
-def mixed(**changes: Any) -> Study:
+def mixed() -> Study:
     """75 variants of several step counts on springs, which all carry values."""
-    carriages = {"car": mass(0.5, cruise(-0.1, 1.1, 1.0, after=0.3)), "next": force(2.0, cruise(0.0, 1.0, 1.0))}
-    sweep = {
-        "speed": {"of": ["carriage.car.motion.speed", "carriage.next.motion.speed"], "values": [0.2, 0.5, 1.0, 2.5, 4]},
-        "weight": {"of": "carriage.car.mass", "from": 0.05, "to": 2.0, "count": 5},
-        "zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.01, 0.05]},
-    }
+    data = dict(test_determinism.mixed().data)
+    sweep = {name: axis for name, axis in data["sweep"].items() if name != "stiffness"}
     envelopes = {"shape": along(places=9), "moments": along("bending_moment", places=5)}
-    solver = {"tolerance": 0.1}  # accuracy is not the question
-    tables = {"sweep": sweep, "envelope": envelopes, "solver": solver}
-    return study(beam(supports=SPRINGS), carriages, **(tables | changes))
+    return Study(**(data | {"sweep": sweep, "envelope": envelopes, "output": {"histories": "none"}}))
 
 
 def test_same_bits_for_any_chunks_and_threads() -> None:

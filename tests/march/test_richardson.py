@@ -22,6 +22,7 @@ from tests.engine.build import beam, cruise, fixed, mass, shuttle, study, swing,
 from tests.engine.kept_cycles import Kept
 from tests.engine.reading import Reading
 from tests.engine.twin import solve_twin
+from tests.march.test_twin import DAMPED, SPRINGS
 
 Array = NDArray[np.float64]
 
@@ -34,8 +35,6 @@ SENSORS = {
     "below_acceleration": under("car", "acceleration"),
 }
 PAIR = {"scheme": "richardson"}
-SPRINGS = [{"at": 0.0, "stiffness": 60.0, "rotational": 0.3}, {"at": 1.0, "stiffness": 90.0}]
-DAMPED = [{"at": 0.0, "stiffness": 60.0, "damping": 2.0}, {"at": 0.9, "stiffness": 90.0, "damping": 0.7}]
 TWO = {"car": mass(0.4, cruise(-0.25, 1.25, 1.0, after=0.4)), "next": mass(0.3, cruise(1.0, 0.0, 1.0), delay=0.25)}
 
 
