@@ -129,8 +129,7 @@ def check_held(model: SceneModel) -> None:
 
 def _numbers(study: Study, asked: Asked, positions: int) -> int:
     """Numbers that are kept of one variant, at most."""
-    modes = int(getattr(asked, "modes", 0))
-    return 8 + positions * (modes or 2 * len(study.sensor) + MAX_CONTACTS * len(study.carriage))
+    return 8 + positions * (asked.frequencies or 2 * len(study.sensor) + MAX_CONTACTS * len(study.carriage))
 
 
 def _shapes(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:

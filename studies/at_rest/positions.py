@@ -46,6 +46,11 @@ class Asked(Spec):
     mode_counts: Annotated[tuple[_Modes, ...], Strict(False), AfterValidator(_ascending)] = ()
     unreduced: int = Field(default=0, ge=0, le=101)
 
+    @property
+    def frequencies(self) -> int:
+        """How many natural frequencies are wanted at every position."""
+        return 0
+
 
 class Positions(NamedTuple):
     """Where the first carriage stands, m (P,), and places among these: of the comparison of numbers of modes, and of

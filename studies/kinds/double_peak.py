@@ -153,8 +153,9 @@ class DoublePeak(Kind):
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
         dataset = with_amplification(dataset, study)
-        ratio = theory.frequency_ratio(Results(dataset, study))
-        dims = tuple(getattr(ratio, "dims", ()))
+        import xarray as xr
+
+        ratio = xr.DataArray(theory.frequency_ratio(Results(dataset, study)))
         found = {
             "peak": ("peak", np.arange(1, PEAKS + 1, dtype=np.int64), _axis("peak")),
             "harmonic_number": (
@@ -162,7 +163,7 @@ class DoublePeak(Kind):
                 np.arange(indices.HARMONICS + 1, dtype=np.int64),
                 _axis("harmonic_number"),
             ),
-            "frequency_ratio": (dims, np.asarray(getattr(ratio, "values", ratio)), _axis("frequency_ratio")),
+            "frequency_ratio": (ratio.dims, ratio.values, _axis("frequency_ratio")),
         }
         return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
 

@@ -38,6 +38,10 @@ class Question(Asked):
 
     modes: int = Field(default=8, ge=1, le=64)
 
+    @property
+    def frequencies(self) -> int:
+        return self.modes
+
 
 _COUPLED = "bodies and carriages together, undamped, the carriages at rest"
 RESULTS = (

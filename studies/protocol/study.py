@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
-from results_schema.pieces import Pieces, lacks
+from results_schema.pieces import Pieces, lacks, no_row_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,7 +168,7 @@ def _check_names(study: Study) -> None:
             raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
 
 
-KIND_HAS = ("name", "summary", "question", "check", "findings", "figures")
+KIND_HAS = ("name", "summary", "question", "start")  # those of another package
 
 
 class _OwnKinds(Mapping[str, Kind]):
@@ -199,16 +199,9 @@ KINDS: Pieces[Kind] = Pieces(
     group="wanderlast.kinds",
     noun="kind of study",
     own=_OwnKinds(),
-    wanted=f"an object with {', '.join(KIND_HAS)} and start",
-    missing=lacks(*KIND_HAS, "start"),
+    wanted=f"an object of a class made of studies.protocol.study.Kind with {', '.join(KIND_HAS)}",
+    missing=lambda kind: no_row_of(Kind)(kind) or lacks(*KIND_HAS)(kind),
 )
-
-
-class _Completed(Kind):
-    """An object of another package that is no `Kind`: what it leaves out is as in `Kind`."""
-
-    def __init__(self, own: object) -> None:
-        self.__dict__ |= {name: getattr(own, name) for name in dir(own) if not name.startswith("__")}
 
 
 def kind_names() -> tuple[str, ...]:
@@ -224,8 +217,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
         remedy = f'did you mean "{near[0]}"?' if near else ""
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
-    kind = KINDS[name]
-    return kind if isinstance(kind, Kind) else _Completed(kind)
+    return KINDS[name]
 
 
 def kind_of(study: Study) -> Kind:

@@ -54,6 +54,8 @@ def _refused(path: Path, text: str) -> ArchiveError:
 def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> dict[str, xr.Dataset]:
     """The groups of bodies; that of a body out of files, under the first carriage, with its lowest elastic frequency
     over the axes that change it, which nobody could tell later without the files."""
+    import xarray as xr
+
     from results_schema.variables import declarations
     from studies.findings.theory import first_omega
 
@@ -62,9 +64,8 @@ def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> 
     if not body.names_files:
         return dict(groups)
     (declared,) = (variable for variable in declarations(MODELS) if variable.name == "first_frequency")
-    omega = first_omega(results)
-    dims, values = getattr(omega, "dims", ()), np.asarray(omega, dtype=np.float64)
-    added = {declared.name: (dims, values / (2.0 * np.pi), declared.attributes())}
+    omega = xr.DataArray(first_omega(results))
+    added = {declared.name: (omega.dims, omega.values / (2.0 * np.pi), declared.attributes())}
     return {**groups, path: groups[path].assign(added)}
 
 
