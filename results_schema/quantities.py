@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from results_schema.pieces import Pieces, no_row_of
 
@@ -81,12 +81,20 @@ _ROWS = (
     Quantity("strain", "1", 2, factor=_strain, of_section=True, needs_fibre=True),
     Quantity("contact_force", "N", of_contact=True, told=True),
 )
+
+
+def _missing(piece: Any) -> list[str]:
+    """What bodies and carriages tell by name is the program's own."""
+    own = ("of_section", "of_contact")
+    return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
+
+
 QUANTITIES = Pieces(
     group="wanderlast.quantities",
     noun="quantity",
     own={row.name: row for row in _ROWS},
     wanted="a Quantity of results_schema.quantities",
-    missing=no_row_of(Quantity),
+    missing=_missing,
 )
 OF_SECTION = tuple(row.name for row in _ROWS if row.of_section)
 MEANT = {word: row.name for row in _ROWS for word in row.meant}

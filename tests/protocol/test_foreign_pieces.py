@@ -205,6 +205,12 @@ def test_an_unfinished_class_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
         table_with("wanderlast.motions", tmp_path, monkeypatch, text)["toy"]
 
 
+def test_a_quantity_that_bodies_would_have_to_know_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = FILES["slope.py"].replace("derivative=1", "derivative=1, of_section=True") + "\nTOY = SLOPE\n"
+    with pytest.raises(BadInput, match="without of_section = False"):
+        table_with("wanderlast.quantities", tmp_path, monkeypatch, text)["toy"]
+
+
 def test_names_of_the_program_stay_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     home = install(tmp_path / "packages", {"wanderlast.motions": {"cruise": "nowhere:TOY"}}, {})
     monkeypatch.syspath_prepend(str(home))
