@@ -56,11 +56,6 @@ class Choice:
     rung: NDArray[np.int32]
     neighbour_errors: NeighbourErrors
 
-    @property
-    def work(self) -> float:
-        """Modes x steps over a passage or cycle of all that pilots marched."""
-        return self.measured.work
-
     def errors(self, variants: Counts) -> Array:
         """(R, V) estimated errors for some variants; NaN where no estimate exists."""
         return self.neighbour_errors.errors(self._march[self.rung[variants, None], self.neighbours[variants]])

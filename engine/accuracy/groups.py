@@ -132,12 +132,8 @@ class MarchGroup(Group):
         return self.grid.model(self.numerics)
 
     @cached_property
-    def _tables(self) -> SceneTables:
-        return self.grid.tables(self.model, self.by)
-
-    @property
     def tables(self) -> SceneTables:
-        return self._tables
+        return self.grid.tables(self.model, self.by)
 
     @property
     def usual_steps(self) -> int:

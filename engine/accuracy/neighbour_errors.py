@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.reference import DOUBTED
-from engine.accuracy.results import deciding, results_of, worst_held
+from engine.accuracy.results import deciding, results_of, tolerances, worst_held
 from engine.kernels.nearest_pilots import nearest
 from results_schema.arrays import Array
 
@@ -68,7 +68,9 @@ def neighbour_errors_of(
         wanted = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
         held, wanted = (_by_rung([worst_held(e.T, part)[measured.march] for part in parts]) for e in (error, wanted))
     else:
-        held = _by_rung([np.where(_holds(part), held_margin * measured.held, 0.0) for part in parts])
+        held = _by_rung(
+            [np.where(np.isfinite(tolerances(part)).any(), held_margin * measured.held, 0.0) for part in parts]
+        )
         wanted = held
     return NeighbourErrors(error, held, wanted)
 
@@ -91,11 +93,6 @@ def _by_rung(held: Sequence[Array]) -> Array:
     """(2, columns x cuts, P) both parts of what is held; pilots without a truth say nothing."""
     found = np.stack(held)
     return np.where(found > 0.0, found, 0.0).reshape(2, -1, found.shape[-1])
-
-
-def _holds(results: tuple[Result, ...]) -> bool:
-    """Whether any of some results is held to a tolerance."""
-    return bool(np.isfinite([result.tolerance for result in results]).any())
 
 
 def _margins(measured: Measured, others: Numbers, results: int, telling: tuple[float, float]) -> tuple[Array, float]:

@@ -85,7 +85,7 @@ def compared(plan: Plan, count: int, seed: int) -> dict[str, Any]:
             own[lanes] = found.used["work"]
             apart = differences(plan.asked, grid.scene, part, found.outcome, truth.of(lanes))
             off[lanes] = worst_held(apart, results_of(plan.asked))
-    return {"own": own, "least": least, "off": off, "besides": plan.choice.work}
+    return {"own": own, "least": least, "off": off, "besides": plan.choice.measured.work}
 
 
 def _held(plan: Plan, grid: SceneGrid, values: VariantValues, numerics: Numerics, cut: int, truth: Outcome) -> Array:
