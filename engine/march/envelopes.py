@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.march.tables import SceneTables
 from engine.model.timeline import coarsened
 from engine.observation.readings import Sensor
 from engine.scene.sensors import MOST_PLACES
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from engine.model.timeline import Segment
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 MOST_READINGS = 2**21  # stations x places that one march watches in a segment, by the size of its tables
 MOST_PAIR_READINGS = 2**19  # the same of a Richardson pair, by the size of its histories

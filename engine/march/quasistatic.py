@@ -24,6 +24,7 @@ from engine.kernels.layout import (
 from engine.march.march import Marched
 from engine.model.variant_values import weights
 from engine.statics.static_response import static_readings
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from engine.model.variant_values import VariantValues
     from engine.observation.signals import Signal
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 MOST_READINGS = 2**22  # stations x signals x variants at a time

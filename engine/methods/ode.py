@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES
 from engine.march.initial_state import initial_state
@@ -22,10 +21,8 @@ from engine.march.tables import SceneTables
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Segment, build_timeline
 from engine.model.variant_values import VariantValues, lane_table, moving_mass, weight
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput, Interrupted
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 DEGREE = 7  # of the polynomials between which the track's rows are looked up
 CELL_PHASE = 0.25  # rad of the highest mode's wave that a polynomial covers: the rows are exact within 1e-13

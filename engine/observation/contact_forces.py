@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.observation.readings import Sensor
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from engine.model.timeline import Rider
     from engine.observation.readings import Channel
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.timeline import Segment, Timeline, Window
 from engine.scene.settings import Every
-
-Counts = NDArray[np.int64]
+from results_schema.arrays import Counts
 
 CYCLE_STATIONS = 200  # of a kept history over the last cycle
 WHOLE_STATIONS = 401  # of a kept history over a whole run

@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import Observation
 from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.readings import Sensor, SpotSensor, SprungSensor
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import StationPath
     from engine.model.ties import CarriageTie
 
-Array = NDArray[np.float64]
 
 Signal = Sensor | ContactForce
 

@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.variant_values import weights
 from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.readings import Sensor
 from engine.observation.signals import build_sensors
 from engine.statics.equilibrium import static_state
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.attachment import Along
     from engine.model.scene_model import SceneModel
     from engine.model.variant_values import VariantValues
     from engine.observation.contact_forces import ContactForce
-
-Array = NDArray[np.float64]
 
 
 class StaticReadings(NamedTuple):
