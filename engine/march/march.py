@@ -101,6 +101,7 @@ class March:
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
             active[: len(model.carriages)] = segment.active[: len(model.carriages)]
+            active[model.first_push :] = [segment.active[push.carriage] for push in model.pushes]
             mass = np.where(active[:, None], self.lanes.mass, 0.0)
             self._board(segment)
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)

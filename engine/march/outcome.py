@@ -274,14 +274,17 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
 
 
 def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
-    """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body; of a rate its
-    own largest; infinite where nothing is but rounding."""
+    """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body, and no less
+    than its own largest where something pushes that along its track, at which statics do not look; of a rate its own
+    largest; infinite where nothing is but rounding."""
     columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
     count = len(tables.model.study.sensor)
     for sensor, usual in zip(tables.sensors[:count], tables.static_scales, strict=False):
         static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
         own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
-        columns.append(own if sensor.offset_order else np.maximum(static, STILL * usual * weight))
+        static = np.maximum(static, STILL * usual * weight)
+        pushed = tables.model.is_pushed(sensor.body)
+        columns.append(own if sensor.offset_order else np.maximum(static, own) if pushed else static)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
     found[:, [sensor.silent(tables.model) for sensor in tables.sensors[:count]]] = np.inf
     return np.where(found > 0.0, found, np.inf)

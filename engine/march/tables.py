@@ -16,7 +16,6 @@ from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import StationPath, ways
-from engine.model.ties import Attachment
 from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import tabulate_ties
 from engine.observation import kinks
@@ -206,12 +205,7 @@ class SceneTables:
         found = []
         for sensor in self.sensors:
             body = self.model.bodies[sensor.body].modal
-            s = np.linspace(0.0, body.length, 65)
-            everywhere = StationPath(s, np.zeros_like(s), np.zeros_like(s), True)
-            reader = replace(sensor, quantity="displacement") if sensor.offset_order else sensor
-            if sensor.under is not None:
-                reader = replace(reader, under=0)
-            largest = np.abs(reader.unit_reading(self.model, (everywhere,), Attachment(1.0, sensor.body, 0))).max()
+            largest = sensor.largest_influence(self.model, np.linspace(0.0, body.length, 65))
             found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 

@@ -16,7 +16,7 @@ from engine.model.ties import Attachment
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.model.scene_model import SceneModel
+    from engine.model.scene_model import BodyPart, SceneModel
 
 Along = tuple[StationPath, ...]
 
@@ -82,9 +82,20 @@ def tie_shapes(model: SceneModel, ties: Sequence[int], along: Along) -> Array:
             if holds(attachment, along):
                 shapes = attachment.factor * rows(model, attachment, along)
                 found[:, model.bodies[attachment.body].modes, place] += shapes
-        if r >= model.first_spring and (mode := model.springs[r - model.first_spring].mode) is not None:
+        if r >= model.first_push:
+            carriage = model.pushes[r - model.first_push].carriage
+            part, way = model.bodies[model.carriages[carriage].body], along[carriage]
+            on = way.active if way.here is None else way.here[:, None]
+            found[:, part.modes, place] = np.where(on, along_shapes(part, way.s)[0], 0.0)
+        elif r >= model.first_spring and (mode := model.springs[r - model.first_spring].mode) is not None:
             found[:, mode, place] = -1.0
     return found
+
+
+def along_shapes(part: BodyPart, s: Array, highest: int = 0) -> Array:
+    """(highest + 1, S, N) motion of a body's track along itself, and its derivatives."""
+    assert part.modal.along is not None  # checked
+    return part.modal.along.derivatives(s, range(highest + 1))
 
 
 def residual(model: SceneModel, along: Along) -> Array:

@@ -5,7 +5,7 @@ A `SceneModel` is what variants share that differ only in mass, force, pace, dam
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engine.bodies.build import build_body
 from engine.model.numerics import Numerics
 from engine.model.support_reactions import Place, stand
-from engine.model.ties import CarriageTie, DamperTie, Load, SpringTie
+from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
 from engine.model.timeline import Rider
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -64,11 +64,12 @@ class SceneModel:
     springs: tuple[SpringTie, ...] = ()
     contacts: tuple[Rider, ...] = ()
     swept: tuple[str, ...] = ()
+    pushes: tuple[AlongTie, ...] = ()
 
     @property
     def ties(self) -> int:
-        """Number of ties: carriages first, then dampers, then springs."""
-        return len(self.carriages) + len(self.dampers) + len(self.springs)
+        """Number of ties: carriages first, then dampers, springs, and pushes along tracks."""
+        return self.first_push + len(self.pushes)
 
     @property
     def body_modes(self) -> int:
@@ -77,8 +78,10 @@ class SceneModel:
 
     @cached_property
     def omega(self) -> Array:
-        """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass."""
-        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(len(self.sprung))])
+        """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass and for the coordinate that stays
+        1, which is there where something pushes along its track."""
+        others = len(self.sprung) + bool(self.pushes)
+        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(others)])
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:
@@ -129,11 +132,21 @@ class SceneModel:
         """Number of the first spring among all ties."""
         return len(self.carriages) + len(self.dampers)
 
+    @property
+    def first_push(self) -> int:
+        """Number of the first push along a track among all ties, after the springs."""
+        return self.first_spring + len(self.springs)
+
     @cached_property
     def attachments(self) -> tuple[tuple[Attachment, ...], ...]:
-        """Where every tie acts on the bodies."""
+        """Where every tie acts on the bodies across their tracks."""
         ties: tuple[CarriageTie | DamperTie | SpringTie, ...] = (*self.carriages, *self.dampers, *self.springs)
-        return tuple(tie.attachments for tie in ties)
+        pushes: list[tuple[Attachment, ...]] = [() for _ in self.pushes]
+        return (*(tie.attachments for tie in ties), *pushes)
+
+    def is_pushed(self, body: int) -> bool:
+        """Whether the inertia of a carriage acts along the track of a body."""
+        return any(self.carriages[push.carriage].body == body for push in self.pushes)
 
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
@@ -213,7 +226,17 @@ def build_model(
     carried = tuple(
         support_reactions[n].carried(tie) if n in support_reactions else tie for n, tie in enumerate(carriages)
     )
-    model = SceneModel(study, numerics, tuple(parts), carried, tuple(dampers), springs, contacts, tuple(swept))
+    model = SceneModel(
+        study,
+        numerics,
+        tuple(parts),
+        carried,
+        tuple(dampers),
+        springs,
+        contacts,
+        tuple(swept),
+        tuple(_pushes(study, numerics, carriages)),
+    )
     _check_rigid_modes(model)
     return model
 
@@ -267,6 +290,20 @@ def _springs(
             damped = suspension.damping > 0.0 or f"{key}.damping" in swept
             found.append(SpringTie(number, number, tie.body, key, None, first + len(found), damped))
     return tuple(found)
+
+
+def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie]) -> Iterator[AlongTie]:
+    """The carriages whose inertia acts along their tracks, wherever any inertia does."""
+    for number, tie in enumerate(carriages):
+        if study.carriage[tie.name].pushes_along and numerics.fidelity not in ("force", "static"):
+            if tie.rider.is_jolted(alone=len(carriages) == 1):
+                raise BadInput(
+                    "this carriage changes its speed at an instant, and so would push along its track without bound",
+                    where=study.source.where(f"carriage.{tie.name}.motion"),
+                    expected="a motion without jumps of speed",
+                    remedy="turn > 0 of an out-and-back, or inertia_along = false",
+                )
+            yield AlongTie(number, numerics.fidelity != "mass-without-convective")
 
 
 def _standing(

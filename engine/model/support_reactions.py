@@ -200,9 +200,9 @@ def _check_ways(study: Study, name: str, carriage: Carriage, riders: tuple[Rider
                 expected=f"a way within 0 to {rider.length:.6g} m",
                 received=f"{low + rider.offset:.6g} to {high + rider.offset:.6g} m",
             )
-        alone = len(study.carriage) == 1  # then the scene ends where its motion does
-        jumps = [t for t in rider.speed_jumps[0] if 0.0 < t < rider.end or not (alone or t == 0.0)]
-        shocks = bool(jumps) or rider.delay > 0.0 or rider.motion.free_vibration > 0.0
+        shocks = (
+            rider.is_jolted(alone=len(study.carriage) == 1) or rider.delay > 0.0 or rider.motion.free_vibration > 0.0
+        )
         if contact.is_rigid and (not stays or shocks):
             raise BadInput(
                 "a rigid contact would meet a shock",

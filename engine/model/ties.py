@@ -122,3 +122,15 @@ class DamperTie:
     def attachments(self) -> tuple[Attachment, ...]:
         """Where its force acts."""
         return (Attachment(1.0, self.body, None, self.at),)
+
+
+@dataclass(frozen=True, eq=False)
+class AlongTie:
+    """The inertia of a carriage (its number) along its track: F = -m (s'' + D2 u), u the track's motion along itself.
+
+    What the motion prescribes, s'', is m per step squared for every lane alike: the rate at which a coordinate that
+    stays 1 enters the tie's kinematics. convected: whether D2 has its convective terms.
+    """
+
+    carriage: int
+    convected: bool

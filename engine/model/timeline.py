@@ -107,6 +107,10 @@ class Rider:
         jumps = np.array([jump for jump in found if jump[1] != 0.0]).reshape(-1, 2)
         return self.delay + jumps[:, 0] / self.pace, jumps[:, 1] * self.pace
 
+    def is_jolted(self, alone: bool) -> bool:
+        """Whether its speed jumps while anything is computed; where it is alone the scene ends with its motion."""
+        return any(0.0 < t < self.end or not (alone or t == 0.0) for t in self.speed_jumps[0])
+
     def events(self) -> Iterator[float]:
         """Scene times that must be step boundaries, in no order."""
         yield from (self.delay, self.end)

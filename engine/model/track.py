@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import FORCE, RATE, Impulse, Ties
+from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
-from engine.model.attachment import holds, residual, shape_derivatives
+from engine.model.attachment import along_shapes, holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
 
 if TYPE_CHECKING:
     from engine.kernels.layout import Alpha, Newmark
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import StationPath
-    from engine.model.ties import Attachment, SpringTie
+    from engine.model.ties import AlongTie, Attachment, SpringTie
     from engine.model.timeline import Segment
 
 Array = NDArray[np.float64]
@@ -50,22 +50,35 @@ def tabulate_ties(
             rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
         if along[spring.rider].active:
             drive[:, r], level[:, r] = _sag_under(model, spring, model.attachments[r][0], along)
+    for r, push in enumerate(model.pushes, start=model.first_push):
+        if along[push.carriage].active:
+            _add_push(rows, model, r, push, along[push.carriage])
     inertial, springs = _kinds(model)
     close_rows(rows, inertial, scheme.beta, scheme.gamma, reaches)
     damped = [False] * len(model.carriages) + [True for _ in model.dampers] + [s.damped for s in model.springs]
-    moves = inertial | np.array(damped, dtype=np.bool_)
+    moves = inertial | np.array([*damped, *(False for _ in model.pushes)], dtype=np.bool_)
     prescribed, reactive = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
-    unity[model.first_spring :] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
+    unity[model.first_spring : model.first_push] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
     missed = residual(model, along) if missed is None else missed
     return Ties(rows, drive, level, reactive, prescribed, moves, springs, missed, unity, reaches)
+
+
+def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: StationPath) -> None:
+    """Rows of a push along the track: those of a mass, by the track's motion along itself, and what is prescribed."""
+    part, stations = model.bodies[model.carriages[push.carriage].body], way.s.size
+    motion = np.stack([np.zeros(stations), 2.0 * way.ds, way.dds, way.ds**2]) if push.convected else np.zeros((4, 0))
+    add_attachment(rows, r, part.modes.start, 1.0, along_shapes(part, way.s, 2 * push.convected), motion)
+    rows[:, -1, r, CURVE] = way.dds
 
 
 def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Per tie, whether its acceleration enters its force, and whether its gap does."""
     inertial = [carriage.inertia != "force" for carriage in model.carriages]
     inertial += [False for _ in model.dampers] + [spring.rigid for spring in model.springs]
+    inertial += [True for _ in model.pushes]
     springs = [False] * model.first_spring + [not spring.rigid for spring in model.springs]
+    springs += [False for _ in model.pushes]
     return np.array(inertial, dtype=np.bool_), np.array(springs, dtype=np.bool_)
 
 
@@ -154,6 +167,11 @@ def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: 
             shape[r, part.modes] = part.modal.shape(place)[0]
             slope[r, part.modes] = part.modal.shape(place, 1)[0]
             sag_slope[r] = model.sag(carriage.body, place, 1)[0]
+    for r, push in enumerate(model.pushes, start=model.first_push):
+        if segment.active[push.carriage]:
+            rider, part = model.riders[push.carriage], model.bodies[model.carriages[push.carriage].body]
+            place = np.clip(rider.path(at, segment.start, segment.end).S, 0.0, rider.length)
+            shape[r, part.modes], slope[r, part.modes] = along_shapes(part, place, 1)[:, 0]
     for strike in segment.strikes:
         if strike.rider >= len(model.carriages):  # a contact on a spring meets no shock
             continue
@@ -161,4 +179,7 @@ def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: 
         arrives[strike.rider] = float(strike.arrives and inertia != "force")
         if inertia == "mass":
             speed[:, strike.rider] = strike.speed / time_scale
+        for r, push in enumerate(model.pushes, start=model.first_push):
+            if push.carriage == strike.rider:
+                arrives[r], speed[:, r] = 1.0, push.convected * strike.speed / time_scale
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)

@@ -229,19 +229,21 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
     rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
     coefficients = [*map(values.damping, model.dampers), *map(values.damping, model.springs)]
+    pushes, alongside = [none] * len(model.pushes), [moving_mass(model, values, p.carriage) for p in model.pushes]
     stiffness = [none if spring.rigid else values.stiffness(spring) for spring in model.springs]
-    ones = np.ones((model.body_modes, values.size))
+    ones, others = np.ones((model.body_modes, values.size)), model.omega.size - model.body_modes
+    constant = others - len(model.sprung)
     return LaneTable(
         omega=model.omega,
-        rates=to_blocks(np.concatenate([*rates, np.zeros((len(model.sprung), values.size))])),
+        rates=to_blocks(np.concatenate([*rates, np.zeros((others, values.size))])),
         inverse_modal_mass=to_blocks(
-            np.concatenate([ones, *(1.0 / values.sprung_mass(s)[None] for s in model.sprung)])
+            np.concatenate([ones, *(1.0 / values.sprung_mass(s)[None] for s in model.sprung), ones[:constant]])
         ),
-        mass=to_blocks(np.stack(masses + dampers + springs)),
-        joint=to_blocks(np.stack(carriages + dampers + rigid)),
-        weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs])),
-        damper=to_blocks(np.stack(carriages + coefficients)),
-        spring=to_blocks(np.stack(carriages + dampers + stiffness)),
+        mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
+        joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),
+        weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs, *pushes])),
+        damper=to_blocks(np.stack(carriages + coefficients + pushes)),
+        spring=to_blocks(np.stack(carriages + dampers + stiffness + pushes)),
         time_scale=to_blocks(values.scene_time_scale),
         gravity=to_blocks(values.gravity),
     )

@@ -8,21 +8,21 @@ Velocity and acceleration are those of the kept modes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.attachment import holds, place
+from engine.model.attachment import along_shapes, holds, place
 from engine.model.attachment import rows as shape_rows
+from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
 from results_schema.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
     from engine.model.scene_model import BodyPart, SceneModel
-    from engine.model.station_path import StationPath
     from results_schema.quantities import Quantity
 
 Array = NDArray[np.float64]
@@ -137,6 +137,14 @@ class Sensor:
         here, *elsewhere = np.abs(rows).max(axis=1)
         return bool(here <= SILENT * max(elsewhere))
 
+    def largest_influence(self, model: SceneModel, places: Array) -> float:
+        """Its largest static reading per unit force at places of its body's track; of a rate, of the displacement."""
+        reader = replace(self, quantity="displacement") if self.offset_order else self
+        if self.under is not None:
+            reader = replace(reader, under=0)
+        everywhere = StationPath(places, np.zeros_like(places), np.zeros_like(places), True)
+        return float(np.abs(reader.unit_reading(model, (everywhere,), Attachment(1.0, self.body, 0))).max())
+
     def rides(self, model: SceneModel) -> int | None:
         """The rider that it moves with."""
         return self.under
@@ -234,10 +242,18 @@ class SpotSensor(Sensor):
 
     def silent(self, model: SceneModel) -> bool:
         """Whether no load on the track moves it, nor its body as a rigid one."""
-        modal, gauge = self._modal(model), self._gauge(model)
+        modal = self._modal(model)
         places = np.linspace(0.0, modal.length, PLACES)
-        felt = np.abs([*gauge.along(places), *gauge.points.values()]).max()
-        return bool(not modal.rigid_modes and felt <= SILENT * np.abs(modal.influence_at(places, places)).max())
+        usual = np.abs(modal.influence_at(places, places)).max()
+        return bool(not modal.rigid_modes and self.largest_influence(model, places) <= SILENT * usual)
+
+    def largest_influence(self, model: SceneModel, places: Array) -> float:
+        modal, gauge = self._modal(model), self._gauge(model)
+        found = np.abs([*gauge.along(places), *gauge.points.values()]).max()
+        if not model.is_pushed(self.body):
+            return float(found)
+        pushed = along_shapes(model.bodies[self.body], places)[0] * modal.modal_flexibility @ gauge.row
+        return float(max(found, np.abs(pushed).max()))
 
     def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
         return self._gauge(model).influence(loaded)

@@ -70,6 +70,11 @@ class Carriage(Spec):
         return None
 
     @property
+    def pushes_along(self) -> bool:
+        """Whether its inertia acts along its track too."""
+        return False
+
+    @property
     def riding_body(self) -> str | None:
         """Name of the body that rides."""
         return None
@@ -139,18 +144,24 @@ class ForceCarriage(Carriage):
 
 
 class MassCarriage(Carriage):
-    """A rigid mass in kg that stays in contact; its weight acts."""
+    """A rigid mass in kg that stays in contact; its weight acts. inertia_along: the mass also pushes along its track,
+    by -m (s'' + u''), u the motion of the track along itself."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass",)
     touching: ClassVar[tuple[str, ...]] = ("mass",)
 
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
+    inertia_along: bool = False
+
+    @property
+    def pushes_along(self) -> bool:
+        return self.inertia_along
 
 
 class OscillatorCarriage(Carriage):
     """A sprung mass (kg) on a spring (N/m) and a damper (N s/m) over a wheel (kg) that stays in contact; the weights of
-    both masses act."""
+    both masses act. inertia_along: as that of a mass, of both."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
     touching: ClassVar[tuple[str, ...]] = ("wheel_mass",)
@@ -160,6 +171,11 @@ class OscillatorCarriage(Carriage):
     wheel_mass: Mass = Field(default=0.0, ge=0)
     stiffness: Stiffness = Field(gt=0)
     damping: Damping = Field(default=0.0, ge=0)
+    inertia_along: bool = False
+
+    @property
+    def pushes_along(self) -> bool:
+        return self.inertia_along
 
     @property
     def suspension(self) -> Suspension:

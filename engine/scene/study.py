@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
-from engine.bodies.modal.description import Recorded, Spot, Spots
-from engine.scene.carriages import AnyCarriage
+from engine.bodies.modal.description import Recorded, Spots
+from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.study_file.checks import Check, on_body
@@ -295,29 +296,41 @@ def _check_names(study: Study) -> None:
 def _check_references(study: Study) -> None:
     """Every name that is mentioned exists, and sensors suit their bodies."""
     for name, carriage in study.carriage.items():
-        _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
-        for word, contact in carriage.riding_contacts.items():
-            _must_exist(study, f"carriage.{name}.contacts.{word}.on", contact.on or carriage.on, "body")
-        if carriage.riding_body is not None:
-            _check_rider(study, name, carriage.riding_body)
+        _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():
-        here = f"sensor.{name}"
-        if sensor.rides is not None:
-            _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
-        if sensor.carriage is not None:
-            _check_of_carriage(study, here, sensor)
-        if sensor.body is not None:
-            _must_exist(study, f"{here}.body", sensor.body, "body")
-        body = study.body_of(name)
-        if sensor.body not in (None, body):
-            where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
-            raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
-        _check_quantity(study, here, body, sensor.quantity)
-        if sensor.spot is not None:
-            _check_spot(study, here, body, sensor.spot)
+        _check_sensor(study, name, sensor)
     for name, envelope in study.envelope.items():
         _must_exist(study, f"envelope.{name}.body", envelope.body, "body")
         _check_quantity(study, f"envelope.{name}", envelope.body, envelope.quantity)
+
+
+def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
+    _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
+    for word, contact in carriage.riding_contacts.items():
+        _must_exist(study, f"carriage.{name}.contacts.{word}.on", contact.on or carriage.on, "body")
+    if carriage.riding_body is not None:
+        _check_rider(study, name, carriage.riding_body)
+    if carriage.pushes_along:
+        with _within(study, f"carriage.{name}"):
+            _check_along(study, carriage)
+
+
+def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
+    here = f"sensor.{name}"
+    if sensor.rides is not None:
+        _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
+    if sensor.carriage is not None:
+        _check_of_carriage(study, here, sensor)
+    if sensor.body is not None:
+        _must_exist(study, f"{here}.body", sensor.body, "body")
+    body = study.body_of(name)
+    if sensor.body not in (None, body):
+        where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
+        raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
+    _check_quantity(study, here, body, sensor.quantity)
+    if sensor.spot is not None:
+        with _within(study, here):
+            study.body[body].check_spot(sensor.spot)
 
 
 def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
@@ -335,15 +348,26 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
         raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
 
 
-def _check_spot(study: Study, here: str, body: str, spot: Spot) -> None:
-    """A body has the place off its track that a sensor reads."""
+@contextmanager
+def _within(study: Study, here: str) -> Iterator[None]:
+    """Refusals of bodies name a key of the table `here`."""
     try:
-        study.body[body].check_spot(spot)
+        yield
     except BadInput as error:
         where = study.source.where(f"{here}.{error.where}")
         raise BadInput(
             error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
         ) from None
+
+
+def _check_along(study: Study, carriage: Carriage) -> None:
+    """The inertia of a carriage can act along its track."""
+    if any(other.riding_body == carriage.on for other in study.carriage.values()):
+        what = "the body below rides too: its own motion holds it along"
+        raise BadInput(
+            what, where="inertia_along", expected="a body that does not ride", remedy="inertia_along = false"
+        )
+    study.body[carriage.on].check_along()
 
 
 def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:

@@ -119,7 +119,8 @@ def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     """The matrices of all variants at all stations."""
     lanes = lane_table(model, values.padded)
     masses = [number for number, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
-    ties = np.array([*masses, *range(model.first_spring, model.ties)], dtype=np.int64)
+    masses += range(model.first_push, model.ties)
+    ties = np.array([*masses, *range(model.first_spring, model.first_push)], dtype=np.int64)
     on_track = from_blocks(lanes.mass, values.size)[masses]
     least = MASSLESS * model.leading_body.modal.mass
     mass = np.concatenate([1.0 / from_blocks(lanes.inverse_modal_mass, values.size), np.maximum(on_track, least)])

@@ -58,25 +58,24 @@ def static_state(model: SceneModel, along: Along) -> StaticState:
     if not model.springs:
         return StaticState(weights, loose, np.zeros((1, len(loose), count + 1)))
     stations, first = along[0].s.size, model.first_spring
-    held, pushed = (
-        np.swapaxes(tie_shapes(model, ties, along)[:, loose], 1, 2) for ties in (range(first, model.ties), range(count))
-    )
+    springs, numbers = slice(first, model.first_push), (range(first, model.first_push), range(count))
+    held, pushed = (np.swapaxes(tie_shapes(model, ties, along)[:, loose], 1, 2) for ties in numbers)
     soft = flexibility(model, along)
     gap = np.zeros((stations, len(model.springs), count + 1))
-    gap[:, :, :count] = soft[:, first:, :count]
+    gap[:, :, :count] = soft[:, springs, :count]
     gap[:, :, count] = _level(model, along)
     own = np.array([0.0 if s.rigid else 1.0 / model.study.value(f"{s.key}.stiffness") for s in model.springs])
-    matrix = soft[:, first:, first:] + np.diag(own)
+    matrix = soft[:, springs, springs] + np.diag(own)
     force, coordinate = _solved(matrix, held, gap, pushed)
     whole = np.repeat(weights, stations, axis=0)
-    whole[:, first:] = force
+    whole[:, springs] = force
     return StaticState(whole, loose, coordinate)
 
 
 def flexibility(model: SceneModel, along: Along) -> Array:
     """(S, ties, ties) elastic flexibility between ties as the march has it, m/N; rows of springs only."""
     found = np.zeros((along[0].s.size, model.ties, model.ties))
-    for r in range(model.first_spring, model.ties):
+    for r in range(model.first_spring, model.first_push):
         for s in range(model.ties):
             for one, other in shared(model, r, s, along):
                 found[:, r, s] += modal_flexibility_between(model, one, other, along)

@@ -26,7 +26,7 @@ from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.rigid.rigid import Rigid
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
-from engine.unreduced.track import FrameTrack, Rows, no_rows, rows_of
+from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, rows_of
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -86,7 +86,8 @@ class FullBody:
     """A body with all its n degrees of freedom.
 
     rigid (n, r): rigid-body motions of unit mass; pull (n,): own weight per unit gravity; flexibility: the elastic
-    answer to loads, None where nothing bends; points: rows (n,) by name; gauges: by the names of sensors;
+    answer to loads, None where nothing bends; points: rows (n,) by name; along: its track along itself, where
+    it moves so; gauges: by the names of sensors;
     gravity_share: of gravity along the track's direction.
     """
 
@@ -100,6 +101,7 @@ class FullBody:
     flexibility: Flexibility | None
     track: FrameTrack | RigidTrack
     points: dict[str, Array]
+    along: AlongTrack | None = None
     gauges: Mapping[str, FullGauge] = field(default_factory=dict)
     gravity_share: float = 1.0
 
@@ -226,6 +228,7 @@ def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> Fu
         flexibility=flexibility,
         track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
         points={word: loads[:, number] for word, number in numbers.items()},
+        along=AlongTrack.of(track, ends, assembly),
         gauges={sensor: _gauge(place, loads, numbers) for sensor, place in spots},
         gravity_share=float(track.direction @ gravity),
     )

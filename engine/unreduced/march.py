@@ -162,6 +162,7 @@ def _relations(model: Unreduced, along: Along, step: float) -> _Relations:
         other_u=k,
         own=own,
         wanted=np.where(mass & on, m * model.study.gravity, 0.0)
+        - np.where((link == "push") & on, m * along.dds[:, rider], 0.0)
         + np.where(link == "force", np.array([tie.force for tie in model.ties]), 0.0) * on,
     )
 

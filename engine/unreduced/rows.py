@@ -67,10 +67,13 @@ def nowhere(model: Unreduced) -> Along:
 
 
 def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
-    """(S, T, 12) d^j/ds^j of the deflection under every tie, zero where it is off the body."""
+    """(S, T, 12) d^j/ds^j of the deflection under every tie (of a push the track's motion along itself), zero where it
+    is off the body."""
     index, values = [np.zeros((len(along.s), 0, WIDTH), dtype=np.int64)], [np.zeros((len(along.s), 0, WIDTH))]
     for tie in model.ties:
-        rows = model.bodies[tie.body].track.rows(along.s[:, tie.rider], derivative)
+        body = model.bodies[tie.body]
+        track = body.along if tie.link == "push" and body.along is not None else body.track
+        rows = track.rows(along.s[:, tie.rider], derivative)
         index.append((rows.freedoms + model.firsts[tie.body])[:, None])
         values.append((rows.values * along.on[:, tie.rider, None])[:, None])
     return Rows(np.concatenate(index, axis=1), np.concatenate(values, axis=1))
@@ -120,10 +123,10 @@ def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
 
 
 def _together(model: Unreduced) -> Iterator[tuple[int, int]]:
-    """Pairs of a tie whose force is not given and a tie on the same body."""
+    """Pairs of a tie whose force is not given and a tie on the same body, both across its track."""
     for i, one in enumerate(model.ties):
         for j, other in enumerate(model.ties):
-            if one.link != "force" and one.body == other.body:
+            if one.link not in ("force", "push") and other.link != "push" and one.body == other.body:
                 yield i, j
 
 
@@ -166,7 +169,7 @@ def rider_of(model: Unreduced, sensor: Sensor) -> int | None:
 def _counts(tie: Tie, sensor: Sensor) -> float:
     """Part of a tie's force in a contact force: of a carriage altogether, or at one of its contacts."""
     wanted = sensor.carriage if sensor.contact is None else f"{sensor.carriage}_{sensor.contact}"
-    return float(wanted == (tie.carriage if sensor.contact is None else tie.name))
+    return float(tie.link != "push" and wanted == (tie.carriage if sensor.contact is None else tie.name))
 
 
 class _Parts(NamedTuple):
@@ -262,7 +265,7 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
         return track.within(place, s, sensor.quantity)
 
     for j, tie in enumerate(model.ties):
-        if tie.body == body:
+        if tie.body == body and tie.link != "push":
             forces[:, j] += np.where(along.on[:, tie.rider], adds(along.s[:, tie.rider]), 0.0)
         if tie.rides == body and tie.at is not None:
             forces[:, j] -= adds(np.full(len(place), tie.at))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 Array = NDArray[np.float64]
-Link = Literal["force", "mass", "spring", "rigid"]
+Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass along its track
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,6 +263,8 @@ class _Scene:
             mass[self.sprung[name]] = -1.0
             k, c = suspension.stiffness, suspension.damping
             yield Tie(name, name, "spring", number, carriage.on, mass, stiffness=k, damping=c)
+        if carriage.pushes_along:
+            yield Tie(name, name, "push", number, carriage.on, none, mass=carriage.moving_mass)
 
     def _contact(self, rider: int, name: str, word: str, contact: Contact) -> Tie:
         carriage = self.study.carriage[name]

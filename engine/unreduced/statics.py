@@ -209,7 +209,7 @@ def _given(model: Unreduced, along: Along) -> Array:
     """(S, T) N: forces of the ties that are known at rest: forces and weights of masses in contact."""
     found = np.zeros((len(along.s), len(model.ties)))
     for j, tie in enumerate(model.ties):
-        load = tie.force if tie.link == "force" else tie.mass * model.study.gravity
+        load = tie.force if tie.link == "force" else tie.mass * model.study.gravity * (tie.link == "mass")
         found[:, j] = load * along.on[:, tie.rider]
     return found
 
@@ -242,7 +242,7 @@ def _mass_with_carriages(model: Unreduced, along: Along) -> Any:
     found = model.mass
     rows = tie_rows(model, along)
     for j, tie in enumerate(model.ties):
-        if tie.link == "mass" and along.on[0, tie.rider]:
+        if tie.link in ("mass", "push") and along.on[0, tie.rider]:
             row = csc_array(Rows(rows.freedoms[:, j], rows.values[:, j]).columns(model.size))
             found = found + tie.mass * (row @ row.T)
     return csc_array(found)

@@ -6,7 +6,7 @@ numbers, and bends the element between its ends besides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +56,30 @@ def rows_of(row: Array) -> Rows:
     entries = np.flatnonzero(row)
     found.freedoms[0, : len(entries)], found.values[0, : len(entries)] = entries, row[entries]
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class AlongTrack:
+    """The motion of a frame's track along itself: that of its axis, less what the axis' slope takes from a line beside
+    it by a lever (m)."""
+
+    axis: FrameTrack
+    beside: FrameTrack
+    lever: float
+
+    @classmethod
+    def of(cls, track: TrackBeams, ends: TrackPoints, assembly: Assembly) -> AlongTrack:
+        """The same of a track in an assembly's numbers of degrees of freedom."""
+        lever, none = float(np.linalg.norm(track.offset)), np.zeros(3)
+        sideways = track.offset / lever if lever else track.direction
+        lines = (replace(track, direction=way, offset=none) for way in (track.axes[0, 0], sideways))
+        axis, beside = (FrameTrack.of(line, ends, assembly, np.zeros_like(track.axes[:, 0])) for line in lines)
+        return cls(axis, beside, lever)
+
+    def rows(self, s: Array, derivative: int = 0) -> Rows:
+        """d^j/ds^j of it, j up to 2."""
+        axis, beside = self.axis.rows(s, derivative), self.beside.rows(s, derivative + 1)
+        return Rows(axis.freedoms, axis.values - self.lever * beside.values)
 
 
 @dataclass(frozen=True, eq=False)

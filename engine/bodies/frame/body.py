@@ -14,7 +14,7 @@ from engine.bodies.frame.gauges import Read, frame_gauge
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.points import frame_points, point_loads
 from engine.bodies.frame.sections import TrackSections
-from engine.bodies.frame.shapes import mode_forces, track_shapes
+from engine.bodies.frame.shapes import along_shapes, mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics, track_statics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
@@ -101,6 +101,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         gravity_share=float(track.direction @ gravity),
         sections=sections,
         points=points,
+        along=along_shapes(track, moved, forces),
         gauges={name: frame_gauge(read, spot, loads) for name, spot in spots},
     )
 

@@ -13,9 +13,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
-from engine.bodies.frame.geometry import DIRECTIONS, TrackLine
+from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
-from engine.bodies.modal.description import Body, Spot, Spots
+from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
@@ -244,6 +244,9 @@ class Frame(Body):
 
     def check_spot(self, spot: Spot) -> None:
         check_spot(self, spot)
+
+    def check_along(self) -> None:
+        check_level(self.line.tangent, self.line.direction, unit(self.gravity))
 
     def place(self, node: str) -> Three:
         """Coordinates of a node, m; in a plane frame two may be given."""

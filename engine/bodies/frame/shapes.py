@@ -10,7 +10,7 @@ A concentrated force at a node bends the line of twist, extension and shear ther
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -119,6 +119,35 @@ def track_shapes(track: TrackBeams, moved: Array, forces: ModeForces) -> TrackSh
     bending_y, bending_z = (bending[:, None, None] for bending in (track.beams.bending_y, track.beams.bending_z))
     curvatures += across_y * forces.forces[:, :, 5] / bending_y - across_z * forces.forces[:, :, 4] / bending_z
     return TrackShapes(track.places, values, slopes, curvatures)
+
+
+@dataclass(frozen=True, eq=False)
+class AlongShapes:
+    """Motion of a track along itself: that of its axis, less what the axis' slope takes from a line beside it.
+
+    lever: m, by which the track is off its axis; beside: the axis' deflections that way, None on the axis.
+    """
+
+    axis: TrackShapes
+    lever: float = 0.0
+    beside: TrackShapes | None = None
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j psi_k/ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N)."""
+        found = self.axis.derivatives(s, orders)
+        if self.beside is None:
+            return found
+        return np.asarray(found - self.lever * self.beside.derivatives(s, [order + 1 for order in orders]))
+
+
+def along_shapes(track: TrackBeams, moved: Array, forces: ModeForces) -> AlongShapes:
+    """The same from displacements and rotations (E + 1, 6, N) of the track's points and the modes' section forces."""
+    on_axis, lever = np.zeros(3), float(np.linalg.norm(track.offset))
+    axis = track_shapes(replace(track, direction=track.axes[0, 0], offset=on_axis), moved, forces)
+    if lever == 0.0:
+        return AlongShapes(axis)
+    beside = replace(track, direction=track.offset / lever, offset=on_axis)
+    return AlongShapes(axis, lever, track_shapes(beside, moved, forces))
 
 
 def _strains(track: TrackBeams, forces: Array) -> Array:

@@ -13,7 +13,7 @@ from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.checks import findings
 from engine.bodies.imported.line import LineShapes, LineStatics, LineStress, NoSections
 from engine.bodies.imported.model import HeldModel, held_model
-from engine.bodies.imported.rows import node_rows, track_rows
+from engine.bodies.imported.rows import node_rows, spline_slopes, track_rows
 from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility, solving
 from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, held_weight
@@ -92,9 +92,18 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
         sections=sections,
         points=_points(names, held, (statics, sections, stresses), parts) if names else None,
         gauges={name: _gauge(held, statics, load, parts, names) for name, load in read},
+        along=LineShapes(places, _along_ends(body, held, shapes)),
         checks=findings(body, held, along),
     )
     return found, statics
+
+
+def _along_ends(body: Imported, held: HeldModel, shapes: Array) -> Array:
+    """(2 P, N) motion of the track's nodes along it, and its slopes by the smooth curve through them."""
+    found = np.zeros((2 * len(body.line.nodes), shapes.shape[1]))
+    found[::2] = node_rows(held, body.line.nodes, body.line.tangent, 0).T @ shapes
+    found[1::2] = spline_slopes(body.line.places) @ found[::2]
+    return found
 
 
 def _modes(body: Imported, held: HeldModel) -> tuple[Array, Array]:

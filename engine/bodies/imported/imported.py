@@ -18,7 +18,7 @@ from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
 from engine.bodies.frame.frame import Place, Support, Vector
 from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
-from engine.bodies.modal.description import Body, Spot, Spots, check_spot_name
+from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import shortened
@@ -190,6 +190,10 @@ class Imported(Body):
         if not any(way[axis] and free[axis] and DIRECTIONS[axis] not in held for axis in range(3)):
             what = f"node {spot.node} does not move in this direction"
             raise BadInput(what, where="direction", expected="a direction that is not held", remedy="node elsewhere")
+
+    def check_along(self) -> None:
+        if self.recorded is None:
+            check_level(self.line.tangent, unit(self.direction), unit(self.gravity_direction))
 
     def _check_track_rows(self) -> None:
         """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""

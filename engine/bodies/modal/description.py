@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr, Strict, Tag
 
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside, shortened
 from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form, nearest
 from engine.study_file.units import Dimensionless, Rate, Time
 from results_schema.errors import BadInput
 
+LEVEL = 1e-6  # cosine of the angle above which a vector has a part along the track
 MAX_MODES = 64
 AUTO_MODES = 12
 
@@ -52,6 +53,13 @@ class Spot:
 
 
 Spots = tuple[tuple[str, Spot], ...]  # by the names of sensors
+
+
+def check_level(tangent: Array, direction: Array, gravity: Array) -> None:
+    """Raise BadInput for a track whose loads or whose gravity act along it too; unit vectors (3,)."""
+    for vector, what in ((gravity, "this track rises"), (direction, "the loads of this track act along it too")):
+        if abs(float(tangent @ vector)) > LEVEL:
+            raise BadInput(what, where="inertia_along", expected="a level track with loads square to it")
 
 
 def check_spot_name(key: str, name: object, names: Iterable[str]) -> None:
@@ -145,6 +153,11 @@ class Body(Spec):
     def springs(self) -> tuple[Any, ...]:
         """The springs on which a uniform beam stands instead, each with `at`, `stiffness` and `rotational`."""
         return ()
+
+    def check_along(self) -> None:
+        """Raise BadInput where the inertia of what rides cannot act along the track."""
+        what, expected = "this body does not move along its own track", "a frame, or a body out of finite-element files"
+        raise BadInput(what, where="inertia_along", expected=expected, remedy="inertia_along = false")
 
     @property
     def lacks_for_stress(self) -> str:

@@ -159,6 +159,7 @@ class ModalBody:
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
     points              places off the track; None: there are none
     gauges              places that sensors read off the track, by the sensors' names
+    along               motion of the track along itself, as `shapes`; None: it has none
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     """
@@ -178,6 +179,7 @@ class ModalBody:
     sections: Sections | None = None
     points: Points | None = None
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
+    along: Shapes | None = None
     checks: tuple[tuple[str, str], ...] = ()
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
