@@ -1,4 +1,4 @@
-"""The command `wanderlast`: what it understands. The work is done elsewhere, and imported only when it is asked for."""
+"""The command `wanderlast`: what it understands. What does the work is imported only when it is asked for."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from results_schema.errors import ArchiveError, BadInput
 from studies.commands import error_exit as trouble
 from studies.protocol import stopping
+from studies.results.formatting import counted
+
+if TYPE_CHECKING:
+    from studies.protocol.options import RunOptions
+    from studies.runs.runner import Outcome
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 _FILE = click.Path(path_type=Path)
@@ -43,18 +49,28 @@ def init(kind: str, file: Path | None) -> None:
 
     FILE is KIND.toml unless given.
     """
-    from studies.commands import actions
+    from results_schema.store import files
+    from studies.commands import catalogue, console
 
-    actions.init(kind, file)
+    text, path = catalogue.start_text(kind), file or Path(f"{kind}.toml")
+    files.check_output_place(path)
+    if path.exists():
+        raise BadInput("there is a file already", where=str(path), remedy="choose another name or remove it")
+    files.write_text(path, text)
+    console.say(f"wrote {path}; next: wanderlast check {path}")
 
 
 @commands.command()
 @click.argument("study")
 def check(study: str) -> None:
     """Validate STUDY and explain what a run would do."""
-    from studies.commands import actions
+    import engine
+    from studies.commands import catalogue, console
+    from studies.commands.preview import preview
+    from studies.protocol.study import kind_of
 
-    actions.check(study)
+    loaded = engine.load(catalogue.find_study(study))
+    console.show_preview(preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0))))
 
 
 @commands.command()
@@ -70,14 +86,14 @@ def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
     With a progress bar, and a summary at the end. Started again after any interruption it goes on from what is
     finished.
     """
-    from studies.commands import actions, console
+    from studies.commands import console
     from studies.findings import numerics_used as choices
     from studies.protocol.options import RunOptions
     from studies.reporting import summary
     from studies.results.results import Results
 
-    outcome = actions.run(study, archive, RunOptions(**how))
-    code = actions.exit_code(outcome)
+    outcome = _run(study, archive, RunOptions(**how))
+    code = summary.exit_code(outcome)
     if as_json:
         chosen = choices.as_json(Results.of(outcome.results))
         console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
@@ -95,9 +111,12 @@ def report(archive: Path, folder: Path | None) -> None:
 
     One self-contained HTML page, and the figures as SVG and PNG beside it.
     """
-    from studies.commands import actions
+    _refuse_unfinished(archive)
+    from studies.commands import console
+    from studies.reporting.report import write_report
 
-    actions.report(archive, folder)
+    page = write_report(archive, folder or Path(f"{archive.name.removesuffix('.nc')}-report"))
+    console.say(f"wrote {page}")
 
 
 @commands.command()
@@ -107,17 +126,23 @@ def info(archive: Path) -> None:
 
     Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
     """
-    from studies.commands import actions
+    _refuse_unfinished(archive)
+    from results_schema.store.archive import describe
+    from studies.commands import console
 
-    actions.info(archive)
+    found = describe(archive)
+    console.show_archive(found)
+    if not found.whole:
+        raise ArchiveError(found.damage)
 
 
 @commands.command(name="list")
 def list_() -> None:
     """List the built-in studies and the kinds of study."""
-    from studies.commands import actions
+    from studies.commands import catalogue, console
+    from studies.protocol.study import kind_named, kind_names
 
-    actions.list_studies()
+    console.show_studies(catalogue.entries(), [(kind, kind_named(kind).summary) for kind in kind_names()])
 
 
 @commands.command()
@@ -130,14 +155,45 @@ def list_() -> None:
 @_JSON
 def bench(threads: int | None, as_json: bool, **scene: Any) -> None:
     """Measure the pace of the march on this machine."""
-    from studies.commands import actions, console
-    from studies.commands.bench import Scene
+    from studies.commands import console
+    from studies.commands.bench import Scene, measure
 
-    found = actions.bench(Scene(**scene), threads)
+    found = measure(Scene(**scene), threads)
     if as_json:
         console.say_json(found.as_json())
     else:
         console.show_throughput(found)
+
+
+def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
+    """Run a study to its archive, with a progress bar; signals stop it with finished work kept."""
+    with stopping.stop_on_signals() as stop:
+        import engine
+        from studies.commands import catalogue, console
+        from studies.runs.runner import run_to_archive
+
+        path = catalogue.find_study(study)
+        loaded = engine.load(path)
+        with console.progress_bar(path.stem) as progress:
+            return run_to_archive(loaded, archive or Path(f"{path.stem}.nc"), options, progress=progress, stop=stop)
+
+
+def _refuse_unfinished(archive: Path) -> None:
+    """Tell of an unfinished run where its archive is not there yet. Raises BadInput."""
+    from results_schema.store.parts import finished_so_far
+
+    if archive.exists() or (parts := finished_so_far(archive)) is None:
+        return
+    variants = {int(number) for part in parts for number in part}
+    pieces = sum(part.size == 0 for part in parts)
+    so_far = counted(pieces, "finished piece") if pieces else f"parts with {counted(len(variants), 'finished variant')}"
+    raise BadInput(
+        "not there yet; an unfinished run of it is",
+        where=str(archive),
+        expected="a finished archive",
+        received=so_far,
+        remedy=f"wait for the run if one is at work, or go on from there: wanderlast run STUDY -o {archive}",
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from studies.results.results import Results
     from studies.runs.runner import Outcome
 
+SOME_NOT_OK = 3
 _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 
@@ -72,6 +73,19 @@ def counts(results: xr.Dataset) -> dict[str, int]:
 def all_ok(results: xr.Dataset) -> bool:
     """Whether every variant's status is ok."""
     return bool((results["status"].values == Status.OK).all())
+
+
+def exit_code(outcome: Outcome) -> int:
+    """Exit code of a finished run: 3 where some variants are not ok, or an audit found the tolerance missed.
+
+    A study that measures asks where methods fail: a method that diverges is its answer, and nothing that a script has
+    to look after. So it ends with 0.
+    """
+    from studies.runs.audit import Verdict
+
+    if outcome.audit is not None and not Verdict.of(outcome.audit).held:
+        return SOME_NOT_OK
+    return 0 if is_measured(outcome.results) or all_ok(outcome.results) else SOME_NOT_OK
 
 
 def ranges(study_results: Results) -> Iterator[Range]:

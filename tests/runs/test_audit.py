@@ -15,9 +15,9 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.store.archive import open_archive
 from results_schema.validate import validate
-from studies.commands.actions import exit_code
 from studies.commands.cli import main
 from studies.protocol.parts import Work
+from studies.reporting.summary import exit_code
 from studies.results.results import Results
 from studies.runs.audit import (
     GROUP,
