@@ -13,7 +13,17 @@ from matplotlib.figure import Figure as Drawing
 from studies.findings import theory
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, logarithmic, shades
-from studies.pictures.common.sweep_view import MASSES, SPEEDS, View, along_axis, depends_on, draw_curves, draw_map, view
+from studies.pictures.common.sweep_view import (
+    MASSES,
+    SPEEDS,
+    View,
+    along_axis,
+    along_x,
+    along_y,
+    draw_curves,
+    draw_map,
+    view,
+)
 from studies.pictures.common.traces import picked
 from studies.results.formatting import scale_for
 from studies.results.results import Index, Results, chosen
@@ -106,16 +116,11 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
 
 
 def _ratio(seen: View) -> tuple[Any, str]:
-    """What stands on the horizontal axis: the frequency ratio where it follows from that axis alone."""
-    ratio = theory.frequency_ratio(seen.results)
-    if depends_on(seen, ratio, seen.x):
-        return ratio, "frequency ratio Ω/ω₁"
-    assert seen.x is not None
-    return None, seen.x.title
+    return along_x(seen, theory.frequency_ratio(seen.results), "frequency ratio Ω/ω₁")
 
 
 def _map(seen: View, sensor: str) -> Figure:
-    ways = _ways(seen)
+    ways = _ratio(seen)[0], along_y(seen)[0]
     lines = ways[0] is not None and _held_mass(seen, ways[1]) is not None
     caption = seen.caption(
         "Number of peaks in the last cycle.",
@@ -127,20 +132,13 @@ def _map(seen: View, sensor: str) -> Figure:
     return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 3.4, partial(_draw_map, seen, sensor, ways))
 
 
-def _ways(seen: View) -> tuple[Any, Any]:
-    """Frequency ratio and mass ratio where each follows from one axis alone."""
-    mass = seen.results.dataset.coords.get("mass_ratio")
-    return _ratio(seen)[0], mass if mass is not None and depends_on(seen, mass, seen.y) else None
-
-
 def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) -> None:
     assert seen.x is not None and seen.y is not None
     axes = drawing.subplots()
     colours, norm = ListedColormap(PEAK_COLOURS), BoundaryNorm(PEAK_BANDS, len(PEAK_COLOURS))
     counts = seen.results.of_sensor("peaks_per_cycle", sensor).clip(1.0, float(len(PEAK_COLOURS)))
     mesh = draw_map(axes, seen, counts, ways, cmap=colours, norm=norm)
-    axes.set_xlabel(_ratio(seen)[1])
-    axes.set_ylabel(seen.y.title if ways[1] is None else "mass ratio")
+    axes.set(xlabel=_ratio(seen)[1], ylabel=along_y(seen)[1])
     bar = colour_bar(axes, mesh, "peaks per cycle", ticks=range(1, len(PEAK_COLOURS) + 1))
     bar.ax.set_yticklabels(["0-1", "2", "3", "4", "5", "6 +"])
     if ways[0] is not None:

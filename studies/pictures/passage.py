@@ -18,7 +18,8 @@ from studies.pictures.common.sweep_view import (
     SPEEDS,
     View,
     along_axis,
-    depends_on,
+    along_x,
+    along_y,
     draw_curves,
     draw_map,
     view,
@@ -66,12 +67,7 @@ def _has_contact(results: Results, carriage: str) -> bool:
 
 
 def _ratio(seen: View) -> tuple[Any, str]:
-    """What stands on the horizontal axis: the speed ratio where it follows from that axis alone."""
-    ratio = seen.results.dataset.coords.get("speed_ratio")
-    if ratio is not None and depends_on(seen, ratio, seen.x):
-        return ratio, "speed ratio v/(ω₁ L/π)"
-    assert seen.x is not None
-    return None, seen.x.title
+    return along_x(seen, seen.results.dataset.coords.get("speed_ratio"), "speed ratio v/(ω₁ L/π)")
 
 
 def _amplification(seen: View, sensors: list[str]) -> Figure:
@@ -102,22 +98,10 @@ def _map(seen: View, sensor: str) -> Figure:
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
     axes = drawing.subplots()
-    ways = _ways(seen)
+    ways, titles = zip(_ratio(seen), along_y(seen), strict=True)
     mesh = draw_map(axes, seen, seen.results.of_sensor("dynamic_amplification", sensor), ways, cmap="viridis")
-    _name_ways(axes, seen, ways)
+    axes.set(xlabel=titles[0], ylabel=titles[1])
     colour_bar(axes, mesh, f"{sensor}, max/static")
-
-
-def _ways(seen: View) -> tuple[Any, Any]:
-    """Speed ratio and mass ratio where each follows from one axis alone."""
-    mass = seen.results.dataset.coords.get("mass_ratio")
-    return _ratio(seen)[0], mass if mass is not None and depends_on(seen, mass, seen.y) else None
-
-
-def _name_ways(axes: Any, seen: View, ways: tuple[Any, Any]) -> None:
-    assert seen.y is not None
-    axes.set_xlabel(_ratio(seen)[1])
-    axes.set_ylabel(seen.y.title if ways[1] is None else "mass ratio")
 
 
 def _contact(seen: View, carriage: str) -> Figure:
@@ -160,9 +144,9 @@ def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
         along_axis(axes, seen, title)
         axes.set_ylabel("smallest contact force / weight")
         return
-    ways = _ways(seen)
+    ways, titles = zip(_ratio(seen), along_y(seen), strict=True)
     mesh = draw_map(axes, seen, force, ways, cmap="PuOr", vmin=-1.0, vmax=1.0)
-    _name_ways(axes, seen, ways)
+    axes.set(xlabel=titles[0], ylabel=titles[1])
     colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
     if not _has_line(seen, force):
         return

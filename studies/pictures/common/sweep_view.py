@@ -203,6 +203,22 @@ def _edges(values: Array) -> Array:
     return np.exp(edges) if is_logarithmic(values) else edges
 
 
-def depends_on(seen: View, values: Any, axis: Axis | None) -> bool:
+def _depends_on(seen: View, values: Any, axis: Axis | None) -> bool:
     """Whether values, cut to the view, vary along exactly this axis."""
     return axis is not None and seen.cut(values).dims == (axis.dim,)
+
+
+def along_x(seen: View, ratio: Any, title: str) -> tuple[Any, str]:
+    """What stands on the horizontal axis: a ratio where it follows from that axis alone, else None for its values."""
+    if ratio is not None and _depends_on(seen, ratio, seen.x):
+        return ratio, title
+    assert seen.x is not None
+    return None, seen.x.title
+
+
+def along_y(seen: View) -> tuple[Any, str]:
+    """The same of the vertical axis and the mass ratio."""
+    mass = seen.results.dataset.coords.get("mass_ratio")
+    if mass is not None and _depends_on(seen, mass, seen.y):
+        return mass, "mass ratio"
+    return None, "" if seen.y is None else seen.y.title
