@@ -55,7 +55,7 @@ def write_whole(path: Path | str, write: Callable[[Path], None], look: Callable[
         _sync(path.parent)
     except BaseException as error:
         _discard(temporary)
-        if isinstance(error, OSError) or _is_netcdf_failure(error):
+        if isinstance(error, OSError) or (isinstance(error, RuntimeError) and str(error).startswith("NetCDF:")):
             raise output_failed(path, error) from error
         raise
 
@@ -76,10 +76,6 @@ def _free_bytes(folder: Path) -> int | None:
         return shutil.disk_usage(folder).free
     except OSError:
         return None
-
-
-def _is_netcdf_failure(error: BaseException) -> bool:
-    return isinstance(error, RuntimeError) and str(error).startswith("NetCDF:")
 
 
 def _sync(path: Path) -> None:
@@ -105,11 +101,6 @@ def clean_leftovers(path: Path | str) -> None:
     for entry in path.parent.iterdir():
         if entry.name.startswith(f".{path.name}.") and entry.name.endswith(_TEMPORARY):
             _discard(entry)
-
-
-def is_temporary(path: Path) -> bool:
-    """Whether this is a file that `write_whole` had not finished."""
-    return path.name.endswith(_TEMPORARY)
 
 
 def write_text(path: Path | str, text: str) -> None:

@@ -88,15 +88,13 @@ def to_dataset(table: Table) -> xr.Dataset:
     import xarray as xr
 
     variables = {
-        name: xr.Variable(column.dims, _plain(column), dict(column.attributes))
+        name: xr.Variable(
+            column.dims, column.data.astype(str) if column.is_text else column.data, dict(column.attributes)
+        )
         for name, column in table.columns.items()
     }
     coordinates = [name for name, column in table.columns.items() if column.is_coordinate]
     return xr.Dataset(variables, attrs=dict(table.attributes)).set_coords(coordinates)
-
-
-def _plain(column: Column) -> np.ndarray:
-    return column.data.astype(str) if column.is_text else column.data
 
 
 def canonical(value: Any) -> Any:

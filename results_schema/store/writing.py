@@ -37,18 +37,15 @@ def _write_table(place: Any, table: Table, filters: Mapping[str, Any]) -> None:
     further = [name for name, column in table.columns.items() if column.is_coordinate and column.dims != (name,)]
     named: set[str] = set()
     for name, column in table.columns.items():
-        beside = [] if column.is_coordinate else _coordinates_of(column, further, table)
+        # CF wants those coordinates named with a variable that lie over some of its dimensions.
+        along = [one for one in further if set(table.columns[one].dims) <= set(column.dims)]
+        beside = [] if column.is_coordinate else along
         named.update(beside)
         named_beside = {"coordinates": " ".join(beside)} if beside else {}
         _write_column(place, name, replace(column, attributes={**column.attributes, **named_beside}), filters)
     rest = [name for name in further if name not in named]
     if rest:
         place.setncattr("coordinates", " ".join(rest))
-
-
-def _coordinates_of(column: Column, further: list[str], table: Table) -> list[str]:
-    """The coordinates that CF wants named with a variable: those over some of its dimensions."""
-    return [name for name in further if set(table.columns[name].dims) <= set(column.dims)]
 
 
 def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, Any]) -> None:

@@ -58,7 +58,8 @@ def _code_of_unforeseen(error: Exception) -> int:
         drop_stdout()
         _complain(f"output failed: {error}")
         return OutputFailed.exit_code
-    _complain(f"a bug of our own ({type(error).__name__}: {_one_line(error)}); details in {_log(error)}")
+    said = " ".join(str(error).split())[:200]
+    _complain(f"a bug of our own ({type(error).__name__}: {said}); details in {_log(error)}")
     return WanderlastError.exit_code
 
 
@@ -75,10 +76,6 @@ def _complain_about_usage(error: click.UsageError) -> None:
 def _complain(message: str) -> None:
     with suppress(OSError):
         click.echo(f"wanderlast: {message}", err=True)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
 
 
 def _log(error: Exception) -> str:

@@ -187,14 +187,11 @@ def _along(results: Results) -> str:
         for here in (middle, last)
     ]
     many = "lowest natural frequency is" if shown == 1 else f"{_WORDS[shown]} lowest natural frequencies are"
-    return f"The {many} {listed(parts)}{_of_base(results)}."
+    of_base = " in the scene without its sweep" if results.size > 1 else ""
+    return f"The {many} {listed(parts)}{of_base}."
 
 
 _WORDS = {2: "two", 3: "three"}
-
-
-def _of_base(results: Results) -> str:
-    return " in the scene without its sweep" if results.size > 1 else ""
 
 
 def _together(results: Results) -> list[str]:

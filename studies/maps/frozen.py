@@ -123,9 +123,10 @@ def sentences(dataset: xr.Dataset) -> list[str]:
             float(swinging.mean()),
             float(dataset["centrifugal_number"].where(swinging.any(_OVER[1])).min()),
         )
+        least = ", the slowest tried" if slowest <= float(dataset["centrifugal_number"].min()) else ""
         found.append(
             f"Frozen so, with {counts[most]} modes some vibration also swings ever more (flutter, no divergence): "
-            f"from {number(slowest)} on{_least(dataset, slowest)}, in {percent(share)} of the speeds and masses tried."
+            f"from {number(slowest)} on{least}, in {percent(share)} of the speeds and masses tried."
         )
     frozen = dataset["frozen_growth"].isel(held_mode_count=most).fillna(np.inf)
     passage = dataset["passage_growth"].isel(held_mode_count=most).fillna(np.inf)
@@ -138,23 +139,13 @@ def _diverges(dataset: xr.Dataset, most: int) -> str:
     limit, counts = dataset["frozen_divergence"].values, dataset["held_mode_count"].values
     held = "a mass held at midspan with the terms of its speed"
     if not math.isfinite(limit[most]):
-        return (
-            f"Frozen: {held} has no speed at which it begins to diverge with {counts[most]} modes, {_tried(dataset)}."
-        )
+        tried = f"speed ratio times root of mass ratio {number(SLOWEST)} to {number(FASTEST)}"
+        return f"Frozen: {held} has no speed at which it begins to diverge with {counts[most]} modes, {tried}."
     first = f"{number(limit[0], 4)} on with {counted(int(counts[0]), 'mode')} and " * math.isfinite(limit[0])
     return (
         f"Frozen: {held} diverges from speed ratio times root of mass ratio {first}{number(limit[most], 4)}"
         f"{'' if first else ' on'} with {counts[most]}{'' if first else ' modes'}."
     )
-
-
-def _tried(dataset: xr.Dataset) -> str:
-    return f"speed ratio times root of mass ratio {number(SLOWEST)} to {number(FASTEST)}"
-
-
-def _least(dataset: xr.Dataset, value: float) -> str:
-    """Whether a speed is the slowest that was tried."""
-    return ", the slowest tried" if value <= float(dataset["centrifugal_number"].min()) else ""
 
 
 def _passages(growth: Array) -> str:
@@ -165,12 +156,10 @@ def _passages(growth: Array) -> str:
     where = f"of {counted(growth.size, 'real passage')} where it grows"
     if neutral:
         return f"That is a property of the frozen station only: {where}, {neutral} do not grow at all."
-    low, high = (number(float(end), 2) if np.isfinite(end) else "beyond all numbers" for end in _ends(growth))
+    low, high = (
+        number(float(end), 2) if np.isfinite(end) else "beyond all numbers" for end in (growth.min(), growth.max())
+    )
     return f"Real passages grow there too: {where}, all do, {low} to {high} times per passage."
-
-
-def _ends(values: Array) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
 
 
 MAP = Map("frozen", "the frozen station beside the real passage", 4.0, AXES, VARIABLES, compute, sentences)

@@ -106,16 +106,14 @@ class Errors:
 def error_figure(results: Results, panels: Sequence[Errors], wanted: float, words: str) -> Figure:
     """Errors over the number of modes, with and without static correction; one panel each."""
     caption = f"{words} The dashed line is {printed(100.0 * wanted)} %." + (
-        f" Errors below {printed(FLOOR)}, where rounding begins, are drawn there." if _floored(panels) else ""
+        f" Errors below {printed(FLOOR)}, where rounding begins, are drawn there."
+        if any((panel.errors < FLOOR).any() for panel in panels)
+        else ""
     )
     title = "How many modes it takes"
     height = 0.5 + 2.3 * -(-len(panels) // 2)
     where = [quantity(float(place), "m") for place in results.dataset["checked_position"].values]
     return draw("modes", title, caption, height, partial(_draw_errors, panels, wanted, where))
-
-
-def _floored(panels: Sequence[Errors]) -> bool:
-    return any(bool((panel.errors < FLOOR).any()) for panel in panels)
 
 
 def _draw_errors(panels: Sequence[Errors], wanted: float, where: Sequence[str], drawing: Drawing) -> None:

@@ -108,7 +108,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     files.make_folder(folder)
     files.check_output_place(folder / PAGE)
     for figure, drawn in zip(figures, page.figures, strict=True):
-        files.write_text(folder / f"{drawn.files}.svg", _standalone(drawn.svg))
+        files.write_text(folder / f"{drawn.files}.svg", f'<?xml version="1.0" encoding="utf-8"?>\n{drawn.svg}')
         files.write_whole(folder / f"{drawn.files}.png", partial(_fill, png(figure)))
     files.write_text(folder / PAGE, text)
     return folder / PAGE
@@ -126,7 +126,10 @@ def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Pag
             _finding(results, text)
             for text in (*findings_of(results), *_audited(source, results), *told_unreduced(source.groups.get(GROUP)))
         ],
-        figures=[_drawn(place, figure) for place, figure in enumerate(figures, 1)],
+        figures=[
+            Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
+            for place, figure in enumerate(figures, 1)
+        ],
         statuses=_statuses(results, noun(source.root)),
         scene=_scene(results),
         sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
@@ -178,14 +181,6 @@ def _fill(content: bytes, path: Path) -> None:
     path.write_bytes(content)
 
 
-def _standalone(element: str) -> str:
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{element}'
-
-
-def _drawn(place: int, figure: Figure) -> Drawn:
-    return Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
-
-
 def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
     dataset = results.dataset
@@ -213,11 +208,7 @@ def _statuses(results: Results, noun: str) -> list[Row]:
     """How many have which status; nothing where a study that measures is one whole, and well."""
     if noun == "point" and results.size == 1 and set(results.status_counts) == {Status.OK}:
         return []
-    return [_status_row(status, count) for status, count in results.status_counts.items()]
-
-
-def _status_row(status: Status, count: int) -> Row:
-    return Row(label(status), f"{count:,}", status.message)
+    return [Row(label(status), f"{count:,}", status.message) for status, count in results.status_counts.items()]
 
 
 def _scene(results: Results) -> dict[str, list[Row]]:
@@ -261,7 +252,7 @@ def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> R
     if unit is not None and unit.symbol and not isinstance(value, str):
         text = f"{text} {unit_text(unit.symbol)}"
     remark = f"swept: {swept[path]}" if path in swept else ""
-    return Row(path.rsplit(".", 1)[-1], _shortened(text), remark)
+    return Row(path.rsplit(".", 1)[-1], text if len(text) <= LONG_TEXT else f"{text[: LONG_TEXT - 1]}…", remark)
 
 
 def _plain(value: Any) -> str:
@@ -272,10 +263,6 @@ def _plain(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
     return number(value, 9) if isinstance(value, float) else str(value)
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= LONG_TEXT else f"{text[: LONG_TEXT - 1]}…"
 
 
 def _sweep_row(results: Results, place: int) -> Row:

@@ -35,7 +35,10 @@ class Extreme:
     @property
     def where(self) -> str:
         """The variant in words."""
-        return ", ".join(f"{name} {_shown(value, unit)}" for name, (value, unit) in self.variant.items())
+        return ", ".join(
+            f"{name} {value if isinstance(value, str) else quantity(value, unit)}"
+            for name, (value, unit) in self.variant.items()
+        )
 
 
 @dataclass(frozen=True)
@@ -70,11 +73,6 @@ def counts(results: xr.Dataset) -> dict[str, int]:
     return {label(Status(int(value))): int(count) for value, count in zip(values, found, strict=True)}
 
 
-def all_ok(results: xr.Dataset) -> bool:
-    """Whether every variant's status is ok."""
-    return bool((results["status"].values == Status.OK).all())
-
-
 def exit_code(outcome: Outcome) -> int:
     """Exit code of a finished run: 3 where some variants are not ok, or an audit found the tolerance missed.
 
@@ -85,7 +83,8 @@ def exit_code(outcome: Outcome) -> int:
 
     if outcome.audit is not None and not Verdict.of(outcome.audit).held:
         return SOME_NOT_OK
-    return 0 if is_measured(outcome.results) or all_ok(outcome.results) else SOME_NOT_OK
+    all_ok = bool((outcome.results["status"].values == Status.OK).all())
+    return 0 if is_measured(outcome.results) or all_ok else SOME_NOT_OK
 
 
 def ranges(study_results: Results) -> Iterator[Range]:
@@ -171,10 +170,6 @@ def _extreme(results: xr.Dataset, array: xr.DataArray, flat: np.intp) -> Extreme
             value = coordinate.values[place[coordinate.dims[0]]].item()
             variant[str(name)] = (value, str(coordinate.attrs.get("units", "1")))
     return Extreme(float(array.values.reshape(-1)[flat]), variant)
-
-
-def _shown(value: float | str, unit: str) -> str:
-    return value if isinstance(value, str) else quantity(value, unit)
 
 
 _DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

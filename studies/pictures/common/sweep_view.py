@@ -114,7 +114,7 @@ def view(results: Results, x: Sequence[str] = SPEEDS, y: Sequence[str] = (*DAMPI
     varied = [axis for axis in results.axes if len(axis.values) > 1]
     first = results.axis(*x) or (varied[0] if varied else None)
     rest = [axis for axis in varied if axis is not first and first and (axis.dim == VARIANT) == (first.dim == VARIANT)]
-    second = _first(rest, y) or (rest[0] if rest else None)
+    second = next((axis for ending in y for axis in rest if axis.sets(ending)), rest[0] if rest else None)
     shown = {axis.dim for axis in (first, second) if axis is not None}
     held = {dim: size // 2 for dim, size in zip(results.dims, results.shape, strict=True) if dim not in shown}
     return View(results, first, second, held)
@@ -130,10 +130,6 @@ def alone(seen: View) -> View:
 def _order(axis: Axis) -> Counts:
     """Places along an axis in ascending order; a sample stays as it is."""
     return np.arange(len(axis.values)) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
-
-
-def _first(axes: Sequence[Axis], endings: Sequence[str]) -> Axis | None:
-    return next((axis for ending in endings for axis in axes if axis.sets(ending)), None)
 
 
 def along_axis(axes: Axes, seen: View, title: str = "", values: Array | None = None) -> None:
