@@ -113,6 +113,9 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     if carriage.masses != ("mass",):
         where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
         raise BadInput("the maps know rigid masses only", where=where, expected=expected)
+    if carriage.pushes_along:
+        where = study.source.where(f"carriage.{name}.inertia_along")
+        raise BadInput("the maps know inertia across the track only", where=where, expected="inertia_along = false")
     if not carriage.motion.passes:
         where, expected = study.source.where(f"carriage.{name}.motion.kind"), '"cruise"'
         raise BadInput("the maps start from a passage", where=where, expected=expected)

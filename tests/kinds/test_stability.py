@@ -20,6 +20,7 @@ from studies.maps.table import MAPS
 from studies.protocol.parts import Work
 from studies.reporting import report
 from studies.results.results import Results
+from tests.bodies import frames
 
 BEAM: dict[str, Any] = {
     "kind": "beam",
@@ -260,6 +261,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "force": (
         {"carriage": {"mass": {"on": "beam", "kind": "force", "force": 1.0, "motion": CRUISE}}},
         "carriage.mass.kind",
+    ),
+    "along": (
+        {"body": {"beam": frames.straight(frames.PINNED)}, "carriage": {"mass": MASS | {"inertia_along": True}}},
+        "carriage.mass.inertia_along: the maps know",
     ),
     "statics": ({"solver": {"fidelity": "static"}}, "solver.fidelity"),
     "own weight": ({"bed": {"own_weight": True}}, "body.beam.own_weight"),
