@@ -140,8 +140,18 @@ def _attribute_findings(array: xr.DataArray, variable: Variable) -> Iterator[str
             continue
         if received is None:
             yield f"{array.name}: expected the attribute {key} = {wanted!r}, received none"
-        elif not np.array_equal(received, wanted):
+        elif not _agree(received, wanted, key):
             yield f"{array.name}: expected {key} = {wanted!r}, received {received!r}"
+
+
+def _agree(received: object, wanted: object, key: str) -> bool:
+    """Whether an attribute is as declared; flags may have been added since an archive was written."""
+    if key == "flag_meanings":
+        received, wanted = str(received).split(), str(wanted).split()
+    if key.startswith("flag_"):
+        found = np.atleast_1d(received)
+        return found.size > 0 and np.array_equal(found, np.atleast_1d(wanted)[: found.size])
+    return np.array_equal(received, wanted)
 
 
 def _value_findings(dataset: xr.Dataset, name: str, variable: Variable) -> Iterator[str]:

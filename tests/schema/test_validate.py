@@ -42,8 +42,18 @@ def test_dims_dtype_units_and_names_are_compared():
     del dataset.support_max.attrs["long_name"]
     assert "support_max: expected the attribute long_name" in found(dataset)
     dataset = march()
-    dataset.status.attrs["flag_values"] = np.arange(6, dtype=np.int8)
+    dataset.status.attrs["flag_values"] = np.arange(1, 8, dtype=np.int8)
     assert "status: expected flag_values" in found(dataset)
+
+
+def test_flags_may_have_been_added_since():
+    dataset = march()
+    scheme = dataset.scheme_used.attrs
+    words = scheme["flag_meanings"].split()[:-1]
+    scheme |= {"flag_values": scheme["flag_values"][:-1], "flag_meanings": " ".join(words)}
+    assert found(dataset) == ""
+    scheme["flag_meanings"] = " ".join(reversed(words))
+    assert "scheme_used: expected flag_meanings" in found(dataset)
 
 
 def test_nan_needs_a_status_that_explains_it():
