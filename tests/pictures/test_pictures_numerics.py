@@ -35,10 +35,13 @@ ERRORS = [[6e-4, 8e-4], [4e-4, np.nan], [2e-4, 5e-4]]
 KNOWN = {"fidelity_used": MODELS, "modes_used": MODES, "steps_used": STEPS, "work": WORK, "error_estimate": ERRORS}
 
 
+KEPT = ("modes_used", "steps_used", "error_estimate")  # which every march has
+
+
 def put(dataset: xr.Dataset, **known: Any) -> xr.Dataset:
     """The dataset with these numbers of every variant, others of their kind taken out, and no errors of results."""
     status = dataset["status"]
-    bare = dataset.drop_vars([name for name in KNOWN if name in dataset and name not in ("modes_used", "steps_used")])
+    bare = dataset.drop_vars([name for name in KNOWN if name in dataset and name not in KEPT])
     mass = dataset["fidelity_used"].copy(data=np.full(status.shape, 3, dtype=np.int8))
     bare = bare.assign(fidelity_used=mass).drop_dims("result")
     whole = {name: np.asarray(values).astype(dataset[name].dtype) for name, values in known.items()}
