@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def _attribute_findings(array: xr.DataArray, variable: Variable) -> Iterator[str
             yield f"{array.name}: expected {key} = {wanted!r}, received {received!r}"
 
 
-def _agree(received: object, wanted: object, key: str) -> bool:
+def _agree(received: Any, wanted: Any, key: str) -> bool:
     """Whether an attribute is as declared; flags may have been added since an archive was written."""
     if key == "flag_meanings":
         received, wanted = str(received).split(), str(wanted).split()
