@@ -21,6 +21,8 @@ from engine.scene.study import Study, load
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 from studies.commands.preview import preview
+from studies.protocol.parts import Variants
+from studies.protocol.study import kind_of
 from studies.runs.identity import run_key
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, PINNED, body, straight
 from tests.bodies.models import Files, refusal, study
@@ -227,12 +229,13 @@ def test_a_passage_is_the_frames(files: Files) -> None:
 @pytest.mark.usefixtures("own_process")
 def test_checks_are_printed_and_the_key_follows_the_files(files: Files, tmp_path: Path) -> None:
     copy = Files(tmp_path, straight(PINNED, elements=16))
-    plan = make_plan(study(copy.table()))
-    shown = next(table for table in preview(plan, 1).tables if table.title == "Import of bed")
+    given = study(copy.table())
+    plan, parts = make_plan(given), Variants(kind_of(given), given)
+    shown = next(table for table in preview(parts, 1).tables if table.title == "Import of bed")
     assert ("rigid-body modes", "none: the supports hold the body") in shown.rows
     save_npz(tmp_path / "mass.npz", csc_matrix(2.0 * copy.assembly.mass))
     again = make_plan(study(copy.table()))
-    assert run_key(again.study) != run_key(plan.study)
+    assert run_key(again.study) != run_key(given)
     assert np.abs(again.base.bodies[0].modal.omega / plan.base.bodies[0].modal.omega - 0.5**0.5).max() < 1e-9
     assert load(write_document({"schema_version": 1} | study(copy.table()).data)).body["bed"].length == LENGTH
 
