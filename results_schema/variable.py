@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Literal
 
 from results_schema.status import flag_meanings, flag_values
 
 EVERY_KIND = "*"
 AXES = "axes"
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,8 @@ class Variable:
         self, values: Any, dims: Sequence[str] | None = None
     ) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
         """Dimensions, values in the declared type, and attributes, as a dataset takes them."""
+        import numpy as np
+
         array = np.asarray(values)
         own = tuple(self.dims if dims is None else dims)
         return own, array if self.dtype == "str" else array.astype(self.dtype), self.attributes()

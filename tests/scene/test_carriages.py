@@ -30,7 +30,7 @@ class PushedMass(Carriage):
 
 
 def test_a_kind_from_elsewhere_is_a_mass_and_a_force(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(CARRIAGES, "pushed-mass", PushedMass)  # type: ignore[arg-type]
+    monkeypatch.setitem(CARRIAGES.own, "pushed-mass", PushedMass)  # type: ignore[arg-type]
     pushed = {"on": "bed", "kind": "pushed-mass", "mass": 0.3, "push": 2.0, "motion": WAY}
     sensors = {"place": fixed(0.61), "moment": fixed(0.37, "bending_moment")}
     options = {"body": {"bed": beam(modes=6)}, "sensor": sensors, "solver": {"steps": 200}}
