@@ -97,6 +97,8 @@ class March:
 
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
         """The impulse and the new accelerations of a segment's event, and its first station."""
+        if not self.unseen(segment, before):
+            return
         model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment))
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
@@ -107,8 +109,11 @@ class March:
             strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
         if segment.fresh:
             solve_initial_acceleration(table.ties, stepped, self.state)
-        if _unseen(segment, before):
-            watch_start(table.ties, stepped, self.state, *observed, segment.first)
+        watch_start(table.ties, stepped, self.state, *observed, segment.first)
+
+    def unseen(self, segment: Segment, before: Segment | None) -> bool:
+        """Whether the first station of a segment was not observed as the last one of the segment before."""
+        return segment.fresh or (segment.recorded and not (before is not None and before.recorded))
 
     def step(self, segment: Segment, table: SegmentTable, observed: Observed) -> Codes:
         """The steps of a segment, from its station 0, which is settled and seen."""
@@ -141,11 +146,6 @@ class March:
 def step_kernel(ties: Ties) -> Callable[..., Codes]:
     """The kernel that marches a segment with so many ties."""
     return march_one if ties.rows.shape[2] == 1 else march_many
-
-
-def _unseen(segment: Segment, before: Segment | None) -> bool:
-    """Whether the first station of a segment was not observed as the last one of the segment before."""
-    return segment.fresh or (segment.recorded and not (before is not None and before.recorded))
 
 
 def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None = None) -> March:

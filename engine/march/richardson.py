@@ -63,13 +63,17 @@ def march_pair(
 class _Histories(March):
     """A march whose signals are all kept, of one segment at a time."""
 
+    def unseen(self, segment: Segment, before: Segment | None) -> bool:
+        """Every segment has a history of its own, from its first station on."""
+        return True
+
     def observe(self, segment: Segment, table: SegmentTable) -> Observed:
         """The histories of all signals; no extremes and no sums, which `survey` and `integrate` find."""
         watch = table.watch if segment.recorded else table.unrecorded
         blocks, signals = self.statistics.shape[0], watch.offset.shape[1]
         statistics = np.zeros((blocks, signals, STATISTICS, LANES))
         statistics[:, :, LARGEST], statistics[:, :, SMALLEST], statistics[:, :, DIVERGED_AT] = np.inf, -np.inf, -1.0
-        history = np.empty((blocks, segment.steps + 1, signals, LANES))
+        history = np.full((blocks, segment.steps + 1, signals, LANES), np.nan)  # what is not observed shows
         everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)
         record = Record(statistics, np.arange(segment.steps + 1), history)
         return Observed(watch._replace(counted=everywhere, summed=nowhere), record)

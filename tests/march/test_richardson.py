@@ -13,8 +13,12 @@ from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
+from engine.kernels.layout import LANES, SMALLEST
 from engine.march.richardson import march_pair
-from engine.model.variant_values import padded
+from engine.march.tables import SceneTables
+from engine.model.scene_model import build_model
+from engine.model.timeline import Window
+from engine.model.variant_values import VariantValues, padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
 from results_schema.status import Status
@@ -35,6 +39,7 @@ SENSORS = {
     "below_acceleration": under("car", "acceleration"),
 }
 PAIR = {"scheme": "richardson"}
+WINDOWS: tuple[Window, ...] = ("whole", "last-cycle")
 TWO = {"car": mass(0.4, cruise(-0.25, 1.25, 1.0, after=0.4)), "next": mass(0.3, cruise(1.0, 0.0, 1.0), delay=0.25)}
 
 
@@ -180,3 +185,30 @@ def test_reduction_gets_the_extrapolated_cycle() -> None:
     assert float(reduced.midspan_max) >= last.max()
     told = [ds.estimated_error.sel(result="midspan_max").item() for ds in (reduced, whole)]
     assert told[0] <= told[1]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_contact_that_opens_before_the_last_cycle_is_seen(turn: float) -> None:
+    """Cycles that are not recorded are observed from station to station all the same, across their slices too."""
+    motion = shuttle(0.1, 0.9, 1.0, turn, 2)
+    given = study(beam(modes=4, damping_ratio=0.3), mass(3.0, motion), solver=PAIR | {"steps": 2000}, initial="rest")
+    reduced = run(given, reduction=Kept(100))
+    whole = run(given)
+    alone = run(with_solver(given, scheme="average-acceleration", steps=2000), reduction=Kept(100))
+    assert float(alone.car_separation_position) == pytest.approx(float(whole.car_separation_position), abs=2e-3)
+    assert float(reduced.car_separation_position) == float(whole.car_separation_position)
+    assert int(reduced.status) == Status.SEPARATED
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_what_is_not_recorded_is_observed_alike(turn: float) -> None:
+    """The smallest contact force of both parts of a shuttle is that of the whole, whatever is recorded of it."""
+    given = study(beam(damping_ratio=0.05), mass(0.3, shuttle(0.1, 0.9, 1.0, turn, 3)), solver=PAIR | {"steps": 5000})
+    model, values = build_model(given, {}, {}), VariantValues(given, {}, LANES)
+    found = {
+        window: march_pair(SceneTables(model, 5000, window, refinement=2), values, np.zeros(0, np.int64), 1)[0]
+        for window in WINDOWS
+    }
+    smallest = [part[-1, SMALLEST, 0] for part in (found["last-cycle"].unrecorded, found["last-cycle"].statistics)]
+    assert np.isfinite(smallest).all()
+    assert min(smallest) == found["whole"].statistics[-1, SMALLEST, 0]
