@@ -107,7 +107,7 @@ def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Count
 
 
 def allow_any_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
-    """In place of `resonance.check_steps` where accuracy is not the question."""
+    """In place of `check_steps` where accuracy is not the question."""
 
 
 def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:

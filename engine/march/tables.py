@@ -128,11 +128,6 @@ class SceneTables:
         periods = self.timeline.free_periods
         return periods * (2.0 * math.pi / self.model.first_omega) if periods > 0.0 else 0.0
 
-    @property
-    def cycle_bytes(self) -> int:
-        """Size of the rows of all ties over one unit of scene time."""
-        return 32 * self.steps * self.model.omega.size * self.model.ties
-
     def table(self, segment: Segment) -> SegmentTable:
         """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
         unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0

@@ -4,6 +4,7 @@ starts. Nothing is marched; a kind says what it computes of a scene, and this cu
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -44,17 +45,17 @@ class AtRestKind(PiecedKind):
     settings: type[Asked] = Asked
     sweeps = True
 
+    @abstractmethod
     def variants(self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]) -> Named:
         """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V, S) where a contact opens."""
-        raise NotImplementedError
 
+    @abstractmethod
     def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> Named:
         """Results (B, S, ...) along all bodies, of the scene without sweep."""
-        raise NotImplementedError
 
+    @abstractmethod
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> Named:
         """Results (S, ...) of the unreduced model, by the names of `variants`."""
-        raise NotImplementedError
 
     def check_model(self, model: SceneModel) -> None:
         """Refuse a scene that has no answer. Raises BadInput."""
@@ -63,9 +64,9 @@ class AtRestKind(PiecedKind):
         """Which model computes it."""
         return model.fidelity
 
+    @abstractmethod
     def inner(self, model: SceneModel) -> Mapping[str, tuple[str, NDArray[Any]]]:
         """Dimensions of results beyond variant and position: result -> dimension and its coordinate."""
-        raise NotImplementedError
 
     def check(self, study: Study) -> None:
         """Positions exist, and numbers of modes that every body takes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
@@ -92,7 +93,7 @@ class Kind:
         return []
 
 
-class PiecedKind(Kind):
+class PiecedKind(Kind, ABC):
     """A kind that is computed in pieces of its own instead of by a march of variants."""
 
     sweeps = False
@@ -122,13 +123,13 @@ class PiecedKind(Kind):
 
         return parts.Pieces(self, study)
 
+    @abstractmethod
     def pieces(self, study: Study) -> Sequence[Piece]:
         """The work, always the same for the same study; nothing large is computed."""
-        raise NotImplementedError
 
+    @abstractmethod
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         """The study's dataset from the datasets of all pieces by name."""
-        raise NotImplementedError
 
 
 def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:

@@ -227,3 +227,11 @@ def test_a_full_disk_keeps_the_finished_pieces(here: Path, monkeypatch: pytest.M
     with pytest.raises(OutputFailed):
         run_to_archive(study, Path("small.nc"), RunOptions())
     assert 1 <= len(finished_so_far("small.nc") or ()) < 6 and not Path("small.nc").exists()
+
+
+def test_a_kind_without_pieces_cannot_be_made() -> None:
+    class Unfinished(PiecedKind):
+        name = "unfinished"
+
+    with pytest.raises(TypeError, match=r"abstract methods.* gather.*pieces"):
+        Unfinished()  # type: ignore[abstract]
