@@ -1,7 +1,8 @@
-"""Every error a user can meet, each with the exit code of the command."""
+"""Every error a user can meet, each with the exit code of the command, and values as messages show them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 
@@ -83,3 +84,20 @@ class Interrupted(WanderlastError):
     """Stopped by a signal; finished work is kept."""
 
     exit_code = 130
+
+
+def printable(text: str, limit: int) -> str:
+    """Text on one line of bounded length; control characters, which a terminal would obey, as escapes."""
+    text = text if len(text) <= limit else f"{text[: limit - 3]}..."
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shortened(value: object, limit: int = 60) -> str:
+    """A value as the user would have written it, on one line of bounded length."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        text = f"[{', '.join(shortened(item) for item in value[:8])}{', ...' if len(value) > 8 else ''}]"
+    else:
+        text = str(value).lower() if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
+    return printable(text, limit)

@@ -23,7 +23,7 @@ from results_schema.errors import BadInput
 if TYPE_CHECKING:
     from engine.march.tables import Missed, SegmentTable
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.timeline import Segment
     from engine.scene.study import Study
 
@@ -45,11 +45,11 @@ class Places(Sensor):
     every: Array
     known: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
-    def places(self, along: tuple[StationPath, ...]) -> Array:
+    def places(self, along: Along) -> Array:
         """(X, 1), to be broadcast against loads."""
         return self.every[:, None]
 
-    def lines(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array) -> Array:
+    def lines(self, model: SceneModel, along: Along, loaded: Array) -> Array:
         """(X, S) static readings per unit force at places of the track (S,)."""
         found = self.known.get(id(loaded))
         if found is None:
@@ -64,7 +64,7 @@ class Place(Sensor):
     number: int
     together: Places
 
-    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
         if isinstance(loaded, str) or loaded.size == 1:
             return super()._full(model, along, loaded)
         return np.asarray(self.together.lines(model, along, loaded)[self.number])

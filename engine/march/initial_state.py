@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import State
 from engine.model.attachment import rows
-from engine.model.station_path import StationPath
+from engine.model.station_path import Along, StationPath
 from engine.model.track import rate_rows
 from engine.statics.equilibrium import static_state
 
@@ -44,7 +44,7 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
     return State(q, v, np.zeros(shape), np.zeros(shape))
 
 
-def _first_places(model: SceneModel) -> tuple[StationPath, ...]:
+def _first_places(model: SceneModel) -> Along:
     """Where all riders are at time 0, and their speed per unit of scene time."""
     found = []
     for rider in model.riders:
@@ -54,7 +54,7 @@ def _first_places(model: SceneModel) -> tuple[StationPath, ...]:
     return tuple(found)
 
 
-def _coordinates(model: SceneModel, along: tuple[StationPath, ...], state: StaticState) -> Array:
+def _coordinates(model: SceneModel, along: Along, state: StaticState) -> Array:
     """(N, L) static modal coordinates per unit weight of each carriage and per unit gravity."""
     found = np.zeros((model.omega.size, state.force.shape[2]))
     for r, attachments in enumerate(model.attachments):
@@ -67,7 +67,7 @@ def _coordinates(model: SceneModel, along: tuple[StationPath, ...], state: Stati
     return found
 
 
-def _meet(model: SceneModel, lanes: LaneTable, along: tuple[StationPath, ...], state: tuple[Array, Array]) -> None:
+def _meet(model: SceneModel, lanes: LaneTable, along: Along, state: tuple[Array, Array]) -> None:
     """Speeds at which bodies on rigid joints follow the track from the first instant, while that is at rest like under
     a rigid mass: the smallest ones,  y' = v (v.v)^-1 s' (phi'.q + sag')."""
     joints = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.rigid]

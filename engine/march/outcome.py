@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,10 @@ from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import counts_reduced
-from engine.scene.study import Study
 from results_schema.status import Fidelity, SchemeUsed, Status
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -29,7 +29,7 @@ from results_schema.status import Status
 
 if TYPE_CHECKING:
     from engine.march.tables import SceneTables
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.observation.signals import Signal
 
@@ -74,7 +74,7 @@ def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
     return static_readings(model, readers, tables.ways_at(counts))
 
 
-def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: tuple[StationPath, ...]) -> Flags:
+def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> Flags:
     """(S, J) where each signal reads anything."""
     found = []
     for signal in signals:

@@ -15,7 +15,7 @@ from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath, ways
+from engine.model.station_path import Along, StationPath, ways
 from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import tabulate_ties
 from engine.observation import kinks
@@ -162,7 +162,7 @@ class SceneTables:
             self._missed[key] = found
         return found
 
-    def _ways(self, segment: Segment) -> tuple[StationPath, ...]:
+    def _ways(self, segment: Segment) -> Along:
         """The ways of all carriages along a segment."""
         return ways(self.model, segment)
 
@@ -204,7 +204,7 @@ class SceneTables:
             found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 
-    def ways_at(self, counts: Array | Counts) -> tuple[StationPath, ...]:
+    def ways_at(self, counts: Array | Counts) -> Along:
         """Places of all riders at stations by their count; ``active`` says whether it is on its body at any of them."""
         found = []
         for rider in range(len(self.model.riders)):
@@ -229,11 +229,11 @@ class SceneTables:
             return np.zeros((counts.size, len(self.sensors)))
         return np.where(first.here[:, None], self._slope(along), 0.0)
 
-    def _readings(self, along: tuple[StationPath, ...]) -> Array:
+    def _readings(self, along: Along) -> Array:
         """(S, J, C + 1) static readings of every sensor per unit weight of each carriage, and last per unit gravity."""
         return static_readings(self.model, self.sensors, along)
 
-    def _slope(self, along: tuple[StationPath, ...]) -> Array:
+    def _slope(self, along: Along) -> Array:
         """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
         apart, which it reaches with all its contacts."""
         riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length

@@ -42,7 +42,7 @@ from engine.march.march import March, Marched, Observed, prepare
 from engine.march.stepper import Codes
 from engine.march.tables import SceneTables, SegmentTable
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
+from engine.model.station_path import Along, StationPath
 from engine.model.ties import CarriageTie
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_ties
@@ -312,7 +312,7 @@ def _way(carriage: CarriageTie, segment: Segment, offset: float) -> StationPath:
     return StationPath(place, speed * segment.step, path.ddS * segment.step**2, active=True)
 
 
-def _tabulated(model: SceneModel, along: tuple[StationPath, ...]) -> Track:
+def _tabulated(model: SceneModel, along: Along) -> Track:
     """Rows of the one tie along a way per offset."""
     ties = [tabulate_ties(model, (way,), _NO_IMPLICIT_PART) for way in along]
     rows = np.ascontiguousarray(np.stack([tie.rows[:, :, 0] for tie in ties]))

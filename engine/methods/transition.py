@@ -19,7 +19,7 @@ from engine.march.march import prepare, step_kernel
 from engine.march.tables import SceneTables
 from engine.methods.comparison import ComparisonScheme, frozen_track, propagate_comparison
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import StationPath
+from engine.model.station_path import Along, StationPath
 from engine.model.track import tabulate_ties
 from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table, padded, to_blocks
 from engine.observation.contact_forces import ContactForce
@@ -57,7 +57,7 @@ class Frozen:
         """The ties along so many steps."""
         return tabulate_ties(self.model, self._along(steps), self.model.scheme.coefficients)
 
-    def _along(self, steps: int) -> tuple[StationPath, ...]:
+    def _along(self, steps: int) -> Along:
         """The ways of all carriages at the stations 0..steps."""
         still = np.zeros(steps + 1)
         way = StationPath(still + self.place, still + self.advance, still, active=True)

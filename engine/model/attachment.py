@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine.model.station_path import StationPath
 from engine.model.ties import Attachment
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import BodyPart, SceneModel
-
-Along = tuple[StationPath, ...]
+    from engine.model.station_path import Along
 
 
 def holds(attachment: Attachment, along: Along) -> bool:

@@ -49,7 +49,10 @@ class StationPath:
         return found
 
 
-def ways(model: SceneModel, segment: Segment) -> tuple[StationPath, ...]:
+Along = tuple[StationPath, ...]  # all riders along one segment
+
+
+def ways(model: SceneModel, segment: Segment) -> Along:
     """The ways of all riders at the stations 0..steps of a segment."""
     tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end
@@ -65,7 +68,7 @@ def _highest(model: SceneModel) -> list[int]:
     return found
 
 
-def frozen(model: SceneModel, places: Array) -> tuple[StationPath, ...]:
+def frozen(model: SceneModel, places: Array) -> Along:
     """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track and every other one
     where it starts; whoever is off the body does not touch it."""
     starts = [np.full_like(places, float(c.rider.motion.path(0.0).S)) for c in model.carriages]

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.ties import Attachment, Load, SpringTie
-from engine.model.timeline import AT_END
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -188,22 +187,19 @@ def _check_points(study: Study, name: str, carriage: Carriage, modal: ModalBody)
 
 def _check_ways(study: Study, name: str, carriage: Carriage, riders: tuple[Rider, ...]) -> None:
     """Contacts stay on what they ride unless the carriage only passes; rigid ones never meet a shock."""
-    low, high = carriage.motion.range()
     for rider, (word, contact) in zip(riders, carriage.riding_contacts.items(), strict=True):
         where = study.source.where(f"carriage.{name}.contacts.{word}")
-        slack = AT_END * rider.length
-        stays = low + rider.offset >= -slack and high + rider.offset <= rider.length + slack
-        if rider.stays and not stays:
+        if rider.stays and rider.leaves:
             raise BadInput(
                 "this contact leaves the body that it rides",
                 where=where,
                 expected=f"a way within 0 to {rider.length:.6g} m",
-                received=f"{low + rider.offset:.6g} to {high + rider.offset:.6g} m",
+                received="{:.6g} to {:.6g} m".format(*rider.range),
             )
         shocks = (
             rider.is_jolted(alone=len(study.carriage) == 1) or rider.delay > 0.0 or rider.motion.free_vibration > 0.0
         )
-        if contact.is_rigid and (not stays or shocks):
+        if contact.is_rigid and (rider.leaves or shocks):
             raise BadInput(
                 "a rigid contact would meet a shock",
                 where=f"{where}.stiffness",

@@ -92,6 +92,17 @@ class Rider:
         return -self._slack <= place <= self.length + self._slack
 
     @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest place along the body, m."""
+        low, high = self.motion.range()
+        return low + self.offset, high + self.offset
+
+    @property
+    def leaves(self) -> bool:
+        """Whether it passes an end of the body."""
+        return self.range[0] < -self._slack or self.range[1] > self.length + self._slack
+
+    @property
     def _slack(self) -> float:
         """m by which a contact may be beyond an end that it touches; a carriage itself is where its motion says."""
         return AT_END * self.length if self.offset else 0.0
@@ -119,7 +130,7 @@ class Rider:
 
     def _crossings(self) -> Iterator[float]:
         """The motion's own times at which it passes an end of the body."""
-        low, high = (end + self.offset for end in self.motion.range())
+        low, high = self.range
         beyond = ((0.0, low < -self._slack), (self.length, high > self.length + self._slack))
         for place, passed in beyond:
             if passed:

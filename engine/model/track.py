@@ -18,16 +18,14 @@ from engine.model.attachment import rows as shape_rows
 if TYPE_CHECKING:
     from engine.kernels.layout import Alpha, Newmark
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along, StationPath
     from engine.model.ties import AlongTie, Attachment, SpringTie
     from engine.model.timeline import Segment
 
 Array = NDArray[np.float64]
 
 
-def tabulate_ties(
-    model: SceneModel, along: tuple[StationPath, ...], scheme: Newmark | Alpha, missed: Array | None = None
-) -> Ties:
+def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, missed: Array | None = None) -> Ties:
     """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
     `attachments.residual`, where it is known."""
     stations, modes = along[0].s.size, model.omega.size
@@ -89,7 +87,7 @@ class _Motion(NamedTuple):
     factors: Array
 
 
-def _motion(model: SceneModel, r: int, attachment: Attachment, along: tuple[StationPath, ...]) -> _Motion:
+def _motion(model: SceneModel, r: int, attachment: Attachment, along: Along) -> _Motion:
     """Of an attachment of tie r. Of a mass or rigid joint A = 2 s' phi', B = s'^2 phi'' + s'' phi' (DLR 16, 17, 26-28);
     of a damper A = phi, B = s' phi' (mechanics section 4)."""
     stations, number = along[0].s.size, r - model.first_spring
@@ -111,16 +109,14 @@ def _motion(model: SceneModel, r: int, attachment: Attachment, along: tuple[Stat
     return _Motion(1, factors)
 
 
-def _curved_sag(model: SceneModel, attachment: Attachment, along: tuple[StationPath, ...]) -> Array:
+def _curved_sag(model: SceneModel, attachment: Attachment, along: Along) -> Array:
     """(stations,) what the curve of the body's own sag accelerates a mass by on its way, per unit gravity."""
     assert attachment.rider is not None
     way = along[attachment.rider]
     return np.asarray(way.ds**2 * model.sag(attachment.body, way.s, 2) + way.dds * model.sag(attachment.body, way.s, 1))
 
 
-def _sag_under(
-    model: SceneModel, spring: SpringTie, below: Attachment, along: tuple[StationPath, ...]
-) -> tuple[Array, Array]:
+def _sag_under(model: SceneModel, spring: SpringTie, below: Attachment, along: Along) -> tuple[Array, Array]:
     """(stations,) rate, of a rigid joint acceleration, and gap of a spring by the sag of the body that it stands on."""
     way = along[spring.rider]
     if spring.rigid:
@@ -129,7 +125,7 @@ def _sag_under(
     return (way.ds * model.sag(below.body, way.s, 1) if spring.damped else np.zeros_like(level)), level
 
 
-def rate_rows(model: SceneModel, ties: list[int], along: tuple[StationPath, ...]) -> tuple[Array, Array, Array]:
+def rate_rows(model: SceneModel, ties: list[int], along: Along) -> tuple[Array, Array, Array]:
     """p and s' phi' (N, R) of springs or joints at the first station, and s' times the slope of the body's own sag (R,)
     per unit gravity; s' as the ways have it."""
     force, slope, sag = (

@@ -13,7 +13,7 @@ from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.ties import Attachment
     from engine.model.timeline import Rider
     from engine.observation.readings import Channel
@@ -38,13 +38,13 @@ class ContactForce:
         body = model.carriages[self.carriage].body
         return ContactSensor("", "contact_force", body, 0.0, self.carriage, self.carriage, self.contact)
 
-    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
         return []
 
-    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def missed(self, model: SceneModel, along: Along) -> Array:
         return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
-    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def offset(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)
 
     @property
@@ -55,7 +55,7 @@ class ContactForce:
         """The rider whose place it is."""
         return self.carriage if self.contact is None else self.contact
 
-    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         rider = self.rides(model)
         way = along[rider]
@@ -74,28 +74,28 @@ class ContactSensor(Sensor):
     carriage: int
     contact: int | None
 
-    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
         return []
 
-    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def missed(self, model: SceneModel, along: Along) -> Array:
         return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
-    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: Along) -> Array:
         return self.missed(model, along)
 
-    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def loose(self, model: SceneModel, along: Along) -> Array:
         return np.zeros((1, model.omega.size))
 
-    def unit_reading(self, model: SceneModel, along: tuple[StationPath, ...], attachment: Attachment) -> Array:
+    def unit_reading(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         return np.ones(1)
 
     def rides(self, model: SceneModel) -> int:
         return ContactForce(self.carriage, self.contact).rides(model)
 
-    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Flags:
         return np.full(along[0].s.size, along[self.rides(model)].active)
 
-    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def offset(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)
 
 

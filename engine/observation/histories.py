@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from engine.model.timeline import Segment, Timeline, Window
-from engine.scene.settings import Every
 from results_schema.arrays import Counts
+
+if TYPE_CHECKING:
+    from engine.model.timeline import Segment, Timeline, Window
+    from engine.scene.settings import Every
 
 CYCLE_STATIONS = 200  # of a kept history over the last cycle
 WHOLE_STATIONS = 401  # of a kept history over a whole run

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engine.model.attachment import along_shapes, holds, place
 from engine.model.attachment import rows as shape_rows
-from engine.model.station_path import StationPath
+from engine.model.station_path import Along, StationPath
 from engine.model.ties import Attachment
 from results_schema.quantities import QUANTITIES
 
@@ -60,16 +60,16 @@ class Sensor:
         """What it reads, as the table of quantities has it."""
         return QUANTITIES[self.quantity]
 
-    def places(self, along: tuple[StationPath, ...]) -> Array:
+    def places(self, along: Along) -> Array:
         """Where it reads, m: one place, or one per station."""
         return np.array([self.at]) if self.under is None else along[self.under].s
 
-    def shape(self, model: SceneModel, along: tuple[StationPath, ...], derivative: int) -> Array:
+    def shape(self, model: SceneModel, along: Along, derivative: int) -> Array:
         """(1 or stations, modes of its body) mode shapes where it reads."""
         body = model.bodies[self.body].modal
         return body.shape_at(self.at, derivative) if self.under is None else along[self.under].shape(body, derivative)
 
-    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
         """Its sums over the modes."""
         part = model.bodies[self.body]
         order = self.offset_order
@@ -87,7 +87,7 @@ class Sensor:
             material = {"q": ds**2 * self.shape(model, along, 2) + dds * slope, "v": 2.0 * ds * slope, "a": shape}
         return [Channel(of, order, _spread(model, part, rows)) for of, rows in material.items()]
 
-    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def missed(self, model: SceneModel, along: Along) -> Array:
         """(stations, ties): static response per unit force of each tie that the kept modes miss."""
         found = np.zeros((along[0].s.size, model.ties))
         if self.offset_order or not model.numerics.static_correction:
@@ -100,7 +100,7 @@ class Sensor:
             found[:, r] += attachment.factor * known[attachment.unit]
         return found
 
-    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: Along) -> Array:
         """(stations, ties) static reading per unit force of each tie, by what the march tends to when it is slow: the
         whole influence line with the static correction, else the kept modes."""
         found = np.zeros((along[0].s.size, model.ties))
@@ -109,7 +109,7 @@ class Sensor:
                 found[:, r] += attachment.factor * self.unit_reading(model, along, attachment)
         return found
 
-    def unit_reading(self, model: SceneModel, along: tuple[StationPath, ...], attachment: Attachment) -> Array:
+    def unit_reading(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         """(1 or stations,) static reading per unit force where an attachment holds its body."""
         if not model.numerics.static_correction:
             return self._kept(model, along, shape_rows(model, attachment, along))
@@ -117,7 +117,7 @@ class Sensor:
         here = None if attachment.rider is None else along[attachment.rider].here
         return whole if here is None else np.where(here, whole, 0.0)
 
-    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def loose(self, model: SceneModel, along: Along) -> Array:
         """(1 or stations, N) what it reads of `equilibrium.unrestrained_coordinates`, which only contacts hold."""
         if self.offset_order:
             return np.zeros((1, model.omega.size))
@@ -149,7 +149,7 @@ class Sensor:
         """The rider that it moves with."""
         return self.under
 
-    def _felt(self, model: SceneModel, along: tuple[StationPath, ...]) -> Iterator[tuple[int, Attachment]]:
+    def _felt(self, model: SceneModel, along: Along) -> Iterator[tuple[int, Attachment]]:
         """The attachments of all ties on its body, with the ties' numbers."""
         for r, attachments in enumerate(model.attachments):
             for attachment in attachments:
@@ -163,7 +163,7 @@ class Sensor:
         """What reads section forces where the body is not one uniform beam."""
         return self._modal(model).sections if self.reads.of_section else None
 
-    def _rows(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def _rows(self, model: SceneModel, along: Along) -> Array:
         """(1 or stations, modes of its body) what it reads of every mode."""
         sections = self._sections(model)
         if sections is not None:
@@ -174,7 +174,7 @@ class Sensor:
         """What a derivative of w is multiplied by."""
         return self.reads.factor(self._modal(model))
 
-    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
         """Static reading per unit force at places of the track (m), or at a point (its name)."""
         sections = self._sections(model)
         if isinstance(loaded, str):
@@ -184,7 +184,7 @@ class Sensor:
         line = self._modal(model).influence_at(self.places(along), loaded, self.reads.derivative)
         return np.asarray(self._factor(model) * line)
 
-    def _under_point(self, model: SceneModel, along: tuple[StationPath, ...], point: str) -> Array:
+    def _under_point(self, model: SceneModel, along: Along, point: str) -> Array:
         """Static reading per unit force at a point."""
         points, x = self._modal(model).points, self.places(along)
         assert points is not None
@@ -192,11 +192,11 @@ class Sensor:
             return points.section_influence(self.quantity, point, x)
         return np.asarray(self._factor(model) * points.influence(point, x, self.reads.derivative))
 
-    def _kept(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array) -> Array:
+    def _kept(self, model: SceneModel, along: Along, loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
         return np.asarray(np.sum(self._rows(model, along) * loaded * self._modal(model).modal_flexibility, axis=1))
 
-    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def offset(self, model: SceneModel, along: Along) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""
         stations = along[0].s.size
         x = self.places(along)
@@ -215,7 +215,7 @@ class Sensor:
             return way.ds * slope
         return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
 
-    def sagging(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def sagging(self, model: SceneModel, along: Along) -> Array:
         """(stations,): its static reading by the body's own weight per unit gravity."""
         return self.offset(model, along) if self.offset_order == 0 else np.zeros(along[0].s.size)
 
@@ -224,7 +224,7 @@ class Sensor:
         """The power of 1/h that makes the offset SI."""
         return self.reads.rate
 
-    def counted(self, model: SceneModel, along: tuple[StationPath, ...]) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Flags:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, self.under is None or along[self.under].active)
 
@@ -233,10 +233,10 @@ class Sensor:
 class SpotSensor(Sensor):
     """The motion of a place of a body off its track, which the modal body knows by the sensor's name; ``at`` is NaN."""
 
-    def shape(self, model: SceneModel, along: tuple[StationPath, ...], derivative: int) -> Array:
+    def shape(self, model: SceneModel, along: Along, derivative: int) -> Array:
         return self._gauge(model).row[None]
 
-    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def offset(self, model: SceneModel, along: Along) -> Array:
         weighs = model.bodies[self.body].own_weight and self.offset_order == 0
         return np.full(along[0].s.size, self._gauge(model).own_weight() if weighs else 0.0)
 
@@ -255,7 +255,7 @@ class SpotSensor(Sensor):
         pushed = along_shapes(model.bodies[self.body], places)[0] * modal.modal_flexibility @ gauge.row
         return float(max(found, np.abs(pushed).max()))
 
-    def _full(self, model: SceneModel, along: tuple[StationPath, ...], loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
         return self._gauge(model).influence(loaded)
 
     def _gauge(self, model: SceneModel) -> Gauge:
@@ -269,26 +269,26 @@ class SprungSensor(Sensor):
 
     mode: int
 
-    def channels(self, model: SceneModel, along: tuple[StationPath, ...]) -> list[Channel]:
+    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
         row = np.zeros((1, model.omega.size))
         row[0, self.mode] = 1.0
         return [Channel("qva"[self.offset_order], self.offset_order, row)]
 
-    def missed(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def missed(self, model: SceneModel, along: Along) -> Array:
         return np.zeros((along[0].s.size, model.ties))
 
-    def unit_static(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def unit_static(self, model: SceneModel, along: Along) -> Array:
         return np.zeros((along[0].s.size, model.ties))
 
-    def loose(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def loose(self, model: SceneModel, along: Along) -> Array:
         found = np.zeros((1, model.omega.size))
         found[0, self.mode] = float(self.offset_order == 0)
         return found
 
-    def offset(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def offset(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)
 
-    def sagging(self, model: SceneModel, along: tuple[StationPath, ...]) -> Array:
+    def sagging(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)
 
 

@@ -13,7 +13,7 @@ from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.ties import CarriageTie
 
 
@@ -55,13 +55,13 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     )
 
 
-def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: tuple[StationPath, ...]) -> Array:
+def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: Along) -> Array:
     """(stations, signals, ties) static responses per unit force of each tie that the kept modes miss."""
     return np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1))
 
 
 def tabulate_watch(
-    model: SceneModel, signals: tuple[Signal, ...], along: tuple[StationPath, ...], missed: Array | None = None
+    model: SceneModel, signals: tuple[Signal, ...], along: Along, missed: Array | None = None
 ) -> Observation:
     """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]

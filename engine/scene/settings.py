@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
 
 from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme, SchemeRow
-from engine.study_file.document import shortened
 from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
 from engine.study_file.units import Dimensionless, fault
+from results_schema.errors import shortened
 from results_schema.pieces import Pieces, no_row_of
 
 #: The program's schemes and those of other packages.

@@ -17,10 +17,10 @@ from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.study_file.checks import Check, on_body
-from engine.study_file.document import Document, Source, document_of, read_document, shortened
+from engine.study_file.document import Document, Source, document_of, read_document
 from engine.study_file.spec import Keys, Spec, field_at, nearest, refuse
 from engine.study_file.units import Acceleration, Unit, fault
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.quantities import QUANTITIES
 from results_schema.variables import RESERVED, expand, sensor_unit
 

@@ -24,8 +24,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.model.attachment import Along, residual_flexibility, shared, tie_shapes
+from engine.model.attachment import residual_flexibility, shared, tie_shapes
 from engine.model.scene_model import SceneModel
+from engine.model.station_path import Along
 from engine.model.variant_values import VariantValues, from_blocks, lane_table
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from engine.model.attachment import modal_flexibility_between, residual, shared, tie_shapes
 
 if TYPE_CHECKING:
-    from engine.model.attachment import Along
     from engine.model.scene_model import SceneModel
+    from engine.model.station_path import Along
 
 Array = NDArray[np.float64]
 

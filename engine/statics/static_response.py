@@ -10,13 +10,12 @@ import numpy as np
 from engine.model.variant_values import weights
 from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.readings import Sensor
-from engine.observation.signals import build_sensors
 from engine.statics.equilibrium import static_state
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.model.attachment import Along
     from engine.model.scene_model import SceneModel
+    from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.observation.contact_forces import ContactForce
 
@@ -46,9 +45,8 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
     return found
 
 
-def static_values(model: SceneModel, values: VariantValues, along: Along) -> StaticReadings:
-    """Static readings of the study's sensors and of all contacts, for some variants of a scene."""
-    sensors = build_sensors(model)
+def static_values(model: SceneModel, sensors: Sequence[Sensor], values: VariantValues, along: Along) -> StaticReadings:
+    """Static readings of sensors and of all contacts, for some variants of a scene."""
     unit, loads = static_readings(model, sensors, along), _loads(model, values)
     force = static_state(model, along).force
     parts = np.array([contact_row(model, c.carriage, c.contact) for c in contact_forces(model)])

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, printable, shortened
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
@@ -95,23 +95,6 @@ def write_document(data: Mapping[str, Any]) -> str:
     """TOML text of plain data; reading it gives the same data."""
     blocks = [_block(header, table) for header, table in _tables("", data)]
     return "\n".join(block for block in blocks if block)
-
-
-def printable(text: str, limit: int) -> str:
-    """Text on one line of bounded length; control characters, which a terminal would obey, as escapes."""
-    text = text if len(text) <= limit else f"{text[: limit - 3]}..."
-    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
-def shortened(value: object, limit: int = 60) -> str:
-    """A value as the user would have written it, on one line of bounded length."""
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        text = f"[{', '.join(shortened(item) for item in value[:8])}{', ...' if len(value) > 8 else ''}]"
-    else:
-        text = _literal(value) if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
-    return printable(text, limit)
 
 
 def _file_bytes(path: str | Path) -> bytes:

@@ -12,9 +12,9 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, Discriminator, GetCoreSchemaHandler, Tag, ValidationError
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from engine.study_file.document import Beside, Source, shortened
+from engine.study_file.document import Beside, Source
 from engine.study_file.units import Unit, fault
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.pieces import Pieces, unfinished
 
 Keys = Sequence[str | int]

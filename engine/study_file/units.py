@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from engine.study_file.document import shortened
+from results_schema.errors import shortened
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 _FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|1(?=\s*/)")

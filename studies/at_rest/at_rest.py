@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from results_schema.status import Fidelity
@@ -46,11 +46,11 @@ class AtRestKind(PiecedKind):
     sweeps = True
 
     @abstractmethod
-    def variants(self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]) -> Named:
+    def variants(self, model: SceneModel, values: VariantValues, along: Along) -> Named:
         """Results (V, S, ...) of some variants with the riders at `along`; "opened" (V, S) where a contact opens."""
 
     @abstractmethod
-    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> Named:
+    def shapes(self, model: SceneModel, along: Along) -> Named:
         """Results (B, S, ...) along all bodies, of the scene without sweep."""
 
     @abstractmethod

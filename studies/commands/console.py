@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from engine.study_file.document import printable
+from results_schema.errors import printable
 from results_schema.status import Status, label
 from studies.commands.error_exit import drop_stdout
 from studies.results.formatting import counted, number, quantity

@@ -23,7 +23,7 @@ from studies.results.results import Results, extreme
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
@@ -114,14 +114,12 @@ class Eigenfrequencies(AtRestKind):
             )
         super().check(study)
 
-    def variants(
-        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
-    ) -> dict[str, NDArray[Any]]:
+    def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
         from engine.statics.coupled_modes import coupled_frequencies
 
         return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}
 
-    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
+    def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
         from engine.model.variant_values import VariantValues
         from engine.statics.coupled_modes import coupled_modes
 

@@ -23,7 +23,7 @@ from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import StationPath
+    from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
@@ -129,13 +129,12 @@ class Influence(AtRestKind):
                 )
         super().check(study)
 
-    def variants(
-        self, model: SceneModel, values: VariantValues, along: tuple[StationPath, ...]
-    ) -> dict[str, NDArray[Any]]:
+    def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
         from engine.observation.contact_forces import contact_forces
+        from engine.observation.signals import build_sensors
         from engine.statics.static_response import static_values
 
-        found = static_values(model, values, along)
+        found = static_values(model, build_sensors(model), values, along)
         named: dict[str, NDArray[Any]] = {}
         for j, sensor in enumerate(model.study.sensor):
             named[sensor] = found.sensors[:, :, j]
@@ -146,7 +145,7 @@ class Influence(AtRestKind):
         named["opened"] = ((found.contacts < -LIFTS * size) & reacts).any(axis=2)
         return {**named, "contact_force": found.contacts}
 
-    def shapes(self, model: SceneModel, along: tuple[StationPath, ...]) -> dict[str, NDArray[Any]]:
+    def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
         from engine.model.variant_values import VariantValues
         from engine.statics.static_response import static_shapes
 

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
-from engine.study_file.document import shortened
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import fault
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
 from studies.precision.checks import slug_of

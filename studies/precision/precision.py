@@ -23,7 +23,7 @@ from engine.march.tables import SceneTables
 from engine.methods.comparison import COMPARISON, march_comparison, prepare_comparison
 from engine.methods.ode import ModalEquations, Solved
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.station_path import StationPath, ways
+from engine.model.station_path import Along, ways
 from engine.model.timeline import Segment
 from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
@@ -115,16 +115,16 @@ def with_correction(model: SceneModel, corrected: bool) -> SceneModel:
 class SharedTables(SceneTables):
     """Tables whose ways are shared by all schemes of one body and number of steps: they take most of the time."""
 
-    shared: dict[Any, tuple[StationPath, ...]] = field(default_factory=dict)
+    shared: dict[Any, Along] = field(default_factory=dict)
 
-    def _ways(self, segment: Segment) -> tuple[StationPath, ...]:
+    def _ways(self, segment: Segment) -> Along:
         key = (segment.start, segment.end, segment.steps, segment.active)
         if key not in self.shared:
             self.shared[key] = ways(self.model, segment)
         return self.shared[key]
 
 
-def tables_of(model: SceneModel, steps: int, shared: dict[Any, tuple[StationPath, ...]] | None = None) -> SceneTables:
+def tables_of(model: SceneModel, steps: int, shared: dict[Any, Along] | None = None) -> SceneTables:
     """The tables of a scene, cut so that a Richardson pair can halve them. shared: ways of the same body and steps."""
     return SharedTables(model, steps, "whole", refinement=2, shared={} if shared is None else shared)
 

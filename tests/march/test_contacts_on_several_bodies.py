@@ -86,7 +86,10 @@ def test_statics_are_those_of_finite_elements(name: str, cross: float) -> None:
     model, values, whole = make_plan(study).base, VariantValues(study, {}, 1), unreduced_model(study)
     places = np.array([0.3, 0.45, 0.7, 0.8])  # where the last one is off the shorter beam with one wheel
     both, along = np.stack([places, np.full(4, cross)], axis=1), frozen(model, places)
-    found, right = static_values(model, values, along).sensors[0], unreduced_statics(whole, both)[0]
+    found, right = (
+        static_values(model, build_sensors(model), values, along).sensors[0],
+        unreduced_statics(whole, both)[0],
+    )
     assert (np.abs(found - right).max(axis=0) <= 1e-6 * np.abs(right).max(axis=0)).all()
     omega, hertz = coupled_frequencies(model, values, along, 4)[0], unreduced_frequencies(whole, both, 4)
     np.testing.assert_allclose(omega / (2.0 * np.pi), hertz, rtol=5e-4)
@@ -97,7 +100,7 @@ def test_the_documented_gantry_carries_its_weights() -> None:
     (text,) = (block for _, block in examples("toml") if "[body.girder]" in block)
     study = load(text)
     model, values = make_plan(study).base, VariantValues(study, {}, 1)
-    force = static_values(model, values, frozen(model, np.array([4.0]))).contacts[0, 0]
+    force = static_values(model, build_sensors(model), values, frozen(model, np.array([4.0]))).contacts[0, 0]
     weight, trolley, cross = 0.03 * 10.0 * 7850.0 * study.gravity, 3000.0 * study.gravity, 1.5
     right = 0.5 * weight + trolley * (cross - 0.5) / 9.0
     assert [force[0] + force[1], force[2] + force[3]] == pytest.approx([weight + trolley - right, right], rel=1e-9)

@@ -17,6 +17,7 @@ from engine.bodies.reduced.body import save_body
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
+from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.statics.static_response import static_values
 from engine.unreduced.march import course_of, march_unreduced
@@ -74,7 +75,9 @@ def study(sensors: dict[str, Any], bed: dict[str, Any] | None = None, **more: An
 def statics(given: Study, places: Any = PLACES) -> Array:
     """(P, J) readings with the carriage at places."""
     model = base_scene(given)
-    return static_values(model, VariantValues(model.study, {}, 1), frozen(model, np.array(places))).sensors[0]
+    return static_values(
+        model, build_sensors(model), VariantValues(model.study, {}, 1), frozen(model, np.array(places))
+    ).sensors[0]
 
 
 def by_hand(place: float, gravity: float = 0.0) -> list[float]:

@@ -10,6 +10,7 @@ from engine.march.march import march
 from engine.march.step_rules import allow_any_steps
 from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues, padded
+from engine.observation.signals import build_sensors
 from engine.statics.static_response import static_values
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding
 from tests.engine.bodies_on_contacts_dense import Twin
@@ -66,7 +67,7 @@ def test_statics_where_contacts_are_off_the_bed(correction: bool, heavy: bool) -
     (group,) = make_plan(case).groups
     twin, model = Twin(case), group.scene
     places = np.array([-0.3, -0.06, 0.05, 0.5, 0.93, 1.1])
-    found = static_values(model, VariantValues(case, {}, 1), frozen(model, places)).contacts[0]
+    found = static_values(model, build_sensors(model), VariantValues(case, {}, 1), frozen(model, places)).contacts[0]
     right = np.array([twin.static(float(place))[1] for place in places])
     assert np.abs(found - right).max() <= 1e-9 * np.abs(right).max()
 
@@ -80,6 +81,8 @@ def test_static_slopes_move_all_contacts() -> None:
         tables, counts = group.tables, np.array([40])
         (place,) = tables.timeline.positions(0, counts)
         apart = frozen(group.scene, place + np.array([-1e-4, 1e-4]))
-        left, right = static_values(group.scene, VariantValues(case, {}, 1), apart).influence[:, 0]
+        left, right = static_values(
+            group.scene, build_sensors(group.scene), VariantValues(case, {}, 1), apart
+        ).influence[:, 0]
         assert abs(right - left) > 1e-7
         assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)

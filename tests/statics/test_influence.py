@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
+from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.statics.static_response import StaticReadings, contact_names, static_values
 from tests.engine.bodies_on_contacts import TWO, UNEVEN, riding
@@ -27,7 +28,12 @@ def readings(case: Study, places: Any = PLACES, **columns: Any) -> StaticReading
     model = base_scene(case)
     swept = {path.replace("__", "."): np.asarray(column, dtype=float) for path, column in columns.items()}
     size = max((len(column) for column in swept.values()), default=1)
-    return static_values(model, VariantValues(model.study, swept, size), frozen(model, np.asarray(places, dtype=float)))
+    return static_values(
+        model,
+        build_sensors(model),
+        VariantValues(model.study, swept, size),
+        frozen(model, np.asarray(places, dtype=float)),
+    )
 
 
 def line(x: float, s: Array) -> Array:

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine.study_file.document import shortened
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 
 MAX_BYTES = 500_000_000
 MAX_INCLUDES = 32  # within each other

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.bodies.files.model import Array, Counts
-from engine.study_file.document import shortened
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 
 OFF_LINE = 1e-3  # of the track's length: how far its nodes may stand beside a straight line
 MAX_NODES = 1000

@@ -18,7 +18,6 @@ from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
-from engine.study_file.document import shortened
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
     Area,
@@ -35,6 +34,7 @@ from engine.study_file.units import (
     Stiffness,
     fault,
 )
+from results_schema.errors import shortened
 
 MAX_ELEMENTS = 1000
 MAX_COORDINATE = 1e9

@@ -11,10 +11,9 @@ from pydantic_core import InitErrorDetails
 
 from engine.bodies.frame.geometry import SAME_PLACE, TrackLine, member_ends, parallel, unit, up_of
 from engine.bodies.modal.description import Spot, check_spot_name
-from engine.study_file.document import shortened
 from engine.study_file.spec import nearest
 from engine.study_file.units import fault
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame

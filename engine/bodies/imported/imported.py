@@ -21,10 +21,9 @@ from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
-from engine.study_file.document import shortened
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.quantities import OF_SECTION
 
 MAX_POINTS = 50

@@ -11,10 +11,10 @@ from pydantic import Field, PrivateAttr, Strict, Tag
 
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.study_file.checks import Check
-from engine.study_file.document import Beside, shortened
+from engine.study_file.document import Beside
 from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form, nearest
 from engine.study_file.units import Dimensionless, Rate, Time
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 
 LEVEL = 1e-6  # cosine of the angle above which a vector has a part along the track
 MAX_MODES = 64

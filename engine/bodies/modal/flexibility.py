@@ -16,8 +16,7 @@ import numpy as np
 
 from engine.bodies.modal.modal_body import Array
 from engine.linear_algebra import one_thread
-from engine.study_file.document import shortened
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -14,8 +14,7 @@ from engine.bodies.frame.refusals import refuse
 from engine.bodies.modal.description import Body, Spot, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from engine.study_file.checks import Check
-from engine.study_file.document import shortened
-from results_schema.errors import BadInput, WanderlastError
+from results_schema.errors import BadInput, WanderlastError, shortened
 
 
 class Reduced(Body):
