@@ -28,7 +28,7 @@ from studies.at_rest.positions import way_of
 from studies.pictures.at_rest import places, way_title
 from tests.engine.build import Table, beam, cruise, shuttle
 from tests.engine.gantries import CORNERS, CROSSING, FRAME, PAIRS, TRACKS, TROLLEY, gantry
-from tests.march.test_bodies_on_contacts import histories
+from tests.march.contacts.test_bodies_on_contacts import histories
 from tests.test_readme import examples
 
 SHOES = {"rear": {"at": 0.02, "stiffness": 500.0, "damping": 0.1}, "front": {"at": 0.08, "stiffness": 450.0}}
