@@ -26,9 +26,8 @@ class Scheme(Protocol):
     """What the program asks of a scheme.
 
     name: as in the study file. order: of its error on smooth, resolved scenes. coefficients: for the kernels.
-    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. period_error: of such an
-    oscillator, by its leading part: per (omega h)^2, and per (omega h)^4. stride: steps that its coarsest march takes
-    at once.
+    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. stride: steps that its
+    coarsest march takes at once.
     """
 
     @property
@@ -41,11 +40,6 @@ class Scheme(Protocol):
     def coefficients(self) -> Newmark | Alpha: ...
     @property
     def stability_limit(self) -> float: ...
-    @property
-    def period_error(self) -> tuple[float, float]: ...
-    @property
-    def is_damped(self) -> bool:
-        """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
 
     def amplification(self, x: float) -> FloatArray:
         """Matrix of one step of an undamped oscillator of omega h = x, on its state in step units."""
@@ -80,17 +74,6 @@ class NewmarkScheme:
         """(gamma/2 - beta)^-1/2, infinite from beta >= gamma/2 on."""
         slack = 0.5 * self.gamma - self.beta
         return math.inf if slack <= 0.0 else 1.0 / math.sqrt(slack)
-
-    @property
-    def period_error(self) -> tuple[float, float]:
-        """|beta/2 - 1/24|; 1/480 per fourth power where that is 0 (mechanics section 6)."""
-        square = abs(0.5 * self.beta - 1.0 / 24.0)
-        return (0.0, 1.0 / 480.0) if math.isclose(self.beta, 1.0 / 12.0) else (square, 0.0)
-
-    @property
-    def is_damped(self) -> bool:
-        """See `Scheme`."""
-        return _radius(self.amplification(_JUDGED_AT)) <= _DAMPED
 
     def amplification(self, x: float) -> FloatArray:
         """On (u, h u'): the accelerations -x^2 u at both ends put into Newmark's formulas."""
@@ -161,16 +144,6 @@ class AlphaScheme:
         """None: m <= f <= 1/2 and beta >= 1/4 + (f - m)/2 hold for every member offered."""
         return math.inf
 
-    @property
-    def period_error(self) -> tuple[float, float]:
-        """Of average acceleration, to which its phase is close where it damps little."""
-        return (1.0 / 12.0, 0.0)
-
-    @property
-    def is_damped(self) -> bool:
-        """See `Scheme`."""
-        return _radius(self.amplification(_JUDGED_AT)) <= _DAMPED
-
     def amplification(self, x: float) -> FloatArray:
         """On the predictors u*, v* and the memory e; the true acceleration is -x^2 u*/(1 + beta x^2)."""
         c = self.coefficients
@@ -186,9 +159,9 @@ class AlphaScheme:
         return np.asarray(2.0 * np.arctan(0.5 * x))
 
 
-def _radius(matrix: FloatArray) -> float:
-    """Spectral radius."""
-    return float(np.abs(np.linalg.eigvals(matrix)).max())
+def is_damped(scheme: Scheme) -> bool:
+    """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
+    return float(np.abs(np.linalg.eigvals(scheme.amplification(_JUDGED_AT))).max()) <= _DAMPED
 
 
 def hht_alpha(alpha: float) -> AlphaScheme:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.kernels.schemes import is_damped
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 
@@ -53,7 +54,7 @@ def least_steps(model: SceneModel, values: VariantValues) -> Array:
 
 def _alias(model: SceneModel, scale: Array) -> Array:
     """(V,) steps of the alias rule, of time scales rounded up: they rise with it."""
-    if model.scheme.is_damped:
+    if is_damped(model.scheme):
         return np.zeros_like(scale)
     cells, inverse = np.unique(np.ceil(np.log(scale) / ALIAS_CELL), return_inverse=True)
     return np.asarray(alias_steps(model, np.exp(ALIAS_CELL * cells))[inverse.reshape(-1)])
@@ -102,7 +103,7 @@ def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Count
     """Refuse fixed steps beyond the scheme's stability limit (fault 12), or too few for the alias rule where the scheme
     does not damp enough. Raises BadInput with limit and suggestion."""
     _check_limit(model, time_scale, steps)
-    if not model.scheme.is_damped:
+    if not is_damped(model.scheme):
         _check_alias(model, time_scale, steps)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,14 +32,7 @@ _TO_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
 _POWERS = np.arange(DEGREE + 1)
 
 
-class Solved(NamedTuple):
-    """Modal displacements and velocities over time, and how many times the right-hand side was asked.
-
-    states: scene times (S,) -> (2 N, S), q above q'.
-    """
-
-    states: Callable[[Array], Array]
-    evaluations: int
+Solution = Callable[[Array], Array]  # of scene times (S,): modal displacements above velocities (2 N, S)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +126,7 @@ class ModalEquations:
 
         return slope
 
-    def solve(self, method: str, tolerance: float, halted: Callable[[], bool] = lambda: False) -> Solved:
+    def solve(self, method: str, tolerance: float, halted: Callable[[], bool] = lambda: False) -> Solution:
         """Solve over the whole scene with a solver of SciPy; absolute tolerance: that part of the static deflection.
 
         Raises Interrupted where somebody asks to stop, RuntimeError where the solver gives up.
@@ -148,7 +141,7 @@ class ModalEquations:
         found = solve_ivp(slope, span, self.start, method=method, rtol=tolerance, atol=absolute, dense_output=True)
         if not found.success:
             raise RuntimeError(found.message)
-        return Solved(lambda tau: np.asarray(found.sol(tau * self.time_scale)), int(found.nfev))
+        return lambda tau: np.asarray(found.sol(tau * self.time_scale))
 
     @property
     def _span(self) -> tuple[float, float]:

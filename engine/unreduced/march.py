@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.bodies.modal.flexibility import symmetric_lu
-from engine.kernels.layout import DIVERGED, SOUND
+from engine.kernels.layout import SOUND
 from engine.march.stepper import Codes, go
-from engine.model.timeline import Impact, Segment, Timeline, build_timeline
+from engine.model.timeline import Impact, Segment, Timeline
 from engine.observation.histories import rows_sampled
 from engine.unreduced.rows import Along, Readings, readings, rider_of, softness, softness_slopes, tie_rows
 from engine.unreduced.scene import Unreduced
@@ -66,12 +66,6 @@ class Unfolded(NamedTuple):
     forces: Array
 
 
-def course_of(model: Unreduced, steps: int) -> Course:
-    """The whole way of a study's carriages in so many steps per passage or cycle; no free vibration afterwards."""
-    timeline = build_timeline(model.riders, steps, "whole")
-    return Course(timeline, model.study.carriage[model.study.clock].motion.time_scale)
-
-
 def march_unreduced(
     model: Unreduced, course: Course, counts: Counts, check: Callable[[], None] = lambda: None
 ) -> Unfolded:
@@ -85,7 +79,7 @@ def march_unreduced(
         check()
         return False
 
-    with np.errstate(all="ignore"):  # what is not finite shows in the histories
+    with np.errstate(all="ignore"):
         go(march, course.timeline.segments, halted)
     return Unfolded(march.sensors, march.forces)
 
@@ -249,7 +243,7 @@ class _March:
         self._keep(0, observed)
 
     def step(self, segment: Segment, table: _Table, observed: _Observed) -> Codes:
-        """The steps of a segment; (1,) code."""
+        """The steps of a segment; (1,) code, sound whatever happens: what is not finite shows in the histories."""
         factor = self._factor(float(f"{self.course.step(segment):.12g}"))
         h = factor.h
         for n in range(1, segment.steps + 1):
@@ -258,7 +252,7 @@ class _March:
             self.a, self.force = self._solve(table.says, n, factor, u, v)
             self.u, self.v = u + BETA * h**2 * self.a, v + GAMMA * h * self.a
             self._keep(n, observed)
-        return np.array([SOUND if np.isfinite(self.u).all() and np.isfinite(self.v).all() else DIVERGED], dtype=np.int8)
+        return np.array([SOUND], dtype=np.int8)
 
     def _factor(self, h: float) -> _Factor:
         if h not in self._factors:

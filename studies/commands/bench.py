@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from engine.batch.execution import execute, march_seconds, warm_up
+from engine.batch.execution import march_seconds, warm_up
 from engine.batch.plan import make_plan
 from engine.march.step_rules import allow_any_steps
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
-from results_schema.arrays import Array
 from results_schema.errors import BadInput
-from results_schema.store.rows import Chunk
 
 BEST_OF = 7
 MOST_REPEATS = 20
@@ -158,15 +156,3 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
         scheme=scene.scheme,
         ties=scene.ties,
     )
-
-
-def largest_deflections(scene: Scene) -> Array:
-    """(variants,) largest magnitude of the midspan deflection, m: what the march that `measure` times computes."""
-    found = np.empty(scene.variants)
-
-    def take(chunk: Chunk) -> None:
-        variants, arrays = chunk.rows
-        found[variants] = np.maximum(arrays[f"{MIDSPAN}_max"], -arrays[f"{MIDSPAN}_min"])
-
-    execute(make_plan(scene.study(), check_steps=allow_any_steps), take)
-    return found

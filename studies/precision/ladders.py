@@ -38,7 +38,7 @@ def steps(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work)
     """Every scheme over the ladder of steps, at the study's own number of modes."""
     model = precision.scene_model(study, overrides)
     solutions = [ModalEquations(model).solve("DOP853", tol, work.halted) for tol in REFERENCE_TOLERANCES]
-    reference, other = (precision.modal_reference(model, solved) for solved in solutions)
+    reference, other = (precision.modal_reference(model, states) for states in solutions)
     shape = (len(asked.schemes), len(asked.step_counts))
     errors, seconds = np.full((*shape, len(precision.QUANTITIES)), np.nan), np.full(shape, np.nan)
     marched = {s: precision.with_scheme(model, s) if s in precision.MARCHED else model for s in asked.schemes}
@@ -71,9 +71,9 @@ def solvers(study: Study, overrides: Mapping[str, Any], work: Work) -> xr.Datase
     for method, tolerances in SOLVERS.items():
         for tolerance in tolerances:
             start = time.perf_counter()
-            solved = equations.solve(method, tolerance, work.halted)
+            states = equations.solve(method, tolerance, work.halted)
             seconds.append(time.perf_counter() - start)
-            errors.append(reference.errors(precision.as_run(precision.modal_reference(model, solved), model)))
+            errors.append(reference.errors(precision.as_run(precision.modal_reference(model, states), model)))
     return xr.Dataset({"error": (("solver", "quantity"), np.array(errors)), "seconds": ("solver", seconds)})
 
 

@@ -21,7 +21,7 @@ from engine.march.march import Marched, march, prepare
 from engine.march.richardson import march_pair
 from engine.march.tables import SceneTables
 from engine.methods.comparison import COMPARISON, march_comparison, prepare_comparison
-from engine.methods.ode import ModalEquations, Solved
+from engine.methods.ode import ModalEquations, Solution
 from engine.model.scene_model import SceneModel, build_model
 from engine.model.station_path import Along, ways
 from engine.model.timeline import Segment
@@ -176,13 +176,13 @@ def static_scale(model: SceneModel) -> tuple[Array, float]:
     return np.abs(tables.static_over_window.force[:, :, 0]).max(axis=0) * weight, weight
 
 
-def modal_reference(model: SceneModel, solved: Solved) -> Reference:
+def modal_reference(model: SceneModel, states: Solution) -> Reference:
     """A reference from a solution of the same modal equations."""
     equations = ModalEquations(model)
 
     def read(tables: SceneTables, counts: Counts) -> Array:
         _, tau = tables.timeline.moments(counts)
-        return equations.readings(tables, counts, solved.states(tau))
+        return equations.readings(tables, counts, states(tau))
 
     fine = SceneTables(model, FINE_STATIONS, "whole")
     everywhere = read(fine, np.arange(fine.timeline.window[1] + 1))

@@ -19,9 +19,6 @@ from studies.runs.identity import files_of
 CONVENTIONS = "CF-1.11"
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "xarray", "netCDF4", "dask", "pydantic", "pint")
 
-# The only attributes in which a resumed archive may differ from an uninterrupted one.
-OF_TIME_AND_MACHINE = ("history", "machine", "run_seconds")
-
 
 def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
     """Root attributes of an archive. key: what the results belong to; seconds: duration of this run."""

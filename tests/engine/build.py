@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from engine.model.timeline import build_timeline
 from engine.scene.study import Study
+from engine.unreduced.march import Course
+from engine.unreduced.scene import Unreduced
 
 Table = dict[str, Any]
 
@@ -89,3 +92,9 @@ def study(bed: Table, carriages: Table | Mapping[str, Table], **changes: Any) ->
         "output": {"histories": "none"},
     }
     return Study(**(tables | changes))
+
+
+def course_of(model: Unreduced, steps: int) -> Course:
+    """The whole way of a study's carriages in so many steps per passage or cycle; no free vibration afterwards."""
+    timeline = build_timeline(model.riders, steps, "whole")
+    return Course(timeline, model.study.carriage[model.study.clock].motion.time_scale)

@@ -69,7 +69,7 @@ def test_the_reference_solves_the_equations_of_the_naive_twin() -> None:
     equations = ModalEquations(model)
     tables = SceneTables(model, 40, "whole")
     counts = np.arange(41)
-    found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11).states(counts / 40))
+    found = equations.readings(tables, counts, equations.solve("DOP853", 1e-11)(counts / 40))
     deflection, force = histories(*LIGHT, 40, exact=True)
     np.testing.assert_allclose(found[:, 0], deflection, atol=1e-9 * np.abs(deflection).max())
     counted = np.arange(41) / 40 <= 0.98

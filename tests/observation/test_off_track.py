@@ -20,14 +20,14 @@ from engine.model.variant_values import VariantValues
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.statics.static_response import static_values
-from engine.unreduced.march import course_of, march_unreduced
+from engine.unreduced.march import march_unreduced
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_statics
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from tests.bodies.frames import LENGTH, body, straight
 from tests.bodies.models import Files, in_process
-from tests.engine.build import beam, mass, shuttle, swing
+from tests.engine.build import beam, course_of, mass, shuttle, swing
 from tests.observation.plane_frame import PlaneFrame
 from tests.unreduced.test_unreduced import apart
 

@@ -11,11 +11,11 @@ from engine import run
 from engine.bodies.build import build_body
 from engine.scene.study import Study
 from engine.unreduced import march as unreduced_march
-from engine.unreduced.march import course_of, march_unreduced
+from engine.unreduced.march import march_unreduced
 from engine.unreduced.scene import Unreduced, unreduced_model
 from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
 from results_schema.errors import BadInput
-from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
+from tests.engine.build import beam, course_of, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 
 GRAVITY = 9.81
 SECTION = {"area": 1.0, "second_moment": 1.0, "youngs_modulus": 1.0, "density": 1.0, "fibre_distance": 0.1}

@@ -42,7 +42,6 @@ MAX_POINTS = 50
 MAX_FIXED_INTERFACE_MODES = 64
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
-Theory = Literal["euler-bernoulli", "timoshenko"]
 _THEORIES = {"euler": "euler-bernoulli", "bernoulli": "euler-bernoulli"}
 TheoryWord = Annotated[str, AfterValidator(one_of("euler-bernoulli", "timoshenko", meant=_THEORIES))]
 MassWord = Annotated[str, AfterValidator(one_of("consistent", "lumped"))]
