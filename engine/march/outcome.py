@@ -20,7 +20,6 @@ from engine.kernels.layout import (
     SQUARES,
 )
 from engine.kernels.schemes import Scheme
-from engine.march.cycles import reduced
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
 from engine.march.richardson import march_scheme
@@ -29,7 +28,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
-from engine.observation.cycle_reduction import Reduction
+from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
 from results_schema.status import Fidelity, SchemeUsed, Status
 
@@ -121,7 +120,7 @@ def outcome(
         **_contact_forces(tables, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
-        **reduced(asked.reduction, tables, values, own, reduction),
+        **_reduced(asked.reduction, tables, values, own, reduction),
     }
     status, diverged_step = _status(tables.model, marched)
     for array in numbers.values():
@@ -325,3 +324,30 @@ def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
         rest = (counts - start) * (tables.free_seconds / steps)
         found = found + np.where(free, rest, 0.0)
     return found
+
+
+def _reduced(
+    reduction: Reduction | None, tables: SceneTables, values: VariantValues, counts: Counts, history: Array
+) -> Flat:
+    """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
+    if reduction is None:
+        return {}
+    loads = weights(tables.model, values)
+
+    def static() -> Array:
+        unit = tables.static_at(counts)
+        found = unit.gravity[:, :, None] * values.gravity
+        for r in range(loads.shape[0]):
+            found = found + unit.force[:, :, r, None] * loads[r]
+        return found
+
+    tau = tables.timeline.moments(counts)[1]
+    cycle = Cycle(
+        phase=(tau - tau[0]) / (tau[-1] - tau[0]),
+        position=tables.timeline.positions(0, counts.astype(np.float64)),
+        history=history,
+        motion=tables.model.clock,
+        find_static=static,
+        find_slope=lambda: tables.static_slope_at(counts)[:, :, None] * loads[0],
+    )
+    return dict(reduction(cycle))

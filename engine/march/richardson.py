@@ -54,7 +54,7 @@ def march_pair(
     Returns what `march` does of the extrapolated histories, extremes also from between stations, and (sensors, V) the
     largest estimated error of the finer march over its whole recorded history. Raises Halted.
     """
-    pair = _Pair(*(_whole_histories(part, values, counts, sampled) for part in (tables, tables.coarser)))
+    pair = _Pair(*(_Histories(**vars(prepare(part, values, counts, sampled))) for part in (tables, tables.coarser)))
     codes = go(pair, zip(tables.timeline.segments, tables.coarser.timeline.segments, strict=True), halted)
     return pair.fine.result(codes, size), from_blocks(pair.gap, size)[: len(tables.sensors)]
 
@@ -77,11 +77,6 @@ class _Histories(March):
         everywhere, nowhere = np.ones_like(watch.counted), np.zeros_like(watch.summed)
         record = Record(statistics, np.arange(segment.steps + 1), history)
         return Observed(watch._replace(counted=everywhere, summed=nowhere), record)
-
-
-def _whole_histories(tables: SceneTables, values: VariantValues, counts: Counts, sampled: int | None) -> _Histories:
-    """A march that is ready to go."""
-    return _Histories(**vars(prepare(tables, values, counts, sampled)))
 
 
 class _Both(NamedTuple):

@@ -13,7 +13,6 @@ from pydantic import Field, Strict, model_validator
 from engine.scene.motion_base import Array, Legs, Motion, Path, Reversal, Side
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
-from engine.study_file.splines import spline_at_rest, spline_range, spline_touches
 from engine.study_file.units import Dimensionless, Frequency, Length, Speed, Time, fault
 
 
@@ -224,7 +223,7 @@ class Waypoints(Motion):
         return float(max(np.abs(slopes).max(), np.abs(self.path(inner).dS).max()))
 
     def range(self) -> tuple[float, float]:
-        low, high = spline_range(np.array(self.times), np.array(self.positions)[:, None])
+        low, high = _spline_range(np.array(self.times), np.array(self.positions)[:, None])
         return float(low[0]), float(high[0])
 
     def checks(self, here: str, length: str) -> list[Check]:
@@ -234,11 +233,11 @@ class Waypoints(Motion):
         return [
             Check(f"{here}.times.0", times[:1], lambda t: t == 0.0, "the first time must be 0", "0 s"),
             Check(f"{here}.times", times, _ascending, "times must ascend", "each later than the one before"),
-            Check(f"{here}.positions", (length, *places, *times), spline_touches, _NO_TOUCH, _TOUCHING),
+            Check(f"{here}.positions", (length, *places, *times), _spline_touches, _NO_TOUCH, _TOUCHING),
         ]
 
     def law(self, tau: Array, side: Side) -> Path:
-        spline = spline_at_rest(np.array(self.times) / self.times[-1], np.array(self.positions))
+        spline = _spline_at_rest(np.array(self.times) / self.times[-1], np.array(self.positions))
         return Path(*(np.asarray(spline(tau, order), dtype=np.float64) for order in range(3)))
 
     def _derivatives(self) -> tuple[Array, Array, Array]:
@@ -266,3 +265,44 @@ def _touch_check(here: str, needs: tuple[str, ...], low: Any, high: Any) -> Chec
 
 def _ascending(*times: Any) -> Any:
     return reduce(np.logical_and, (later > earlier for earlier, later in pairwise(times)))
+
+
+def _spline_at_rest(times: Array, positions: Array) -> Any:
+    """The C2 cubic spline through positions (K,) or (K, V) at ascending times (K,), of zero slope at both ends."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(times, positions, bc_type="clamped")
+
+
+def _spline_range(times: Array, positions: Array) -> tuple[Array, Array]:
+    """Smallest and largest value of splines at rest at both ends: times (K,), positions (K, V) -> (V,), (V,).
+
+    The extremes lie at knots or where the quadratic derivative of a piece is zero.
+    """
+    spline = _spline_at_rest(times, positions)
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    c3, c2, c1, c0 = spline.c
+    spans = np.diff(times)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(c2**2 - 3.0 * c3 * c1)
+        stable = -(c2 + np.copysign(root, c2))
+        for inner in (stable / (3.0 * c3), c1 / stable):
+            value = ((c3 * inner + c2) * inner + c1) * inner + c0
+            valid = (inner > 0.0) & (inner < spans)
+            low = np.minimum(low, np.where(valid, value, np.inf).min(axis=0))
+            high = np.maximum(high, np.where(valid, value, -np.inf).max(axis=0))
+    return low, high
+
+
+def _spline_touches(length: Any, *numbers: Any) -> Any:
+    """Whether splines through positions at times, both as columns, have a part on the body."""
+    columns = np.broadcast_arrays(length, *numbers)
+    shape, flat = columns[0].shape, np.array([column.ravel() for column in columns], dtype=np.float64)
+    places, times = np.split(flat[1:], 2)
+    verdict = np.zeros(flat.shape[1], dtype=bool)
+    sets, member = np.unique(times, axis=1, return_inverse=True)
+    for index in range(sets.shape[1]):
+        chosen = np.flatnonzero(np.ravel(member) == index)
+        low, high = _spline_range(sets[:, index], places[:, chosen])
+        verdict[chosen] = (high > 0.0) & (low < flat[0, chosen])
+    return verdict.reshape(shape)

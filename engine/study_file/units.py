@@ -113,7 +113,7 @@ def _unit_factor(unit: str) -> tuple[Fraction, tuple[int, int, int], int]:
             raise fault("no such unit", expected='a product such as "kN m/rad" or "kg/m^3"', received=shortened(unit))
         if match[1]:
             power = sign * (int(match[2] or 1) if not match[3] else _SUPERSCRIPTS[match[3]])
-            scale, base = _named_unit(match[1])
+            scale, base = _COMMON.get(match[1]) or _named_by_pint(match[1])
             total *= scale**power
             exponents = [old + power * base.get(name, 0) for old, name in zip(exponents, _BASE, strict=True)]
             angle += power * base.get("radian", 0)
@@ -127,14 +127,9 @@ def _unit_factor(unit: str) -> tuple[Fraction, tuple[int, int, int], int]:
     return total, (exponents[0], exponents[1], exponents[2]), angle
 
 
-def _named_unit(name: str) -> tuple[Fraction, Mapping[str, int]]:
-    """Exact SI factor and exponents of base units of one name such as "kN"."""
-    return _COMMON[name] if name in _COMMON else _named_by_pint(name)
-
-
 @lru_cache(maxsize=256)
 def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
-    """The same of any unit; pint is imported here."""
+    """Exact SI factor and exponents of base units of a name such as "inch"; pint is imported here."""
     from pint import PintError
 
     try:

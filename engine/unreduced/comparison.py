@@ -17,7 +17,7 @@ from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.march.outcome import Flat
 from engine.march.tables import SceneTables
-from engine.model.scene_model import SceneModel, build_model
+from engine.model.scene_model import build_model
 from engine.model.timeline import refined
 from engine.model.variant_values import VariantValues, weights
 from engine.observation.histories import counts_shown
@@ -70,7 +70,7 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
     course = Course(
         refined(tables.timeline, by),
         float(values.time_scale(next(iter(study.carriage)))[0]),
-        _first_period(tables.model),
+        2.0 * np.pi / tables.model.first_omega,
     )
     found = march_unreduced(whole, course, by * counts, check)
     seen = np.isfinite(found.sensors)
@@ -114,10 +114,6 @@ def _tables(own: SceneTables, study: Study) -> SceneTables:
     found = SceneTables(model, own.steps, own.window, refinement=own.refinement)
     found.timeline = own.timeline
     return found
-
-
-def _first_period(model: SceneModel) -> float:
-    return 2.0 * np.pi / model.first_omega
 
 
 def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
