@@ -75,6 +75,22 @@ def check(study: str) -> None:
 
 @commands.command()
 @click.argument("study")
+@click.option("-o", "folder", type=_FOLDER, metavar="FOLDER", help="Where to write; default: <study>-drawing, here.")
+def draw(study: str, folder: Path | None) -> None:
+    """Draw the scene of STUDY to scale, and its mode shapes as they move.
+
+    One self-contained HTML page, before anything is run: a wrong support, unit or node is seen at once.
+    """
+    import engine
+    from studies.commands import catalogue, console
+    from studies.reporting.drawing import write_drawing
+
+    path = catalogue.find_study(study)
+    console.say(f"wrote {write_drawing(engine.load(path), folder or Path(f'{path.stem}-drawing'))}")
+
+
+@commands.command()
+@click.argument("study")
 @click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
 @click.option("--overwrite", is_flag=True, help="Replace another archive, and unfinished parts of another study.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")

@@ -94,7 +94,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
     Raises BadInput (no such archive, no such place) and ArchiveError before anything is written, and OutputFailed.
     """
     folder = Path(folder)
-    _check_folder(folder)
+    check_folder(folder, PAGE)
     source = open_archive(archive)
     results = results_of(source)
     figures = [
@@ -104,7 +104,7 @@ def write_report(archive: Path | str, folder: Path | str) -> Path:
         *unreduced.pictures(results, source.groups.get(GROUP)),
     ]
     page = page_of(source, results, figures)
-    text = _template().render(page=page)
+    text = page_template(PAGE).render(page=page)
     files.make_folder(folder)
     files.check_output_place(folder / PAGE)
     for figure, drawn in zip(figures, page.figures, strict=True):
@@ -145,7 +145,8 @@ def _audited(source: Archive, results: Results) -> list[str]:
     return [f"{text[0].upper()}{text[1:]}." for text in told_audit(source.groups.get(audit.GROUP), results)]
 
 
-def _template() -> Template:
+def page_template(name: str) -> Template:
+    """The template of a page that stands by itself."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -156,7 +157,7 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters |= {"soft": _soft, "minus": _minus}
-    return environment.get_template(PAGE)
+    return environment.get_template(name)
 
 
 def _soft(text: str) -> Markup:
@@ -169,12 +170,13 @@ def _minus(text: str) -> str:
     return re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path, page: str) -> None:
+    """Raise BadInput where a page cannot be written into a folder."""
     if folder.exists() and not folder.is_dir():
-        raise BadInput("the report's folder is a file", where=str(folder), expected="a folder", received="a file")
+        raise BadInput("the page's folder is a file", where=str(folder), expected="a folder", received="a file")
     if not folder.parent.is_dir():
-        raise BadInput("the folder above the report does not exist", where=str(folder.parent), remedy="create it first")
-    files.check_output_place((folder if folder.exists() else folder.parent) / PAGE)
+        raise BadInput("the folder above the page's does not exist", where=str(folder.parent), remedy="create it first")
+    files.check_output_place((folder if folder.exists() else folder.parent) / page)
 
 
 def _fill(content: bytes, path: Path) -> None:

@@ -100,6 +100,13 @@ def test_another_study_is_overwritten_only_if_asked(here: Path, capsys: Captured
     assert open_archive("a.nc").root.title == "heavy"
 
 
+def test_draw_writes_one_page_beside_the_study(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["draw", "small.toml"]) == 0
+    assert "small-drawing/drawing.html" in capsys.readouterr().out
+    assert {path.name for path in here.iterdir()} == {"small.toml", "small-drawing"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -120,6 +127,9 @@ def test_another_study_is_overwritten_only_if_asked(here: Path, capsys: Captured
         (["init", "asymetry"], 'did you mean "asymmetry"'),
         (["init", "passage", "small.toml"], "small.toml: there is a file already"),
         (["init", "passage", "missing/a.toml"], "the output folder does not exist"),
+        (["draw", "nothing.toml"], "nothing.toml.*cannot be read"),
+        (["draw", "broken.toml"], "body.beam.lenght: unknown key"),
+        (["draw", "small.toml", "-o", "missing/folder"], "the folder above the page's does not exist"),
         (["info", "nothing.nc"], "nothing.nc: no such file"),
         (["report", "nothing.nc"], "nothing.nc: no such file"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from typing import Annotated, Literal
 
@@ -9,6 +10,7 @@ from pydantic import AfterValidator, Field, Strict, Tag
 
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh
 from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.outline import ALONG, HELD_AT, Elastic, Held, Outline, straight
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
@@ -118,6 +120,18 @@ class Beam(Body):
         from engine.bodies.beam.modes import uniform_beam
 
         return uniform_beam(self, AUTO_MODES if self.modes == "auto" else int(self.modes))
+
+    def outline(self, modal: ModalBody) -> Outline:
+        ends = zip(self.ends, (0.0, self.length), (-ALONG, ALONG), strict=True)
+        springs = [
+            Elastic(f"at {s.at:.10g} m", s.at * ALONG, (0.0, 0.0, s.stiffness), (0.0, s.rotational, 0.0), s.damping > 0)
+            for s in self.springs
+        ]
+        return replace(
+            straight(modal),
+            held=tuple(Held(f"at {s:.10g} m", s * ALONG, HELD_AT[end], out) for end, s, out in ends if end in HELD_AT),
+            springs=tuple(springs),
+        )
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]

@@ -73,15 +73,8 @@ def _whole(content: Content) -> _Whole:
 def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     whole = _whole(Content.of(frame, without=ABOUT_MODES))
     assembly, flexibility, track, statics = whole.assembly, whole.flexibility, whole.track, whole.statics
-    omega, shapes = frame_modes(frame, assembly, flexibility)
-    moved = whole.ends.of(assembly.whole(shapes))
-    masses = MASSES[frame.mass_matrix](track.beams)
-    along = track_shapes(track, moved, mode_forces(track, moved, omega, masses))
-    turn = settled(omega, along, statics.length, shapes)
-    moved, shapes = without_rounding(moved @ turn, (0, 1)), shapes @ turn
-    kept = kept_modes(frame, omega)
-    omega, moved, shapes = _frozen(omega[kept]), moved[:, :, kept], shapes[:, kept]
-    gravity = unit(frame.gravity)
+    omega, moved, shapes = _kept(frame, whole)
+    masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
     loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
@@ -104,6 +97,24 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         along=along_shapes(track, moved, forces),
         gauges={name: frame_gauge(read, spot, loads) for name, spot in spots},
     )
+
+
+def _kept(frame: Frame, whole: _Whole) -> tuple[Array, Array, Array]:
+    """omega (N,), motions of the track's ends (E + 1, 6, N) and shapes (n, N) of the modes that the frame keeps."""
+    assembly, track = whole.assembly, whole.track
+    omega, shapes = frame_modes(frame, assembly, whole.flexibility)
+    moved = whole.ends.of(assembly.whole(shapes))
+    along = track_shapes(track, moved, mode_forces(track, moved, omega, MASSES[frame.mass_matrix](track.beams)))
+    turn = settled(omega, along, whole.statics.length, shapes)
+    kept = kept_modes(frame, omega)
+    return _frozen(omega[kept]), without_rounding(moved @ turn, (0, 1))[:, :, kept], (shapes @ turn)[:, kept]
+
+
+def motion_of_points(frame: Frame) -> tuple[Assembly, Array]:
+    """The frame's matrices, and (P, 6, N) displacements and rotations of all its points in every kept mode."""
+    whole = _whole(Content.of(frame, without=ABOUT_MODES))
+    shapes = whole.assembly.whole(_kept(frame, whole)[2])
+    return whole.assembly, shapes.reshape(-1, 6, shapes.shape[1])
 
 
 def frame_modes(frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:

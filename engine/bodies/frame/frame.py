@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
-from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, unit
+from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import Body, Spot, Spots, check_level
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.outline import Outline
 from engine.study_file.checks import Check
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
@@ -282,6 +284,20 @@ class Frame(Body):
             update={"fixed_interface_modes": min(times * self.fixed_interface_modes, MAX_FIXED_INTERFACE_MODES)}
         )
         return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
+
+    def outline(self, modal: ModalBody) -> Outline:
+        from engine.bodies.frame.outline import frame_outline
+
+        return frame_outline(self)
+
+    def spot_place(self, spot: Spot) -> Array:
+        if spot.member is not None:
+            first, last = member_ends(self, spot.member)
+            return np.asarray(first + spot.at * unit(last - first))
+        if spot.point is None:
+            return np.array(self.place(str(spot.node)))
+        point = self.point[spot.point]
+        return np.asarray(np.array(self.place(point.node)) + point.offset)
 
     @property
     def whole(self) -> Frame:

@@ -57,13 +57,9 @@ def _imported_body(content: _Content, spots: Spots) -> ModalBody:
 
 
 def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
-    held = held_model(body)
+    held, places = held_model(body), body.line.places
     rows, slopes = track_rows(body, held)
-    omega, shapes = _modes(body, held)
-    ends = slopes @ (rows.T @ shapes)
-    places = body.line.places
-    turn = settled(omega, LineShapes(places, ends), body.length, shapes)
-    ends, shapes = ends @ turn, shapes @ turn
+    omega, ends, shapes = _settled_modes(body, held, rows, slopes)
     gravity = unit(body.gravity_direction)
     pull = held.drag @ gravity
     flexibility = held.flexibility
@@ -104,6 +100,25 @@ def _along_ends(body: Imported, held: HeldModel, shapes: Array) -> Array:
     found[::2] = node_rows(held, body.line.nodes, body.line.tangent, 0).T @ shapes
     found[1::2] = spline_slopes(body.line.places) @ found[::2]
     return found
+
+
+def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) -> tuple[Array, Array, Array]:
+    """omega (N,), values and slopes at the track's nodes (2 P, N), and shapes (n, N)."""
+    omega, shapes = _modes(body, held)
+    ends = slopes @ (rows.T @ shapes)
+    turn = settled(omega, LineShapes(body.line.places, ends), body.length, shapes)
+    return omega, ends @ turn, shapes @ turn
+
+
+def motion_of_nodes(body: Imported) -> tuple[HeldModel, Array]:
+    """The held model, and (M, 3, N) displacements of its nodes in every mode; nodes without rows stay."""
+    held = held_model(body)
+    _, _, shapes = _settled_modes(body, held, *track_rows(body, held))
+    owner, way = held.file.owner[held.free], held.file.direction[held.free]
+    moves = (owner >= 0) & (way < 3)
+    found = np.zeros((len(held.file.nodes), 3, shapes.shape[1]))
+    found[owner[moves], way[moves]] = shapes[moves]
+    return held, found
 
 
 def _modes(body: Imported, held: HeldModel) -> tuple[Array, Array]:

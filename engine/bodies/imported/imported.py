@@ -19,7 +19,8 @@ from engine.bodies.frame.frame import Place, Support, Vector
 from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.outline import Outline
 from engine.study_file.checks import Check
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
@@ -234,6 +235,15 @@ class Imported(Body):
 
     def build(self) -> ModalBody:
         return self.read_at(())
+
+    def outline(self, modal: ModalBody) -> Outline:
+        from engine.bodies.imported.outline import imported_outline
+
+        return imported_outline(self)
+
+    def spot_place(self, spot: Spot) -> Array:
+        node = spot.node if spot.point is None else self.point[spot.point].node
+        return np.asarray(self.model.places[self.model.nodes == node][0] * self.length_unit)
 
     def read_at(self, spots: Spots) -> ModalBody:
         from engine.bodies.imported.body import imported_body

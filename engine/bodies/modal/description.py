@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 from pydantic import Field, PrivateAttr, Strict, Tag
 
 from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.outline import Outline, straight
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside
 from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form, nearest
@@ -119,6 +120,14 @@ class Body(Spec):
     def read_at(self, spots: Spots) -> ModalBody:
         """The same with gauges at nodes and places of members, where it has such."""
         return self.build()
+
+    def outline(self, modal: ModalBody) -> Outline:
+        """What it looks like; modal: the body with its modes."""
+        return straight(modal)
+
+    def spot_place(self, spot: Spot) -> Array | None:
+        """(3,) where a sensor reads off its track, m, in the coordinates of its outline; None where that is unknown."""
+        return None
 
     @property
     def whole(self) -> Body | None:

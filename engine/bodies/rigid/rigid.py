@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from engine.bodies.modal.description import Body
 from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.outline import ALONG, DOWN, Line, Lump, Outline, straight
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Inertia, Length, Mass
 from results_schema.quantities import OF_SECTION
+
+BOX = 0.1  # height over length, as it is drawn
 
 
 class Rigid(Body):
@@ -47,6 +52,15 @@ class Rigid(Body):
         from engine.bodies.rigid.body import rigid_body
 
         return rigid_body(self)
+
+    def outline(self, modal: ModalBody) -> Outline:
+        """A box, as nothing else of it is known."""
+        found = straight(modal)
+        line, top = found.lines[0], -BOX * self.length * DOWN
+        corners = [line.points, line.points[::-1] + top, line.points[:1]]
+        box = Line(np.concatenate(corners), np.concatenate([line.motion, line.motion[::-1], line.motion[:1]]))
+        centre = Lump("centre of mass", self.centre_of_mass * ALONG, self.mass)
+        return replace(found, lines=(box,), masses=(centre,))
 
     def checks(self, here: str) -> list[Check]:
         if self.centre is None:

@@ -1,0 +1,113 @@
+"""Shapes that swing: small SVG elements without script, animated from one end of the swing to the other (SMIL)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.arrays import Array
+from studies.pictures.scene_layout import UP, Layout, Placed
+
+WIDTH, LEAST_HEIGHT = 320.0, 110.0  # of a picture, in its own units
+MARGIN = 12.0
+SWING = 0.11  # largest motion over the size of what moves
+BLOCK = 0.018  # half a carriage over the same
+SIDE, FRONT, PLAN = np.eye(3)[[0, 2]], np.eye(3)[[1, 2]], np.eye(3)[[0, 1]]
+SPACE = np.array([[0.883, 0.469, 0.0], [-0.176, 0.331, 0.927]])  # from the right, a third of a right angle above
+FLAT, STILL = 1e-6, 1e-4
+EASE = 'calcMode="spline" keyTimes="0;.5;1" keySplines=".37 0 .63 1;.37 0 .63 1" dur="2.4s" repeatCount="indefinite"'
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Something that moves: points (P, 3) and their motion (P, 3) at the end of a swing; dots: not joined by lines."""
+
+    points: Array
+    motion: Array
+    dots: bool = False
+
+
+def view_of(points: Array) -> Array:
+    """(2, 3) the view that shows a scene: from the side where it lies in one plane, else from above at an angle."""
+    extent = np.ptp(points, axis=0)
+    if extent[1] <= FLAT * extent.max():
+        return SIDE
+    return FRONT if extent[0] <= FLAT * extent.max() else SPACE
+
+
+def view_of_all(shapes: Sequence[Sequence[Piece]]) -> Array:
+    """(2, 3) the view that shows every one of several shapes: none moves out of it alone."""
+    found = []
+    for piece in (piece for pieces in shapes for piece in pieces):
+        largest = float(np.abs(piece.motion).max()) or 1.0
+        far = np.where(np.abs(piece.motion) > STILL * largest, piece.motion, 0.0) / largest
+        found += [piece.points, piece.points + float(np.ptp(piece.points, axis=0).max()) * far]
+    return view_of(np.concatenate(found))
+
+
+def body_pieces(body: Placed, amplitudes: Array) -> Iterator[Piece]:
+    """A body that moves by its modes times `amplitudes` (N,)."""
+    for line in body.outline.every_line:
+        dots = line is body.outline.cloud
+        yield Piece(body.at(line.points), line.motion @ amplitudes @ body.turn.T, dots)
+
+
+def scene_pieces(scene: Layout, amplitudes: Array) -> list[Piece]:
+    """All bodies and carriages by the modes of all bodies and of sprung masses (N,)."""
+    model, found = scene.model, list[Piece]()
+    for body in scene.bodies.values():
+        found += body_pieces(body, amplitudes[body.part.modes])
+    size = BLOCK * float(np.ptp(scene.points, axis=0).max())
+    for number, tie in enumerate(model.carriages):
+        if tie.rides is not None or not model.reacts(number):
+            continue
+        modal = model.bodies[tie.body].modal
+        place = scene.positions[tie.name]
+        on = 0.0 <= place <= modal.length
+        row = modal.shape([min(max(place, 0.0), modal.length)])[0] * on
+        moved = [float(row @ amplitudes[model.bodies[tie.body].modes])]
+        sprung = [spring.mode for spring in model.springs_of(number).values() if spring.mode is not None]
+        moved += [float(amplitudes[mode]) for mode in sprung]
+        for step, down in enumerate(moved):
+            found.append(_block(scene.touched(tie.name) + 3.0 * step * size * UP, size, down))
+    return found
+
+
+def _block(foot: Array, size: float, down: float) -> Piece:
+    corners = size * np.array([[-1, 0, 0], [1, 0, 0], [1, 0, 2], [-1, 0, 2], [-1, 0, 0]], dtype=np.float64)
+    return Piece(foot + corners, np.tile([0.0, 0.0, -down], (5, 1)))
+
+
+def moving(pieces: Sequence[Piece], view: Array, label: str) -> str:
+    """An SVG element in which the pieces swing; grey: at rest."""
+    largest = max(float(np.linalg.norm(piece.motion, axis=1).max()) for piece in pieces)
+    points = np.concatenate([piece.points for piece in pieces])
+    swing = SWING * float(np.ptp(points, axis=0).max()) / (largest or 1.0)
+    ends = [[(piece.points + sign * swing * piece.motion) @ view.T for piece in pieces] for sign in (1.0, -1.0, 0.0)]
+    every = np.concatenate([line for end in ends for line in end])
+    low, high = every.min(axis=0), every.max(axis=0)
+    scale = (WIDTH - 2.0 * MARGIN) / max(high[0] - low[0], 0.6 * (high[1] - low[1]))
+    height = max(LEAST_HEIGHT, scale * (high[1] - low[1]) + 2.0 * MARGIN)
+    middle = 0.5 * (low + high)
+
+    def path(end: list[Array], dots: bool) -> str:
+        chosen = [line for line, piece in zip(end, pieces, strict=True) if piece.dots == dots]
+        return "".join(_path((line - middle) * [scale, -scale] + [0.5 * WIDTH, 0.5 * height], dots) for line in chosen)
+
+    drawn = []
+    for dots, width in ((False, 1.6), (True, 2.6)):
+        out, back, rest = (path(end, dots) for end in ends)
+        if rest:
+            drawn.append(f'<path class="rest" stroke-width="{0.6 * width}" d="{rest}"/>')
+            swinging = f'<animate attributeName="d" values="{out};{back};{out}" {EASE}/>'
+            drawn.append(f'<path class="moving" stroke-width="{width}" d="{out}">{swinging}</path>')
+    box = f'viewBox="0 0 {WIDTH:.0f} {height:.0f}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {box} role="img" aria-label="{label}">{"".join(drawn)}</svg>'
+
+
+def _path(points: NDArray[np.float64], dots: bool) -> str:
+    texts = [f"{x:.1f} {y:.1f}" for x, y in points]
+    return "".join(f"M{text}h0" for text in texts) if dots else f"M{texts[0]}L{' '.join(texts[1:])}"

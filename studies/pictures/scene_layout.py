@@ -1,0 +1,220 @@
+"""Where the things of a scene stand in space: x and y level, z upward, in m.
+
+Frames and bodies out of files stand where their coordinates say, beams along x. What rides stands over its contacts, a
+little above the tracks so that these can be seen; further bodies under it stand below their contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.bodies.modal.description import Spot
+from results_schema.arrays import Array
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.outline import Outline
+    from engine.model.scene_model import BodyPart, SceneModel
+    from engine.scene.carriages import Carriage, Contact
+    from engine.scene.sensors import Sensor
+
+GAP = 0.06  # of the scene's size, between a track and what rides on it
+UP = np.array([0.0, 0.0, 1.0])
+SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A body in the scene: turn (3, 3) and shift (3,) take its own coordinates there."""
+
+    part: BodyPart
+    outline: Outline
+    turn: Array
+    shift: Array
+
+    def at(self, points: Array) -> Array:
+        """Places (..., 3) in the scene."""
+        return np.asarray(points @ self.turn.T + self.shift)
+
+    def along(self, s: float | Array) -> Array:
+        """Places (..., 3) at s on the track, or before and behind it."""
+        start, end = self.outline.track
+        return self.at(start + np.asarray(s)[..., None] * (end - start) / self.part.modal.length)
+
+    @property
+    def forward(self) -> Array:
+        """(3,) level unit vector along the track."""
+        return _level(self.turn @ np.diff(self.outline.track, axis=0)[0])
+
+
+class Standing(NamedTuple):
+    """A contact: its name, where it stands on a track and where it holds what rides, (3,)."""
+
+    name: str
+    below: Array
+    above: Array
+    contact: Contact
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A scene in space; positions: of all carriages, m along their tracks; contacts: of carriages with a body."""
+
+    model: SceneModel
+    bodies: Mapping[str, Placed]
+    positions: Mapping[str, float]
+    contacts: Mapping[str, tuple[Standing, ...]]
+
+    def touched(self, carriage: str) -> Array:
+        """(3,) where a carriage stands."""
+        return self.bodies[self.model.study.carriage[carriage].on].along(self.positions[carriage])
+
+    def read(self, sensor: Sensor) -> Array | None:
+        """(3,) where a sensor reads; None where that is unknown."""
+        if sensor.rides is not None:
+            at_contact = [c.below for c in self.contacts.get(sensor.rides, ()) if c.name == sensor.contact]
+            return at_contact[0] if at_contact else self.touched(sensor.rides)
+        body = self.bodies[str(sensor.body)]
+        if sensor.spot is None:
+            return body.along(float(sensor.at or 0.0))
+        place = self.model.study.body[str(sensor.body)].spot_place(sensor.spot)
+        return None if place is None else body.at(place)
+
+    @property
+    def points(self) -> Array:
+        """(P, 3) all of its bodies."""
+        return np.concatenate([body.at(points) for body in self.bodies.values() for points in _points(body.outline)])
+
+
+def _points(outline: Outline) -> list[Array]:
+    return [outline.track, *(line.points for line in outline.every_line)]
+
+
+def starts(model: SceneModel) -> dict[str, float]:
+    """Where every carriage starts, m."""
+    return {tie.name: float(tie.rider.motion.path(0.0).S) for tie in model.carriages}
+
+
+def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:
+    """The scene with its carriages at some positions."""
+    carriages = model.study.carriage
+    parts = {part.name: (part, model.study.body[part.name].outline(part.modal)) for part in model.bodies}
+    gap = GAP * max(float(np.ptp(np.concatenate(_points(outline)), axis=0).max()) for _, outline in parts.values())
+    placed, contacts = dict[str, Placed](), dict[str, tuple[Standing, ...]]()
+    riding = {name: c for name, c in carriages.items() if c.riding_body is not None}
+    later = {body for c in riding.values() for body in c.bodies if body != c.on}
+    for body, part in parts.items():
+        if body not in later:
+            placed[body] = _on_the_ground(*part, placed, gap)
+    while riding:
+        name, carriage = next((item for item in riding.items() if item[1].on in placed), next(iter(riding.items())))
+        if carriage.on not in placed:  # two that ride stand each on a track beside that of the other
+            placed[carriage.on] = _on_the_ground(*parts[carriage.on], placed, gap)
+        del riding[name]
+        body = str(carriage.riding_body)
+        placed[body] = _above(model, carriage, parts[body], placed, positions[name], gap)
+        for other in carriage.ridden:
+            if other not in placed:
+                placed[other] = _under(model, carriage, parts[other], placed)
+        contacts[name] = tuple(_contacts(model, carriage, placed, positions[name]))
+    return Layout(model, {name: placed[name] for name in parts}, positions, contacts)
+
+
+def _level(vector: Array) -> Array:
+    """The level part of a vector as a unit vector; x where it has none."""
+    level = vector * [1.0, 1.0, 0.0]
+    size = float(np.linalg.norm(level))
+    return level / size if size > SAME * np.linalg.norm(vector) else np.array([1.0, 0.0, 0.0])
+
+
+def _upright(outline: Outline) -> Array:
+    """(3, 3) turn after which gravity acts along -z."""
+    up = -outline.down
+    if up @ UP > 1.0 - SAME:
+        return np.eye(3)
+    along = np.diff(outline.track, axis=0)[0]
+    across = np.cross(up, along)
+    if np.linalg.norm(across) < SAME * np.linalg.norm(along):
+        across = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    across = across / np.linalg.norm(across)
+    return np.array([np.cross(across, up), across, up])
+
+
+def _about_up(one: Array, other: Array) -> Array:
+    """(3, 3) turn about z from one level direction to another."""
+    cosine, sine = float(one @ other), float(np.cross(one, other)[2])
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _on_the_ground(part: BodyPart, outline: Outline, placed: Mapping[str, Placed], gap: float) -> Placed:
+    """Where its coordinates say; what has none stands below all others."""
+    found = Placed(part, outline, _upright(outline), np.zeros(3))
+    if outline.nodes or not placed:
+        return found
+    lowest = min(float(body.at(points)[:, 2].min()) for body in placed.values() for points in _points(body.outline))
+    return Placed(part, outline, found.turn, (lowest - 4.0 * gap) * UP)
+
+
+def _own_places(model: SceneModel, carriage: Carriage, part: BodyPart, outline: Outline) -> Array:
+    """(C, 3) where contacts hold the body that rides, in its own coordinates."""
+    body, (start, end) = model.study.body[part.name], outline.track
+    found = []
+    for contact in carriage.riding_contacts.values():
+        named = None if contact.point is None else body.spot_place(Spot(point=contact.point))
+        share = (contact.at or 0.0) / part.modal.length
+        found.append(start + share * (end - start) if named is None else named)
+    return np.array(found)
+
+
+def _above(
+    model: SceneModel,
+    carriage: Carriage,
+    rider: tuple[BodyPart, Outline],
+    placed: Mapping[str, Placed],
+    position: float,
+    gap: float,
+) -> Placed:
+    """A body over its contacts: of the ways along and across its own track that which suits their offsets best."""
+    part, outline = rider
+    below, offsets = placed[carriage.on], np.array(carriage.contact_offsets(part.modal.length))
+    free = Placed(part, outline, _upright(outline), np.zeros(3))
+    own = _own_places(model, carriage, part, outline)
+    along, across = free.forward, np.cross(UP, free.forward)
+    ways = [along, across, -along, -across]
+    misfits = np.array([np.var(free.at(own) @ way - offsets) for way in ways])
+    way = ways[int(np.argmax(misfits <= misfits.min() + SAME * part.modal.length**2))]
+    forward = below.forward
+    turn = _about_up(way, forward) @ free.turn
+    held, foot, aside = own @ turn.T, below.along(position), np.cross(UP, forward)
+    on = np.array([(contact.on or carriage.on) == carriage.on for contact in carriage.riding_contacts.values()])
+    shift = float(foot @ forward + np.mean(offsets - held @ forward)) * forward
+    shift = shift + float(foot @ aside - np.mean(held[on] @ aside)) * aside
+    return Placed(part, outline, turn, shift + float(foot[2] + gap - held[:, 2].mean()) * UP)
+
+
+def _under(
+    model: SceneModel, carriage: Carriage, below: tuple[BodyPart, Outline], placed: Mapping[str, Placed]
+) -> Placed:
+    """A further body below its contacts, along whose track places count as on the first one."""
+    part, outline = below
+    first, rider = placed[carriage.on], placed[str(carriage.riding_body)]
+    free = Placed(part, outline, _upright(outline), np.zeros(3))
+    turn = _about_up(free.forward, first.forward) @ free.turn
+    own = rider.at(_own_places(model, carriage, rider.part, rider.outline))
+    here = [contact.on == part.name for contact in carriage.riding_contacts.values()]
+    aside, start = np.cross(UP, first.forward), first.along(0.0)
+    start = start + float(own[here].mean(axis=0) @ aside - start @ aside) * aside
+    return Placed(part, outline, turn, start - turn @ outline.track[0])
+
+
+def _contacts(model: SceneModel, carriage: Carriage, placed: Mapping[str, Placed], position: float) -> list[Standing]:
+    rider = placed[str(carriage.riding_body)]
+    held = rider.at(_own_places(model, carriage, rider.part, rider.outline))
+    offsets = carriage.contact_offsets(rider.part.modal.length)
+    return [
+        Standing(name, placed[contact.on or carriage.on].along(position + ahead), above, contact)
+        for (name, contact), ahead, above in zip(carriage.riding_contacts.items(), offsets, held, strict=True)
+    ]

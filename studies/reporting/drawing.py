@@ -1,0 +1,271 @@
+"""The drawing of a study: one page with its scene to scale, its mode shapes as they move, and its key numbers.
+
+As a report it stands by itself, without script; nothing is marched for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.bodies.modal.outline import HELD_AT
+from engine.model.distinct_models import base_scene
+from engine.model.station_path import frozen
+from engine.model.variant_values import VariantValues, moving_mass, weight
+from engine.scene.sweep import expand
+from engine.statics.coupled_modes import coupled_modes
+from results_schema.arrays import Array
+from results_schema.errors import BadInput
+from results_schema.store import files
+from studies.at_rest.positions import way_of
+from studies.pictures.common.figures import svg
+from studies.pictures.moving_shapes import body_pieces, moving, scene_pieces, view_of_all
+from studies.pictures.scene import pictures
+from studies.pictures.scene_layout import Layout, Placed, layout, starts
+from studies.protocol.study import kind_of
+from studies.reporting.report import Drawn, Row, check_folder, page_template
+from studies.results.formatting import counted, number, percent, quantity
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.outline import Outline
+    from engine.model.scene_model import SceneModel
+    from engine.scene.study import Study
+
+PAGE = "drawing.html"
+SHOWN = 6  # modes
+PROBED = 33  # places along a way at which a weight is set down
+_HELD = {frozenset(ways): word for word, ways in HELD_AT.items()}
+
+
+class Shapes(NamedTuple):
+    """Moving pictures with captions under one heading."""
+
+    heading: str
+    note: str
+    pictures: Sequence[Row]
+
+
+class Table(NamedTuple):
+    """Rows of text under headings."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+class Page(NamedTuple):
+    """Everything that the template shows; plain text but for drawings."""
+
+    title: str
+    facts: Sequence[Row]
+    remarks: Sequence[str]
+    figures: Sequence[Drawn]
+    shapes: Sequence[Shapes]
+    tables: Sequence[Table]
+    study_text: str
+
+
+def write_drawing(study: Study, folder: Path) -> Path:
+    """Write the page into a folder; its path. Raises BadInput before anything is written, as `check` does."""
+    check_folder(folder, PAGE)
+    remarks = kind_of(study).parts(study).remarks
+    text = page_template(PAGE).render(page=page_of(study, remarks))
+    files.make_folder(folder)
+    files.check_output_place(folder / PAGE)
+    files.write_text(folder / PAGE, text)
+    return folder / PAGE
+
+
+def page_of(study: Study, remarks: Sequence[str]) -> Page:
+    """The page of a study; remarks: what is worth knowing about it."""
+    model = base_scene(study)
+    scene = layout(model, starts(model))
+    variants = expand(study).size
+    drawn = [
+        Drawn(place, figure.title, figure.caption, figure.name, svg(figure))
+        for place, figure in enumerate(pictures(scene), 1)
+    ]
+    unused = [
+        f"nothing rides on body {name} and nothing reads it: it is left out"
+        for name in study.body
+        if name not in scene.bodies
+    ]
+    return Page(
+        title=study.title or study.kind,
+        facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}")],
+        remarks=[f"{text[0].upper()}{text[1:]}." for text in (*remarks, *unused)],
+        figures=drawn,
+        shapes=[*(_of_body(model, body) for body in scene.bodies.values()), *_of_whole(model)],
+        tables=[
+            table for table in (_bodies(scene), _supports(scene), _carriages(scene), _sensors(scene)) if table.rows
+        ],
+        study_text=study.source.text,
+    )
+
+
+def _of_body(model: SceneModel, body: Placed) -> Shapes:
+    """The lowest modes of a body by itself."""
+    name, omega = body.part.name, body.part.modal.omega
+    rates = VariantValues(model.study, {}, 1).damping_rates(name, omega)[:, 0]
+    shapes = [list(body_pieces(body, unit)) for unit in np.eye(omega.size)[:SHOWN]]
+    view, shown = view_of_all(shapes), []
+    for mode, shape in enumerate(shapes):
+        picture = moving(shape, view, f"mode {mode + 1}")
+        damping = (
+            f"damping {percent(float(rates[mode] / (2.0 * omega[mode])))}" if omega[mode] > 0.0 else "moves freely"
+        )
+        shown.append(Row(f"mode {mode + 1}", f"{number(float(omega[mode]) / (2.0 * np.pi))} Hz, {damping}", picture))
+    kept = (
+        f"The lowest {len(shown)} of {counted(omega.size, 'mode')}, without carriages"
+        if omega.size > len(shown)
+        else "All its modes, without carriages"
+    )
+    return Shapes(f"Mode shapes of {name}", f"{kept}; grey: at rest.", shown)
+
+
+def _of_whole(model: SceneModel) -> Iterator[Shapes]:
+    """The lowest modes of bodies and carriages together, the first carriage where it starts, or half-way where it only
+    passes; nothing where carriages are but forces."""
+    if not any(model.reacts(number) for number in range(len(model.carriages))):
+        return
+    with suppress(BadInput):  # a vehicle that is longer than its body never stands on it with all its contacts
+        low, high = way_of(model.study)
+        first, positions = model.carriages[0].name, starts(model)
+        passes = model.study.carriage[first].motion.passes
+        place = 0.5 * (low + high) if passes else min(max(positions[first], low), high)
+        found = coupled_modes(model, VariantValues(model.study, {}, 1), frozen(model, np.array([place])), SHOWN)
+        scene = layout(model, positions | {first: place})
+        known = np.flatnonzero(np.isfinite(found.omega[0, 0]))
+        shapes = [scene_pieces(scene, found.shapes[0, 0, :, mode]) for mode in known]
+        view, shown = view_of_all(shapes), []
+        for mode, shape in zip(known, shapes, strict=True):
+            hertz = float(found.omega[0, 0, mode]) / (2.0 * np.pi)
+            picture = moving(shape, view, f"mode {mode + 1} of the whole")
+            shown.append(Row(f"mode {mode + 1}", f"{number(hertz)} Hz", picture))
+        note = (
+            f"Bodies and carriages together, undamped, with {first} at {number(place, 4)} m of its track; motions "
+            "that nothing resists are left out."
+        )
+        yield Shapes("Mode shapes of the whole with its carriages", note, shown)
+
+
+def _bodies(scene: Layout) -> Table:
+    rows = []
+    for name, body in scene.bodies.items():
+        modal = body.part.modal
+        stiffness = quantity(modal.bending_stiffness, "N m2") if np.isfinite(modal.bending_stiffness) else ""
+        made = ", ".join(f"{what}: {count:,}" for what, count in body.outline.counts.items())
+        first = ", ".join(number(float(f)) for f in modal.omega[:SHOWN] / (2.0 * np.pi))
+        kind = scene.model.study.body[name].kind
+        rows.append(
+            (
+                name,
+                kind,
+                f"{number(modal.length, 4)} m",
+                _extent(body.outline),
+                quantity(modal.mass, "kg", 4),
+                stiffness,
+                first,
+                made,
+            )
+        )
+    headings = (
+        "body",
+        "kind",
+        "track",
+        "extent x, y, z",
+        "mass",
+        "bending stiffness E I",
+        "frequencies (Hz)",
+        "made of",
+    )
+    return Table("Bodies", headings, rows)
+
+
+def _extent(outline: Outline) -> str:
+    points = np.concatenate([line.points for line in outline.every_line])
+    return " x ".join(number(float(size), 4) for size in np.ptp(points, axis=0)) + " m"
+
+
+def _supports(scene: Layout) -> Table:
+    rows: list[tuple[str, ...]] = []
+    for name, body in scene.bodies.items():
+        for held in body.outline.held:
+            rows.append(
+                (
+                    name,
+                    held.name,
+                    _place(body.at(held.place)),
+                    _HELD.get(frozenset(held.ways), f"held in {', '.join(held.ways)}"),
+                )
+            )
+        for spring in body.outline.springs:
+            rates = [
+                f"{axis} {quantity(rate, 'N m-1')}" for axis, rate in zip("xyz", spring.stiffness, strict=True) if rate
+            ]
+            rates += [
+                f"about {axis} {quantity(rate, 'N m')}/rad"
+                for axis, rate in zip("xyz", spring.rotational, strict=True)
+                if rate
+            ]
+            rows.append(
+                (
+                    name,
+                    spring.name,
+                    _place(body.at(spring.place)),
+                    f"spring: {', '.join([*rates, *(['damper'] if spring.damped else [])])}",
+                )
+            )
+        for lump in body.outline.masses:
+            rows.append((name, lump.name, _place(body.at(lump.place)), f"mass {quantity(lump.mass, 'kg')}"))
+    return Table("Supports, springs and masses", ("body", "name", "x, y, z", "what"), rows)
+
+
+def _place(point: Array) -> str:
+    return ", ".join(number(float(part), 4) for part in np.round(point, 9) + 0.0) + " m"
+
+
+def _carriages(scene: Layout) -> Table:
+    model, rows = scene.model, []
+    values = VariantValues(model.study, {}, 1)
+    for index, tie in enumerate(model.carriages):
+        carriage, modal = model.study.carriage[tie.name], model.bodies[tie.body].modal
+        force, (low, high) = float(weight(model, values, index)[0]), carriage.motion.range()
+        s = np.linspace(max(low, 0.0), min(high, modal.length), PROBED)
+        sag = "" if modal.rigid_modes else quantity(float(np.abs(modal.influence_at(s, s)).max()) * abs(force), "m")
+        way = f"{number(low, 4)} to {number(high, 4)} m, {carriage.motion.kind}"
+        speed = quantity(carriage.motion.max_speed / carriage.motion.time_scale, "m s-1")
+        mass = float(moving_mass(model, values, index)[0])
+        rows.append(
+            (
+                tie.name,
+                ", ".join(dict.fromkeys(carriage.ridden)),
+                carriage.kind,
+                quantity(mass, "kg", 4) if mass else "",
+                quantity(force, "N"),
+                sag,
+                way,
+                speed,
+            )
+        )
+    headings = ("carriage", "on", "kind", "mass", "weight", "largest static deflection under it", "way", "top speed")
+    return Table("Carriages", headings, rows)
+
+
+def _sensors(scene: Layout) -> Table:
+    study, rows = scene.model.study, []
+    for name, sensor in study.sensor.items():
+        spot = sensor.spot
+        if sensor.rides is not None:
+            where = f"moves with {sensor.rides}"
+        elif spot is None:
+            where = f"at {number(sensor.at or 0.0, 4)} m of its track"
+        else:
+            place = study.body[str(sensor.body)].spot_place(spot)
+            where = f"{spot.key} {getattr(spot, spot.key)}" + ("" if place is None else f" at {_place(place)}")
+        rows.append((name, sensor.quantity.replace("_", " "), study.body_of(name), where))
+    return Table("Sensors", ("sensor", "quantity", "body", "where"), rows)

@@ -1,0 +1,182 @@
+"""Drawings: every study has one, what it shows stands where it should, and shapes move as the modes do."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import csc_array
+
+import engine
+from engine.bodies.files.model import FileModel
+from engine.bodies.imported.outline import _neighbours
+from engine.bodies.modal.description import Spot
+from engine.model.distinct_models import base_scene
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from studies.commands import catalogue
+from studies.commands.preview import FREQUENCIES_SHOWN
+from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
+from studies.pictures.scene_layout import Layout, layout, starts
+from studies.reporting.drawing import PAGE, page_of, write_drawing
+from studies.results.formatting import number
+from tests.bodies import models
+from tests.bodies.frames import straight
+from tests.engine import gantries
+from tests.engine.build import Table, beam, cruise, mass, study
+from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
+
+STUDIES = {f"built-in {name}": path for name, path in catalogue.built_in().items()}
+STARTS = {f"start {kind}": catalogue.start_text(kind) for kind in catalogue.starts()}
+
+
+CAR = mass(0.1, cruise(0.0, 1.0, 1.0))
+
+
+def laid_out(scene: Study) -> Layout:
+    model = base_scene(scene)
+    return layout(model, starts(model))
+
+
+@pytest.mark.parametrize("name", [*STUDIES, *STARTS])
+def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
+    """With its bodies, carriages, sensors and the frequencies that `check` shows; one page is all that is written."""
+    found = engine.load(STUDIES[name] if name in STUDIES else STARTS[name])
+    page = write_drawing(found, tmp_path / "drawing")
+    assert [path.name for path in page.parent.iterdir()] == [PAGE]
+    text = page.read_text(encoding="utf-8")
+    reader = check_standing_alone(text)
+    shown = reader.text.partition("schema_version")[0].replace(MINUS, "-")
+    for part in base_scene(found).bodies:
+        rest = shown.partition(f"Mode shapes of {part.name}")[2]
+        for mode, omega in enumerate(part.modal.omega[:FREQUENCIES_SHOWN], start=1):
+            assert f"mode {mode}: {number(omega / (2.0 * np.pi))} Hz" in rest
+    for word in (*found.carriage, *found.sensor, found.title):
+        assert word in shown
+    assert text.count("<animate ") >= 2
+
+
+def test_a_hostile_title_stays_text(tmp_path: Path) -> None:
+    hostile = engine.load(catalogue.find_study("asymmetry")).with_values({"title": HOSTILE})
+    page = write_drawing(hostile, tmp_path).read_text(encoding="utf-8")
+    assert HOSTILE in check_standing_alone(page).text
+
+
+def test_bad_places_are_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    found = engine.load(catalogue.find_study("asymmetry"))
+    for folder in (tmp_path / "file", tmp_path / "missing" / "folder"):
+        with pytest.raises(BadInput, match="folder"):
+            write_drawing(found, folder)
+
+
+def test_studies_that_check_refuses_are_refused(tmp_path: Path) -> None:
+    found = engine.load(catalogue.find_study("machine-bed-frequencies"))
+    with pytest.raises(BadInput, match="off its body"):
+        write_drawing(found.with_values({"question.positions": [-1.0, 1.0]}), tmp_path / "drawing")
+    assert not (tmp_path / "drawing").exists()
+
+
+@pytest.mark.parametrize(
+    "supports", ["pinned-pinned", [{"at": 0.2, "stiffness": 50.0}, {"at": 0.8, "rotational": 1.0, "stiffness": 9.0}]]
+)
+def test_outlines_move_as_the_modes(supports: object) -> None:
+    body = laid_out(study(beam(supports=supports), CAR)).bodies["bed"]
+    (line,) = body.outline.lines
+    modal = body.part.modal
+    assert_allclose(-line.motion[:, 2], modal.shape(line.points[:, 0]))
+    assert len(body.outline.held) + len(body.outline.springs) == 2
+
+
+def test_members_move_as_the_track() -> None:
+    """Between the ends of elements too, and along it."""
+    found = engine.load(catalogue.find_study("machine-bed-run"))
+    body = laid_out(found).bodies["bed"]
+    for line in body.outline.lines:
+        exact = body.part.modal.shape(line.points[:, 0])
+        assert_allclose(-line.motion[:, 2, :6], exact[:, :6], atol=1e-4 * np.abs(exact).max())
+    assert found.body["bed"].spot_place(Spot(member="span_1", at=0.4)) == pytest.approx([0.6, 0.0, 0.0])
+
+
+def test_imported_nodes_move_as_the_track(tmp_path: Path) -> None:
+    table = models.Files(tmp_path, straight({"a": "clamped"})).table()
+    body = laid_out(models.study(table)).bodies["bed"]
+    cloud = body.outline.cloud
+    assert cloud is not None
+    assert len(body.outline.lines) == len(cloud.points) - 1  # the track, and all elements but the first, which is held
+    along = (cloud.points - body.outline.track[0]) @ np.diff(body.outline.track, axis=0)[0] / body.part.modal.length
+    shapes = np.einsum("i,pin->pn", body.outline.down, cloud.motion)
+    assert_allclose(shapes, body.part.modal.shape(along), atol=1e-9 * np.abs(shapes).max())
+    assert body.outline.counts["nodes"] == len(cloud.points)
+
+
+def test_diagonals_of_elements_are_not_drawn() -> None:
+    """Of 4 x 3 square elements, whose matrices join all their corners."""
+    places = np.array([[float(x), float(y), 0.0] for x in range(5) for y in range(4)])
+    joined = np.linalg.norm(places[:, None] - places, axis=2) < 1.5
+    owner = np.arange(len(places))
+    model = FileModel(csc_array(joined * 1.0), None, owner + 1, places, owner, 0 * owner, owner < 0)
+    edges = _neighbours(model, places)
+    assert len(edges) == 4 * 4 + 3 * 5
+    assert {float(np.linalg.norm(np.diff(model.places[edge], axis=0))) for edge in edges} == {1.0}
+
+
+@pytest.mark.parametrize(
+    ("body", "wheels", "side"), [(gantries.GIRDER, gantries.PAIRS, -1.0), (gantries.FRAME, gantries.CORNERS, 1.0)]
+)
+def test_a_gantry_stands_over_its_beams(body: Table, wheels: Table, side: float) -> None:
+    """A beam's places count from the left; a frame stands as its points do."""
+    scene = laid_out(gantries.gantry(wheels=wheels, body=body))
+    left, right, girder = (scene.bodies[name] for name in ("left", "right", "gantry"))
+    assert_allclose(left.along(0.0), 0.0)
+    assert_allclose(right.along(np.array([0.0, 0.9])), [[0.0, 0.6 * side, 0.0], [0.9, 0.6 * side, 0.0]], atol=1e-12)
+    assert_allclose(girder.along(np.array([0.1, 0.7]))[:, :2], [[0.3, 0.0], [0.3, 0.6 * side]], atol=1e-12)
+    below = {one.name: one.below[:2].round(9).tolist() for one in scene.contacts["crane"]}
+    assert below["right_front"] == [0.45, 0.6 * side]
+    assert_allclose(scene.touched("trolley")[:2], [0.3, (scene.positions["trolley"] - 0.1) * side], atol=1e-12)
+    assert view_of(scene.points) is SPACE
+
+
+def test_gravity_points_down() -> None:
+    """Whatever the coordinates of a frame are."""
+    frame = straight({"a": "clamped"}) | {"gravity_direction": [0.0, 1.0, 0.0]}
+    body = laid_out(models.study(frame)).bodies["bed"]
+    assert_allclose(body.turn @ [0.0, 1.0, 0.0], [0.0, 0.0, -1.0], atol=1e-12)
+    assert_allclose(body.turn @ body.turn.T, np.eye(3), atol=1e-12)
+
+
+def test_views() -> None:
+    assert view_of(np.eye(3)[[0, 2]]) is SIDE
+    assert view_of(np.eye(3)[[1, 2]] - np.eye(3)[1]) is FRONT
+
+
+def test_shapes_swing_from_one_side_to_the_other() -> None:
+    line = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    text = moving([Piece(line, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -3.0], [0.0, 0.0, 0.0]]))], SIDE, "mode 1")
+    rest, out = (
+        np.array(re.findall(r"[\d.]+", d), dtype=float).reshape(-1, 2) for d in re.findall(r' d="(.*?)"', text)
+    )
+    ends = [
+        np.array(re.findall(r"[\d.]+", d), dtype=float).reshape(-1, 2)
+        for d in re.findall(r'values="(.*?)"', text)[0].split(";")
+    ]
+    assert_allclose(ends[0], out)
+    assert_allclose(ends[2], out)
+    assert_allclose(0.5 * (ends[0] + ends[1]), rest, atol=0.06)
+    assert out[1, 1] > rest[1, 1]  # down on the page
+
+
+def test_vehicles_longer_than_their_body_have_no_shapes_of_the_whole() -> None:
+    wheels = {"rear": {"at": 0.0, "stiffness": 9.0}, "front": {"at": 3.0, "stiffness": 9.0}}
+    body = {"bed": beam(), "cart": {"kind": "rigid", "length": 3.0, "mass": 1.0, "inertia": 1.0}}
+    carriage = {"on": "bed", "kind": "body", "body": "cart", "contacts": wheels, "motion": cruise(-3.0, 3.0, 1.0)}
+    page = page_of(study(beam(), {"cart": carriage}, body=body), ())
+    assert [shapes.heading for shapes in page.shapes] == ["Mode shapes of bed", "Mode shapes of cart"]
+
+
+def test_bodies_that_nothing_uses_are_told() -> None:
+    found = study(beam(), CAR, body={"bed": beam(), "other": beam()})
+    assert any("other" in remark for remark in page_of(found, ()).remarks)
