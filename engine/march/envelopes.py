@@ -6,7 +6,7 @@ every bit of what they read, does not depend on how many places are watched.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -86,8 +86,8 @@ class EnvelopeTables(SceneTables):
         """(places,) zeros: which variants diverge, the march of the sensors tells."""
         return np.zeros(len(self.places))
 
-    def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
-        found = super()._build(segment, missed)
+    def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
+        found = super()._build(segments, missed)
         for place in self.places:
             place.together.known.clear()
         return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
+from engine.model import track
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along, StationPath, ways
-from engine.model.timeline import Segment, Timeline, Window, build_timeline, coarsened, refined
+from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import tabulate_ties
-from engine.observation import kinks
+from engine.observation import kinks, signals
 from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
@@ -74,6 +76,7 @@ class SceneTables:
     companions: tuple[SceneTables, ...] = ()
     kept_bytes: int = KEPT_BYTES
     _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
+    _next: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
     _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -131,18 +134,28 @@ class SceneTables:
     def table(self, segment: Segment) -> SegmentTable:
         """The table of a segment; a path that repeats itself is tabulated once per unit of scene time."""
         unit = np.floor(segment.start + 1e-9) if self.timeline.repeats else 0.0
-        key = (round(segment.start - unit, 12), round(segment.end - unit, 12), segment.steps, segment.active)
+        shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
+        key = _key(shifted)
         with self._lock:
             found = self._kept.get(key)
             if found is None:
-                shifted = segment._replace(start=segment.start - unit, end=segment.end - unit)
-                found = self._build(shifted, self._missed_of(key))
+                if key not in self._next:
+                    several = (shifted,) if self.timeline.repeats else self._from(segment)
+                    built = self._build(several, self._missed_of(key))
+                    self._next = dict(zip(map(_key, several), built, strict=True))
+                found = self._next.pop(key)
                 if sum(table.bytes for table in self._kept.values()) + found.bytes <= self.kept_bytes:
                     self._kept[key] = found  # and no other goes: marches ask for all in turn, the oldest first
         return found
 
-    def _build(self, segment: Segment, missed: Missed) -> SegmentTable:
-        along = self._ways(segment)
+    def _from(self, segment: Segment) -> tuple[Segment, ...]:
+        """A segment and those that follow, as many as are tabulated at once: short ones take hardly longer together."""
+        following = [one for one in self.timeline.segments if one.first > segment.first]
+        stations = np.cumsum([segment.steps + 1, *(one.steps + 1 for one in following)])
+        return (segment, *following[: np.count_nonzero(stations[1:] <= MOST_STATIONS)])
+
+    def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
+        along = self._ways(segments)
         if not missed:
             found = residual(self.model, along), tabulate_missed(self.model, self.signals, along)
             if self.timeline.repeats:
@@ -151,8 +164,21 @@ class SceneTables:
             found = missed[0], missed[1]
         watch = tabulate_watch(self.model, self.signals, along, found[1])
         contacts = len(self.signals) - len(self.sensors)
-        unrecorded = last_signals(watch, contacts) if contacts else watch
-        return SegmentTable(tabulate_ties(self.model, along, self.scheme, found[0]), watch, unrecorded)
+        unrecorded, others = (
+            (last_signals(watch, contacts), self.signals[-contacts:]) if contacts else (watch, self.signals)
+        )
+        ties = tabulate_ties(self.model, along, self.scheme, found[0])
+        if len(segments) == 1:
+            return [SegmentTable(ties, watch, unrecorded)]
+        ends = np.cumsum([segment.steps + 1 for segment in segments])
+        return [
+            SegmentTable(
+                track.along_part(ties, self.model, self.scheme, part),
+                signals.along_part(watch, self.signals, part),
+                signals.along_part(unrecorded, others, part),
+            )
+            for part in map(slice, [0, *ends[:-1]], ends)
+        ]
 
     def _missed_of(self, key: SegmentKey) -> Missed:
         """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate
@@ -162,14 +188,15 @@ class SceneTables:
             self._missed[key] = found
         return found
 
-    def _ways(self, segment: Segment) -> Along:
-        """The ways of all carriages along a segment."""
-        return ways(self.model, segment)
+    def _ways(self, segments: Sequence[Segment]) -> Along:
+        """The ways of all carriages along segments, one after the other."""
+        return ways(self.model, *segments)
 
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""
         with self._lock:
             self._kept.clear()
+            self._next.clear()
             self._missed.clear()
         for companion in self.companions:
             companion.forget()
@@ -247,6 +274,10 @@ class SceneTables:
         )
         change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
         return np.asarray(change / (after - before)[:, None])
+
+
+def _key(segment: Segment) -> SegmentKey:
+    return round(segment.start, 12), round(segment.end, 12), segment.steps, segment.active
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

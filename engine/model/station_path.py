@@ -5,6 +5,7 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,11 @@ class StationPath:
     highest: int = 0
     _shapes: dict[int, Array] = field(default_factory=dict)
 
+    @property
+    def on(self) -> NDArray[np.bool_]:
+        """(S,) at which stations it touches."""
+        return np.full(self.s.size, self.active) if self.here is None else self.here
+
     def shape(self, body: ModalBody, derivative: int = 0) -> Array:
         """(S, N) mode shapes of its body along the way."""
         return np.asarray(self.shapes(body, derivative)[derivative])
@@ -49,15 +55,31 @@ class StationPath:
         return found
 
 
-Along = tuple[StationPath, ...]  # all riders along one segment
+Along = tuple[StationPath, ...]  # all riders along some stations
 
 
-def ways(model: SceneModel, segment: Segment) -> Along:
-    """The ways of all riders at the stations 0..steps of a segment."""
+def ways(model: SceneModel, *segments: Segment) -> Along:
+    """The ways of all riders at the stations 0..steps of segments, one after the other."""
+    times, highest = [_times(segment) for segment in segments], _highest(model)
+    return tuple(
+        _joined([_way(rider, s, tau, s.active[r], highest[r]) for s, tau in zip(segments, times, strict=True)])
+        for r, rider in enumerate(model.riders)
+    )
+
+
+def _times(segment: Segment) -> Array:
+    """Scene times of the stations of a segment."""
     tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end
-    parts = zip(model.riders, segment.active, _highest(model), strict=True)
-    return tuple(_way(rider, segment, tau, active, highest) for rider, active, highest in parts)
+    return tau
+
+
+def _joined(parts: Sequence[StationPath]) -> StationPath:
+    """One rider along several segments."""
+    if len(parts) == 1:
+        return parts[0]
+    s, ds, dds, on = (np.concatenate([getattr(part, name) for part in parts]) for name in ("s", "ds", "dds", "on"))
+    return StationPath(s, ds, dds, bool(on.any()), None if on.all() or not on.any() else on, parts[0].highest)
 
 
 def _highest(model: SceneModel) -> list[int]:
@@ -87,7 +109,7 @@ def frozen(model: SceneModel, places: Array) -> Along:
 def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> StationPath:
     if not active:
         nowhere = np.zeros_like(tau)
-        return StationPath(nowhere, nowhere, nowhere, active)
+        return StationPath(nowhere, nowhere, nowhere, active, highest=highest)
     path = rider.path(tau, segment.start, segment.end)
     place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
     return StationPath(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)

@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 
 def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, missed: Array | None = None) -> Ties:
-    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment. missed: of
-    `attachments.residual`, where it is known."""
+    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment (`along_part`
+    for several in a row). missed: of `attachments.residual`, where it is known."""
     stations, modes = along[0].s.size, model.omega.size
     rows, reaches = np.zeros((stations, modes, model.ties, 4)), np.zeros((modes, model.ties), dtype=np.bool_)
     drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
@@ -47,7 +47,8 @@ def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, miss
             rows[:, spring.mode, r, FORCE] = -1.0
             rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
         if along[spring.rider].active:
-            drive[:, r], level[:, r] = _sag_under(model, spring, model.attachments[r][0], along)
+            under = _sag_under(model, spring, model.attachments[r][0], along)
+            drive[:, r], level[:, r] = np.where(along[spring.rider].on, under, 0.0)
     for r, push in enumerate(model.pushes, start=model.first_push):
         if along[push.carriage].active:
             _add_push(rows, model, r, push, along[push.carriage])
@@ -62,11 +63,20 @@ def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, miss
     return Ties(rows, drive, level, reactive, prescribed, moves, springs, missed, unity, reaches)
 
 
+def along_part(ties: Ties, model: SceneModel, scheme: Newmark | Alpha, part: slice) -> Ties:
+    """The same along some of the stations, as a segment of their own."""
+    rows, reaches = ties.rows[part], np.zeros_like(ties.reaches)
+    close_rows(rows, _kinds(model)[0], scheme.beta, scheme.gamma, reaches)
+    drive, level, missed = (array[part] for array in (ties.drive, ties.level, ties.residual))
+    return ties._replace(rows=rows, drive=drive, level=level, residual=missed, reaches=reaches)
+
+
 def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: StationPath) -> None:
     """Rows of a push along the track: those of a mass, by the track's motion along itself, and what is prescribed."""
     part, stations = model.bodies[model.carriages[push.carriage].body], way.s.size
     motion = np.stack([np.zeros(stations), 2.0 * way.ds, way.dds, way.ds**2]) if push.convected else np.zeros((4, 0))
-    add_attachment(rows, r, part.modes.start, 1.0, along_shapes(part, way.s, 2 * push.convected), motion)
+    shapes = np.where(way.on[:, None], along_shapes(part, way.s, 2 * push.convected), 0.0)
+    add_attachment(rows, r, part.modes.start, 1.0, shapes, motion)
     rows[:, -1, r, CURVE] = way.dds
 
 

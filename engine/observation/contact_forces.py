@@ -63,7 +63,7 @@ class ContactForce:
             return np.zeros(way.s.size, dtype=np.bool_)
         body = next(load.body for load in model.carriages[self.carriage].loads if load.rider == rider)
         low, high = span_counted(model, model.riders[rider], body)
-        return np.asarray((way.s >= low) & (way.s <= high))
+        return np.asarray(way.on & (way.s >= low) & (way.s <= high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class ContactSensor(Sensor):
         return ContactForce(self.carriage, self.contact).rides(model)
 
     def counted(self, model: SceneModel, along: Along) -> Flags:
-        return np.full(along[0].s.size, along[self.rides(model)].active)
+        return along[self.rides(model)].on
 
     def offset(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)

@@ -96,7 +96,7 @@ class Sensor:
         for r, attachment in self._felt(model, along):
             if attachment.unit not in known:  # a carriage's weight and its springs hold the same places
                 kept = self._kept(model, along, shape_rows(model, attachment, along))
-                known[attachment.unit] = self._full(model, along, place(attachment, along)) - kept
+                known[attachment.unit] = self.unit_reading(model, along, attachment) - kept
             found[:, r] += attachment.factor * known[attachment.unit]
         return found
 
@@ -226,7 +226,7 @@ class Sensor:
 
     def counted(self, model: SceneModel, along: Along) -> Flags:
         """(stations,) bool: whether it reads anything there."""
-        return np.full(along[0].s.size, self.under is None or along[self.under].active)
+        return np.full(along[0].s.size, True) if self.under is None else along[self.under].on
 
 
 @dataclass(frozen=True, eq=False)

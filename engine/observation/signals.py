@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine.kernels.layout import Observation
 from engine.observation.contact_forces import ContactForce, ContactSensor
@@ -79,7 +80,27 @@ def tabulate_watch(
         offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
         counted=counted,
-        summed=np.array([s.is_summed for s in signals], dtype=np.bool_) & counted.all(axis=0),
+        summed=_summed(signals, counted),
+    )
+
+
+def _summed(signals: tuple[Signal, ...], counted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(signals,) of which squares are summed: sensors that read something at every station."""
+    return np.array([s.is_summed for s in signals], dtype=np.bool_) & counted.all(axis=0)
+
+
+def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice) -> Observation:
+    """The same along some of the stations, as a segment of their own."""
+    counted = watch.counted[part]
+    on_q, on_v, on_a = (rows[part] if len(rows) > 1 else rows for rows in (watch.on_q, watch.on_v, watch.on_a))
+    return watch._replace(
+        on_q=on_q,
+        on_v=on_v,
+        on_a=on_a,
+        static=watch.static[part],
+        offset=watch.offset[part],
+        counted=counted,
+        summed=_summed(signals, counted),
     )
 
 

@@ -7,7 +7,7 @@ over time over the weight, on 0-98 % of the span.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -117,10 +117,10 @@ class SharedTables(SceneTables):
 
     shared: dict[Any, Along] = field(default_factory=dict)
 
-    def _ways(self, segment: Segment) -> Along:
-        key = (segment.start, segment.end, segment.steps, segment.active)
+    def _ways(self, segments: Sequence[Segment]) -> Along:
+        key = tuple((segment.start, segment.end, segment.steps, segment.active) for segment in segments)
         if key not in self.shared:
-            self.shared[key] = ways(self.model, segment)
+            self.shared[key] = ways(self.model, *segments)
         return self.shared[key]
 
 
