@@ -12,6 +12,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
 from engine.bodies.modal.description import MAX_MODES
+from engine.march.outcome import outcome
 from engine.scene.study import Study
 from results_schema.status import Status
 from tests.accuracy.passages import OPEN, WEIGHT, only_grid, passages
@@ -152,3 +153,17 @@ def test_no_two_levels_are_the_same_march(modes: Any, scheme: str) -> None:
     for found in (as_fixed(grid), in_full(grid)):
         work = np.array([level_work(grid, grid.values, found, level) for level in range(len(found.numerics))])
         assert len(work) >= 4 and np.all(np.diff(work, axis=0) > 0.0)
+
+
+def test_a_train_is_told_about_what_it_is_off_by() -> None:
+    """Forces that enter one after the other: what they bend converges fast, what they shake slowly."""
+    axles = {f"axle{n}": force(1.0, cruise(0.0, 1.0, 0.8), headway=0.12 * n) for n in range(4)}
+    sensor = {name: fixed(0.5, name) for name in ("displacement", "bending_moment", "acceleration")}
+    grid = only_grid(study(OPEN | {"damping_ratio": 0.01}, axles, sensor=sensor))
+    found = levels(grid, 0.02)
+    model = grid.model(in_full(grid).numerics[-1])
+    finest = outcome(grid.asked, grid.once(model, 1024), grid.values, grid.stations(model, 1024))
+    off = differences(grid.asked, model, grid.values, found.outcome, finest)
+    numbers = [number for number, result in enumerate(results_of(grid.asked)) if result.name.endswith("_rms")]
+    ratios = found.error[numbers, 0] / off[numbers, 0]
+    assert ratios.size == 3 and ratios.min() >= 1.0 and ratios.max() <= 10.0, ratios

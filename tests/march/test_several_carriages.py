@@ -10,6 +10,7 @@ import pytest
 
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
+from engine.march.tables import SceneTables
 from engine.model.variant_values import padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -121,3 +122,28 @@ def test_free_vibration_with_springs_needs_a_stable_scheme(steps: Any, kind: str
     changes: Table = {"body": {"bed": beam(), "t": TABLE}, "solver": {"steps": steps, "scheme": "linear-acceleration"}}
     with pytest.raises(BadInput, match=r"carriage\.m\.motion\.after: free vibration with springs"):
         make_plan(study(beam(), carriages, **changes))
+
+
+def test_segments_tabulated_together_are_what_each_is_alone() -> None:
+    """Asked for backwards, every segment is the first of those that are tabulated with it, and the last one alone."""
+    cars: Table = {
+        "m": mass(0.2, cruise(-0.4, 1.4, 0.8)),
+        "o": oscillator(0.3, 200.0, cruise(0.0, 1.0, 0.5), damping=0.5, delay=0.2),
+        "a": table("t", cruise(-0.4, 1.4, 0.7), headway=0.3),
+        "f": force(1.0, cruise(1.2, -0.2, 0.6)),
+    }
+    sensor = {
+        "moment": fixed(0.4, "bending_moment"),
+        "under": {"under": "o", "quantity": "acceleration"},
+        "contact": {"carriage": "a", "contact": "rear", "quantity": "contact_force"},
+    }
+    plan = make_plan(study(beam(own_weight=True), cars, body={"bed": beam(own_weight=True), "t": TABLE}, sensor=sensor))
+    model = plan.grids[0].scene
+    forth, back = (SceneTables(model, 200, "whole", kept_bytes=0) for _ in range(2))
+    segments = forth.timeline.segments
+    assert len({segment.active for segment in segments}) > 5
+    together = [forth.table(segment) for segment in segments]
+    for segment, expected in zip(reversed(segments), reversed(together), strict=True):
+        for one, other in zip(back.table(segment), expected, strict=True):
+            for left, right in zip(one, other, strict=True):
+                np.testing.assert_array_equal(left, right)
