@@ -17,6 +17,7 @@ SWING = 0.11  # largest motion over the size of what moves
 BLOCK = 0.018  # half a carriage over the same
 SIDE, FRONT, PLAN = np.eye(3)[[0, 2]], np.eye(3)[[1, 2]], np.eye(3)[[0, 1]]
 SPACE = np.array([[0.883, 0.469, 0.0], [-0.176, 0.331, 0.927]])  # from the right, a third of a right angle above
+FEW_POINTS = 400  # that are drawn bold
 FLAT, STILL = 1e-6, 1e-4
 EASE = 'calcMode="spline" keyTimes="0;.5;1" keySplines=".37 0 .63 1;.37 0 .63 1" dur="2.4s" repeatCount="indefinite"'
 
@@ -97,13 +98,13 @@ def moving(pieces: Sequence[Piece], view: Array, label: str) -> str:
         chosen = [line for line, piece in zip(end, pieces, strict=True) if piece.dots == dots]
         return "".join(_path((line - middle) * [scale, -scale] + [0.5 * WIDTH, 0.5 * height], dots) for line in chosen)
 
-    drawn = []
-    for dots, width in ((False, 1.6), (True, 2.6)):
+    drawn, thin = [], 1.0 if len(points) <= FEW_POINTS else 0.5
+    for dots, width in ((False, 1.6 * thin), (True, 2.6 * thin)):
         out, back, rest = (path(end, dots) for end in ends)
         if rest:
-            drawn.append(f'<path class="rest" stroke-width="{0.6 * width}" d="{rest}"/>')
+            drawn.append(f'<path class="rest" stroke-width="{0.6 * width:.2f}" d="{rest}"/>')
             swinging = f'<animate attributeName="d" values="{out};{back};{out}" {EASE}/>'
-            drawn.append(f'<path class="moving" stroke-width="{width}" d="{out}">{swinging}</path>')
+            drawn.append(f'<path class="moving" stroke-width="{width:.2f}" d="{out}">{swinging}</path>')
     box = f'viewBox="0 0 {WIDTH:.0f} {height:.0f}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {box} role="img" aria-label="{label}">{"".join(drawn)}</svg>'
 

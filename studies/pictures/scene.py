@@ -94,7 +94,10 @@ def pictures(scene: Layout) -> list[Figure]:
 
 def _picture(scene: Layout, view: Array) -> Figure:
     ways = _ways(scene)
-    flat = np.concatenate([scene.points, *ways.values()]) @ view.T
+    flat = (
+        np.concatenate([scene.points, *ways.values(), *(scene.touched(name)[None] for name in scene.positions)])
+        @ view.T
+    )
     width = 1.12 * max(float(np.ptp(flat[:, 0])), WIDE * float(np.ptp(flat[:, 1])))
     u, middle = SYMBOL * width, 0.5 * float(flat[:, 0].min() + flat[:, 0].max())
     low, high = float(flat[:, 1].min()) - 3.5 * u, float(flat[:, 1].max()) + (5.0 + 0.8 * len(ways)) * u
@@ -106,8 +109,9 @@ def _picture(scene: Layout, view: Array) -> Figure:
     rows = _in_rows(above, ends), _in_rows(below, ends)
     top, bottom = (max((one.row + 1.3 for one in found), default=0.3) * step for found in rows)
     caption = (
-        "To scale, in metres; symbols are not. Carriages (red) stand where they start, with arrows along their ways; "
-        "green: sensors; dashed: a track beside what carries it. What rides is drawn a little above its track."
+        "To scale, in metres; symbols are not. Carriages (red) stand where they start, those that follow as far behind "
+        "as they trail; arrows along their ways; green: sensors; dashed: a track beside what carries it. What rides is "
+        "drawn a little above its track."
     )
 
     def fill(drawing: Drawing) -> None:
@@ -215,9 +219,9 @@ def _draw_scene(scene: Layout, sheet: Sheet) -> None:
 
 def _draw_body(body: Placed, sheet: Sheet, colour: str) -> None:
     outline = body.outline
-    for line in outline.lines:
-        width = 2.2 if len(outline.lines) <= FEW_LINES else 0.8
-        sheet.line(body.at(line.points), color=colour, linewidth=width, solid_capstyle="round", zorder=2.0)
+    width, gap = 2.2 if len(outline.lines) <= FEW_LINES else 0.8, np.full((1, 3), np.nan)
+    joined = np.concatenate([part for line in outline.lines for part in (body.at(line.points), gap)])
+    sheet.line(joined, color=colour, linewidth=width, solid_capstyle="round", zorder=2.0)
     if outline.cloud is not None:
         sheet.line(body.at(outline.cloud.points), color=colour, linestyle="", marker=".", markersize=2.0, zorder=2.0)
     sheet.line(body.at(outline.track), linestyle=(0, (5, 3)), zorder=1.9)

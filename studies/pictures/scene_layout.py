@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 GAP = 0.06  # of the scene's size, between a track and what rides on it
 UP = np.array([0.0, 0.0, 1.0])
 SAME = 1e-9
+FAR = 3.0  # lengths of a track beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,19 @@ def _points(outline: Outline) -> list[Array]:
 def starts(model: SceneModel) -> dict[str, float]:
     """Where every carriage starts, m."""
     return {tie.name: float(tie.rider.motion.path(0.0).S) for tie in model.carriages}
+
+
+def in_a_row(model: SceneModel) -> dict[str, float]:
+    """The same, but what passes and sets off later stands behind by as much as it trails, unless that is far."""
+    found = starts(model)
+    for name, carriage in model.study.carriage.items():
+        motion = carriage.motion
+        if motion.passes:
+            forward = np.sign(float(motion.path(motion.duration).S) - found[name])
+            found[name] -= forward * motion.max_speed / motion.time_scale * carriage.start_time
+    lengths = {tie.name: model.bodies[tie.body].modal.length for tie in model.carriages}
+    near = all(-FAR * length <= found[name] <= (1.0 + FAR) * length for name, length in lengths.items())
+    return found if near else starts(model)
 
 
 def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:

@@ -25,7 +25,7 @@ from studies.at_rest.positions import way_of
 from studies.pictures.common.figures import svg
 from studies.pictures.moving_shapes import body_pieces, moving, scene_pieces, view_of_all
 from studies.pictures.scene import pictures
-from studies.pictures.scene_layout import Layout, Placed, layout, starts
+from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
 from studies.results.formatting import counted, number, percent, quantity
@@ -83,7 +83,7 @@ def write_drawing(study: Study, folder: Path) -> Path:
 def page_of(study: Study, remarks: Sequence[str]) -> Page:
     """The page of a study; remarks: what is worth knowing about it."""
     model = base_scene(study)
-    scene = layout(model, starts(model))
+    scene = layout(model, in_a_row(model))
     variants = expand(study).size
     drawn = [
         Drawn(place, figure.title, figure.caption, figure.name, svg(figure))

@@ -20,7 +20,7 @@ from results_schema.errors import BadInput
 from studies.commands import catalogue
 from studies.commands.preview import FREQUENCIES_SHOWN
 from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
-from studies.pictures.scene_layout import Layout, layout, starts
+from studies.pictures.scene_layout import Layout, in_a_row, layout, starts
 from studies.reporting.drawing import PAGE, page_of, write_drawing
 from studies.results.formatting import number
 from tests.bodies import models
@@ -175,6 +175,14 @@ def test_vehicles_longer_than_their_body_have_no_shapes_of_the_whole() -> None:
     carriage = {"on": "bed", "kind": "body", "body": "cart", "contacts": wheels, "motion": cruise(-3.0, 3.0, 1.0)}
     page = page_of(study(beam(), {"cart": carriage}, body=body), ())
     assert [shapes.heading for shapes in page.shapes] == ["Mode shapes of bed", "Mode shapes of cart"]
+
+
+def test_what_follows_stands_behind() -> None:
+    """By its headway, or by its delay times its speed; not where that is far off the body."""
+    axles = {"a": CAR, "b": CAR | {"headway": 0.5}, "c": mass(0.1, cruise(1.0, 0.0, 2.0), delay=0.25)}
+    model = base_scene(study(beam(), axles))
+    assert in_a_row(model) == pytest.approx({"a": 0.0, "b": -0.5, "c": 1.5})
+    assert in_a_row(base_scene(study(beam(), axles | {"d": CAR | {"delay": 9.0}})))["b"] == 0.0
 
 
 def test_bodies_that_nothing_uses_are_told() -> None:

@@ -16,7 +16,7 @@ from results_schema.arrays import Array, Counts
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
-POINTS = 16  # of a member, about
+POINTS, MOST_POINTS = 16, 1600  # of a member and of all, about
 
 
 def frame_outline(frame: Frame) -> Outline:
@@ -65,13 +65,14 @@ def _outward(frame: Frame, node: str) -> Array:
 
 def _curve(mesh: Mesh, motion: Array, chain: Counts) -> Line:
     """A member by the cubics of its elements between displacements and rotations of their ends; motion (P, 6, N)."""
+    wanted = max(1, min(POINTS, MOST_POINTS // len(mesh.chains)))
     pairs, arms, axis = mesh.pairs[chain], mesh.arms[chain], mesh.axes[chain, 0]
     length = mesh.beams.length[chain][:, None, None]
     ends, turns = mesh.points[pairs] + arms, motion[pairs, 3:]
     moved = motion[pairs, :3] + np.cross(turns, arms[..., None], axis=2)
     stretch = np.einsum("en,ei->ein", np.einsum("eik,ei->ek", moved[:, 1] - moved[:, 0], axis), axis)
     slopes = length[..., None] * np.cross(turns, axis[:, None, :, None], axis=2) + stretch[:, None]
-    count = max(1, POINTS // len(chain))
+    count = max(1, wanted // len(chain))
     t = np.linspace(0.0, 1.0, count, endpoint=False)[:, None, None]
     points = ends[:, None, 0] * (1.0 - t[:, :, 0]) + ends[:, None, 1] * t[:, :, 0]
     shapes = (
@@ -80,7 +81,7 @@ def _curve(mesh: Mesh, motion: Array, chain: Counts) -> Line:
         + (t - 2.0 * t**2 + t**3) * slopes[:, None, 0]
         + (t**3 - t**2) * slopes[:, None, 1]
     )
-    every = slice(None, None, max(1, len(chain) // POINTS))
+    every = slice(None, None, max(1, len(chain) // wanted))
     return Line(
         np.concatenate([points.reshape(-1, 3)[every], ends[-1:, 1]]),
         np.concatenate([shapes.reshape(-1, 3, motion.shape[2])[every], moved[-1:, 1]]),

@@ -17,7 +17,7 @@ from results_schema.arrays import Array
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
 
-MOST_NODES = 3000  # that are drawn
+MOST_NODES, MOST_JOINED = 1200, 600  # that are drawn, and joined by lines
 MOST_PAIRS = 40  # of a node: beyond it a matrix is a reduced one, which joins everything
 NEARER = 1e-6  # part of a distance by which a third node is nearer
 MOST_HELD = 24  # of one group that are drawn
@@ -29,7 +29,7 @@ def imported_outline(body: Imported) -> Outline:
     file, line = held.file, body.line
     places = file.places * body.length_unit
     shown = np.arange(0, len(places), -(-len(places) // MOST_NODES))
-    pairs = _neighbours(file, places) if len(places) <= MOST_NODES else []
+    pairs = _neighbours(file, places) if len(places) <= MOST_JOINED else []
     named = {f"{file.nodes[node]}": places[node] for node in line.nodes[[0, -1]]}
     named |= {name: body.spot_place(Spot(point=name)) for name in body.point}
     start, moving = places[line.nodes[0]], set(file.owner[held.free].tolist()) - {-1}
