@@ -167,15 +167,28 @@ def check_slowest(model: SceneModel, values: VariantValues) -> None:
 
 
 def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
-    """Refuse step counts beyond the cap (fault 13). Raises BadInput."""
-    if steps.size and not float(np.max(steps)) <= MOST_STEPS:
-        raise BadInput(
-            "too many steps over one passage or cycle",
-            where=model.study.source.where("solver.steps"),
-            expected=f"at most {MOST_STEPS}",
-            received=f"{float(np.max(steps)):.3g}",
-            remedy="a larger tolerance, a faster motion, fewer modes or larger steps",
-        )
+    """Refuse step counts beyond the cap (fault 13), by the number that makes them where one stands out. Raises
+    BadInput."""
+    if not steps.size or float(np.max(steps)) <= MOST_STEPS:
+        return
+    for doubt in model.study.doubts():
+        values = {key: model.study.value(key) for key in doubt.needs}
+        if not doubt.met(values):
+            raise BadInput(
+                f"{doubt.what}, and its march would take {float(np.max(steps)):.2g} steps",
+                where=model.study.source.where(doubt.where),
+                expected=doubt.expected,
+                received=doubt.amount(values),
+                remedy=doubt.meant(values),
+            )
+    frequency = model.first_omega / (2.0 * math.pi)
+    raise BadInput(
+        "too many steps over one passage or cycle",
+        where=model.study.source.where("solver.steps"),
+        expected=f"at most {MOST_STEPS}",
+        received=f"{float(np.max(steps)):.3g}, with a first natural frequency of {frequency:.3g} Hz",
+        remedy="look at the units of the body and of the motion; or a larger tolerance, a faster motion, larger steps",
+    )
 
 
 def contact_omega(model: SceneModel, values: VariantValues) -> Array:

@@ -100,9 +100,11 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             current = study.value(path)
         except KeyError:
             current = study
-        open_ = current in (None, "auto") and path != "solver.fidelity"  # which is a word whatever it says
+        open_ = current in (None, "auto")
         if isinstance(current, bool) or not (open_ or isinstance(current, int | float)):
-            remedy = nearest(path, list(study.numbers()))
+            known = list(study.numbers())
+            longer = [key for key in known if key.endswith(f".{path}")]
+            remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             raise BadInput(
                 "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy
             )

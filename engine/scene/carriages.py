@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from engine.scene.motions import AnyMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import NUMBER, WORD, KindOf, Spec, form_of_amount, kinds
+from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, form_of_amount, kinds
 from engine.study_file.units import Damping, Force, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
@@ -41,7 +41,7 @@ class Carriage(Spec):
         def kind(self) -> str:
             """As in the study file."""
 
-    on: str
+    on: Annotated[str, Noun("the name of a body")]
     motion: AnyMotion
     delay: Time | None = Field(default=None, ge=0)
     headway: Length | None = Field(default=None, ge=0)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
 
 from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme, SchemeRow
-from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Spec, by_form, one_of
+from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Hint, Spec, by_form, form_of, one_of
 from engine.study_file.units import Dimensionless, fault
 from results_schema.errors import shortened
 from results_schema.pieces import Pieces, no_row_of
@@ -51,7 +51,9 @@ class Solver(Spec):
     rho_inf: Dimensionless | None = Field(default=None, ge=0, le=1)
     fidelity: Chosen = "auto"
     steps: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_STEPS)], by_form] = "auto"
-    tolerance: Dimensionless = Field(default=1e-3, gt=0, lt=1)
+    tolerance: Annotated[Dimensionless, Hint('a part of the largest static value: 0.01 or "1 %"')] = Field(
+        default=1e-3, gt=0, lt=1
+    )
     static_correction: bool = True
     audit: Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=0)], by_form] = "auto"
 
@@ -133,6 +135,14 @@ class SweepAxis(Spec):
     def size(self) -> int:
         """Number of values."""
         return next(n for n in (self.count, self.sobol, len(self.values or ())) if n is not None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, value: Any) -> Any:
+        if form_of(value) == TABLE:
+            return value
+        expected = 'an axis, such as { of = "carriage.NAME.mass", values = [50, 100] }'
+        raise fault("a table is wanted here", expected=expected, received=shortened(value))
 
     @model_validator(mode="after")
     def _one_form(self) -> SweepAxis:

@@ -13,12 +13,13 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
+from engine.bodies.modal.section_doubts import Doubt
 from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
-from engine.study_file.spec import Keys, Spec, field_at, nearest, refuse
+from engine.study_file.spec import Keys, Noun, Spec, field_at, nearest, refuse
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.quantities import QUANTITIES
@@ -50,7 +51,7 @@ class Scene(Spec):
 
     schema_version: Annotated[int, AfterValidator(_known_version)] = SCHEMA_VERSION
     title: str = Field(default="", max_length=500)
-    kind: Annotated[str, AfterValidator(_kind_name)]
+    kind: Annotated[str, AfterValidator(_kind_name), Noun('a kind of study, such as kind = "passage"')]
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
     initial: Literal["rest", "equilibrium"] | None = None
     body: dict[str, AnyBody] = Field(default_factory=dict)
@@ -83,6 +84,7 @@ class Study(Scene):
         except ValidationError as error:
             refuse(error, Scene, given.data, given.source)
         self._source, self._data = given.source, given.data
+        _check_swept_words(self)
         _check_names(self)
         _check_references(self)
         verify(self)
@@ -130,6 +132,11 @@ class Study(Scene):
     def numbers(self) -> dict[str, float]:
         """Every number of the model by its dotted key, SI, defaults included."""
         return dict(_numbers("", self))
+
+    def doubts(self) -> Iterator[Doubt]:
+        """Conditions that its numbers may break, but are hardly meant to."""
+        for name, body in self.body.items():
+            yield from body.doubts(f"body.{name}")
 
     def unit(self, path: str) -> Unit | None:
         """Dimension of the number at a dotted key; None for integers such as a number of modes."""
@@ -184,7 +191,8 @@ def _beside(table: Any, recorded: Recorded) -> Any:
 def _check_version(document: Document) -> None:
     if "schema_version" not in document.data:
         where = document.source.where("schema_version")
-        raise BadInput("this key is missing", where=where, expected=f"schema_version = {SCHEMA_VERSION}")
+        expected = f"schema_version = {SCHEMA_VERSION} at the top of the file, above the first [table]"
+        raise BadInput("this key is missing", where=where, expected=expected)
 
 
 def value_in(scene: Scene, path: str) -> Any:
@@ -261,6 +269,21 @@ def _numbers(here: str, value: Any) -> Iterator[tuple[str, float]]:
         inside = enumerate(value)
     for key, item in inside:
         yield from _numbers(f"{here}.{key}" if here else str(key), item)
+
+
+def _check_swept_words(study: Study) -> None:
+    """Axes hold numbers; before their names are looked at, since another name would not help."""
+    for name, axis in study.sweep.axes.items():
+        for path in axis.of:
+            place = field_at(Scene, study.data, path.split("."))
+            if place is not None and place.holds_words_only:
+                raise BadInput(
+                    "a word cannot be swept",
+                    where=study.source.where(f"sweep.{name}.of"),
+                    expected="the key of a number",
+                    received=shortened(path),
+                    remedy="a study file for each word, or a loop in Python: study.with_values({key: word})",
+                )
 
 
 def _check_names(study: Study) -> None:

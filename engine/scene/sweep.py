@@ -176,22 +176,30 @@ def _check_repeats(study: Study, cases: Cases) -> None:
 
 
 def _verify(study: Study, cases: Cases, check: Check) -> None:
-    """A check on the grid of just the axes that it depends on, in blocks."""
+    """A check on the axes that it depends on; the study itself was checked."""
+    if unmet := broken(study, cases, check):
+        _refuse(study, check, *unmet)
+
+
+def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any], Mapping[str, int]] | None:
+    """Values that break a check, with the entry of each axis that it depends on; None where none do.
+
+    On the grid of just these axes, in blocks.
+    """
     touched = [axis for axis in cases.axes if set(axis.paths) & set(check.needs)]
-    if not touched:
-        return  # the study itself was checked
     base = {key: study.value(key) for key in check.needs}
     sizes = {axis.dim: len(axis.values) for axis in touched}
     total = prod(sizes.values())
     for start in range(0, total, CHECKED_AT_ONCE):
         flat = np.arange(start, min(start + CHECKED_AT_ONCE, total))
-        positions = dict(zip(sizes, np.unravel_index(flat, tuple(sizes.values())), strict=True))
+        positions = dict(zip(sizes, np.unravel_index(flat, tuple(sizes.values())), strict=True)) if sizes else {}
         columns = {path: axis.values[positions[axis.dim]] for axis in touched for path in axis.paths}
         met = np.broadcast_to(check.met(base | columns), flat.shape)
         if not met.all():
             worst = int(np.flatnonzero(~met)[0])
             entries = {axis.name: int(positions[axis.dim][worst]) for axis in touched}
-            _refuse(study, check, base | {key: column[worst] for key, column in columns.items()}, entries)
+            return base | {key: column[worst] for key, column in columns.items()}, entries
+    return None
 
 
 def _refuse(study: Study, check: Check, values: Mapping[str, Any], entries: Mapping[str, int]) -> NoReturn:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import json
 import math
@@ -15,6 +16,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from engine.study_file.syntax import what_to_write
 from results_schema.errors import BadInput, printable, shortened
 
 MAX_BYTES = 1_000_000
@@ -27,6 +29,7 @@ INTEGER_DIGITS = 4300  # Python itself refuses to read decimal integers that are
 _LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""",
 )
+_AS_TEXT = "save it as UTF-8, as every editor can (Notepad: Save as, encoding UTF-8)"
 _PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 
 
@@ -74,6 +77,7 @@ def read_document(path_or_text: str | Path) -> Document:
         name, raw = "", path_or_text.encode("utf-8", "surrogatepass")
     else:
         name, raw = str(path_or_text), _file_bytes(path_or_text)
+    raw = raw.removeprefix(codecs.BOM_UTF8)
     source = Source(name, _text(name, raw), hashlib.sha256(raw).hexdigest())
     return Document(_plain_table(_parsed(source), source), source)
 
@@ -106,7 +110,7 @@ def _file_bytes(path: str | Path) -> bytes:
             raw = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = getattr(error, "strerror", None) or str(error)
-        raise BadInput(f"the study file cannot be read: {reason}", where=shortened(name, 200)) from None
+        raise BadInput(f"the study file cannot be read: {reason}", where=printable(name, 200)) from None
     if len(raw) > MAX_BYTES:
         size = f"{Path(path).stat().st_size} bytes"
         raise BadInput("the file is too large", where=name, expected=f"at most {MAX_BYTES} bytes", received=size)
@@ -117,26 +121,26 @@ def _text(name: str, raw: bytes) -> str:
     if len(raw) > MAX_BYTES:
         raise BadInput("the text is too large", where=name, expected=f"at most {MAX_BYTES} bytes")
     source = Source(name, "", "")
-    if raw.startswith(b"\xef\xbb\xbf"):
-        raise BadInput(
-            "the file begins with a byte-order mark",
-            where=source.where(line=1),
-            remedy='save it as "UTF-8 without BOM"',
-        )
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in raw[:2]:
+        raise BadInput("this text is UTF-16", where=source.where(), expected="TOML in UTF-8", remedy=_AS_TEXT)
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise BadInput(
-            "this is not text",
+            "a character that is not UTF-8",
             where=source.where(line=line),
-            expected="TOML in UTF-8",
+            expected="a study file: TOML in UTF-8",
             received=f"byte 0x{raw[error.start]:02x}",
+            remedy=_AS_TEXT,
         ) from None
 
 
 def _parsed(source: Source) -> dict[str, Any]:
     """The file's tables; numbers that are not finite as `_Overflow`."""
+    if not source.text.strip():
+        remedy = "begin with a commented one: wanderlast init passage FILE.toml"
+        raise BadInput("the file is empty", where=source.where(), expected="a study (TOML)", remedy=remedy)
     if long_key := _LONG_KEY.search(source.text):
         _refuse_nesting(source, source.text.count("\n", 0, long_key.start()) + 1)
     try:
@@ -144,13 +148,14 @@ def _parsed(source: Source) -> dict[str, Any]:
     except RecursionError:
         _refuse_nesting(source, None)
     except tomllib.TOMLDecodeError as error:
-        place = _PLACE.search(str(error))
-        lines = source.text.count("\n") + 1
-        line = int(place[1]) if place and place[1] else lines
+        place, complaint = _PLACE.search(str(error)), _PLACE.sub("", str(error))
+        line = int(place[1]) if place and place[1] else source.text.count("\n") + 1
+        written = source.text.split("\n")[line - 1].strip()
         raise BadInput(
-            f"not valid TOML: {_PLACE.sub('', str(error))}",
+            f"not valid TOML: {complaint}",
             where=source.where(line=line),
-            received=shortened(source.text.split("\n")[line - 1].strip()),
+            received=shortened(written),
+            remedy=what_to_write(written, complaint),
         ) from None
 
 

@@ -149,6 +149,13 @@ class Hint:
 
 
 @dataclass(frozen=True)
+class Noun:
+    """Annotation of a place: what belongs there, in words."""
+
+    words: str
+
+
+@dataclass(frozen=True)
 class FieldType:
     """Type and annotations of the place that a dotted key names."""
 
@@ -165,11 +172,23 @@ class FieldType:
         """The remedy for a number out of its bounds, or ""."""
         return next((note.remedy for note in _notes(self.annotation, self.metadata) if isinstance(note, Hint)), "")
 
+    @property
+    def holds_words_only(self) -> bool:
+        """Whether it is the place of a word, and never that of a number."""
+        arms = set(_arms(self.annotation))
+        return str in arms and not arms & {int, float}
+
+    @property
+    def holds_named_tables(self) -> bool:
+        """Whether it is a table of tables that have names of the user's choice."""
+        return get_origin(self.annotation) is dict and get_args(self.annotation)[1] is not Any
+
     def describe(self) -> str:
         """What belongs there, in words, as far as annotations tell: "a length (m), > 0"."""
         notes = list(_notes(self.annotation, self.metadata))
         bounds = [_bound(note) for note in notes if isinstance(note, Gt | Ge | Lt | Le)]
-        noun = self.unit.article if self.unit else _type_words(self.annotation)
+        words = next((note.words for note in notes if isinstance(note, Noun)), "")
+        noun = words or (self.unit.article if self.unit else _type_words(self.annotation))
         return ", ".join(part for part in (noun, *bounds) if part)
 
 
@@ -209,12 +228,11 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     where = source.where(".".join(str(key) for key in keys))
     context = detail.get("ctx", {})
     if detail["type"] == "wanderlast":
-        return BadInput(
-            context["what"], where=where, **{key: context[key] for key in ("expected", "received", "remedy")}
-        )
+        said = {key: context[key] for key in ("expected", "received")}
+        return BadInput(context["what"], where=where, **said, remedy=context["remedy"] or _misplaced(model, data, keys))
     if detail["type"] == "extra_forbidden":
         names = keys_at(model, data, keys[:-1])
-        remedy = nearest(keys[-1], names)
+        remedy = _misplaced(model, data, keys) or nearest(keys[-1], names)
         return BadInput("unknown key", where=where, expected=f"one of {', '.join(names)}", remedy=remedy)
     place = field_at(model, data, keys)
     expected = place.describe() if place else ""
@@ -227,7 +245,48 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     words = get_args(place.annotation) if place and get_origin(place.annotation) is Literal else ()
     bound = any(name in context for _, name, _ in _BOUNDS)
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
+    remedy = remedy or _misplaced(model, data, keys)
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
+
+
+def _misplaced(model: type[Spec], data: Any, keys: Keys) -> str:
+    """A hint at the table to which a key belongs that cannot stand, or not so, in its own, or ""."""
+    try:
+        value = value_at(data, keys)
+    except KeyError:
+        return ""
+    place, around = (field_at(model, data, part) if part else None for part in (keys, keys[:-1]))
+    if place is not None and place.holds_named_tables:
+        return f"[{keys[-1]}.NAME], a table with a name of your choice"
+    if isinstance(value, dict) or str(keys[-1]) in keys_at(model, data, keys[:-1]):
+        return ""
+    if around is not None and around.holds_named_tables:
+        return f"[{keys[-2]}.NAME] as the header: a table with a name of your choice"
+    return _where_else(model, data, around, keys)
+
+
+def _where_else(model: type[Spec], data: Any, around: FieldType | None, keys: Keys) -> str:
+    """The table, or the kind of its own table, that has the key of this name, in words, or ""."""
+    key, here = str(keys[-1]), list(keys[:-1])
+    if here and key in keys_at(model, data, ()):
+        return f"write {key} at the top of the file: a key belongs to the table whose [header] stands above it"
+    notes = _notes(around.annotation, around.metadata) if around else ()
+    tables_of_kinds = [note.table for note in notes if isinstance(note, KindOf)]
+    fitting = [kind for table in tables_of_kinds for kind, cls in table.items() if _field_of(cls, key) is not None]
+    if fitting:
+        return f"{key} is a key of the kind {' and '.join(shortened(kind) for kind in fitting)}"
+    if isinstance(value_at(data, keys), list):  # the same word may well be the name of an axis
+        return ""
+    whole: dict[str, Any] = {name: {} for name in keys_at(model, data, ())} | data
+    tables = (path for path in _tables_in((), whole) if path != tuple(here) and key in keys_at(model, whole, path))
+    return next((f"{key} is a key of [{'.'.join(path)}]: write it below that header" for path in tables), "")
+
+
+def _tables_in(here: tuple[str, ...], data: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    for key, value in data.items():
+        if isinstance(value, dict):
+            yield (*here, key)
+            yield from _tables_in((*here, key), value)
 
 
 def _what(detail: Any) -> str:
@@ -272,6 +331,16 @@ def _bare(annotation: Any) -> Any:
 
 def _is_union(annotation: Any) -> bool:
     return get_origin(annotation) in (Union, UnionType)
+
+
+def _arms(annotation: Any) -> Iterator[Any]:
+    """The types of which a value of this type is one; words out of a list are `str`."""
+    bare = _bare(annotation)
+    if _is_union(bare):
+        for arm in get_args(bare):
+            yield from _arms(arm)
+    else:
+        yield str if get_origin(bare) is Literal else bare
 
 
 def _notes(annotation: Any, metadata: Sequence[Any]) -> Iterator[Any]:

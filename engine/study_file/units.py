@@ -19,6 +19,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from results_schema.errors import shortened
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+_COMMA = re.compile(r",(\d+)(.*)")
 _FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|1(?=\s*/)")
 _OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
 _SUPERSCRIPTS = {"²": 2, "³": 3, "⁴": 4}
@@ -37,6 +38,7 @@ _COMMON = {
     )
     for name, factor in names.items()
 }  # what pint says of them, which takes half a second to import
+_RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,9 @@ def fault(what: str, *, expected: str = "", received: str = "", remedy: str = ""
 def _split(text: str, wanted: Unit) -> tuple[str, str]:
     """Number and unit of a string; a bare number in quotes is refused, as is an expression."""
     match = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
+    if match is not None and (decimals := _COMMA.match(match[2])):
+        remedy = f'a point: "{match[1].replace(".", "")}.{decimals[1]}{decimals[2]}"'
+        raise fault("a decimal comma", expected=wanted.article, received=shortened(text), remedy=remedy)
     example = f'a number, or a string such as "1.5 {wanted.symbol or "%"}"'
     if match is None:
         raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text))
@@ -135,13 +140,24 @@ def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
     try:
         quantity = _registry().Quantity(Fraction(1), name).to_base_units()
     except (PintError, TypeError, ValueError, AssertionError):
-        raise fault(
-            "no such unit", expected="a unit such as m, mm, kN, GPa, km/h, Hz", received=shortened(name)
-        ) from None
+        expected = "a unit such as m, mm, kN, GPa, km/h, Hz"
+        raise fault("no such unit", expected=expected, received=shortened(name), remedy=_meant(name)) from None
     base = {key: int(power) for key, power in dict(quantity._units).items()}
     if not set(base) <= {*_BASE, "radian"} or not isinstance(quantity.magnitude, Fraction):
-        raise fault("not a mechanical unit", expected="a unit of metres, kilograms, seconds", received=shortened(name))
+        expected = "a unit of metres, kilograms, seconds"
+        raise fault("not a mechanical unit", expected=expected, received=shortened(name), remedy=_meant(name))
     return quantity.magnitude, base
+
+
+def _meant(name: str) -> str:
+    """A hint at the unit of another spelling, or "".
+
+    >>> _meant("Gpa")
+    'did you mean "GPa"?'
+    """
+    known = {unit.casefold(): unit for unit in _COMMON} | _RUN_TOGETHER
+    unit = known.get(name.casefold())
+    return f'did you mean "{unit}"?' if unit else ""
 
 
 @lru_cache(maxsize=1)

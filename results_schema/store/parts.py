@@ -1,7 +1,8 @@
 """The finished parts of a run: one immutable netCDF-4 file each, from which a killed run goes on.
 
 Beside an archive `a.nc` lie `a.nc.lock`, held by the run, and the folder `a.nc.parts` with a file `key` (what they were
-computed from), the parts, and the SHA-256 of each. A part counts when its SHA-256 does and it carries the same key.
+computed from, and the study's name), the parts, and the SHA-256 of each. A part counts when its SHA-256 does and it
+carries the same key.
 """
 
 from __future__ import annotations
@@ -32,15 +33,22 @@ Part = Mapping[str, Table]
 class PartStore:
     """The parts of one archive by name, locked while the `with` block lasts.
 
-    key: what the results depend on. look: called under the lock, before anything is touched; it may refuse what lies
-    at the archive's place. discard: parts with another key are removed instead of refused (`--overwrite`).
+    key: what the results depend on. study: its name, kept beside them. look: called under the lock, before anything is
+    touched; it may refuse what lies at the archive's place. discard: parts with another key are removed instead of
+    refused (`--overwrite`).
     Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key.
     """
 
     def __init__(
-        self, archive: Path | str, key: str, look: Callable[[], object] = lambda: None, *, discard: bool = False
+        self,
+        archive: Path | str,
+        key: str,
+        look: Callable[[], object] = lambda: None,
+        *,
+        study: str = "",
+        discard: bool = False,
     ) -> None:
-        self.key = key
+        self.key, self._study = key, study
         self._archive, self._folder = Path(archive), _folder_of(archive)
         self._lock = Lock(Path(f"{archive}.lock"))
         self._look, self._discard = look, discard
@@ -76,7 +84,7 @@ class PartStore:
             files.remove_folder(self._folder)
         files.make_folder(self._folder)
         if found != self.key:
-            files.write_text(self._folder / _KEY_FILE, self.key + "\n")
+            files.write_text(self._folder / _KEY_FILE, f"{self.key}\n{self._study}\n")
 
     def write(self, name: str, part: Part) -> Path:
         """Store one finished part, tables by group ("/" first).
@@ -130,6 +138,11 @@ def finished_so_far(archive: Path | str) -> list[np.ndarray] | None:
     return list(_valid(folder, _stored_key(folder)).values()) if folder.is_dir() else None
 
 
+def unfinished_study(archive: Path | str) -> str:
+    """The name of the study whose unfinished parts lie beside an archive, "" where it cannot be told."""
+    return _stored(_folder_of(archive), 1)
+
+
 def _valid(folder: Path, key: str) -> dict[Path, np.ndarray]:
     """The parts with their own SHA-256 and this key, and the variants that they hold."""
     found = {}
@@ -150,7 +163,12 @@ def _folder_of(archive: Path | str) -> Path:
 
 def _stored_key(folder: Path) -> str:
     """The key of the parts in a folder, "" where it cannot be told."""
+    return _stored(folder, 0)
+
+
+def _stored(folder: Path, line: int) -> str:
+    """A line of the file beside the parts in a folder, "" where it cannot be told."""
     try:
-        return (folder / _KEY_FILE).read_text(encoding="utf-8").strip()
+        return [*(folder / _KEY_FILE).read_text(encoding="utf-8").splitlines(), "", ""][line].strip()
     except (OSError, UnicodeDecodeError):
         return ""

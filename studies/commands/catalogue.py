@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, cast
 
 from results_schema.errors import BadInput
+from results_schema.store.files import is_hdf5
 from studies.protocol.study import KINDS
 
 LIBRARY = Path(__file__).parents[1] / "library"
@@ -49,18 +50,50 @@ def find_study(study: str) -> Path:
     >>> find_study("asymmetry").name
     'asymmetry.toml'
     """
-    known = built_in()
+    known, path = built_in(), Path(study)
     if study in known:
         return known[study]
-    path = Path(study)
-    if path.suffix or path.is_file() or len(path.parts) > 1:
+    if is_hdf5(path):
+        raise BadInput(
+            "this is an archive of results, not a study",
+            where=study,
+            expected="a study file (TOML)",
+            remedy=f"wanderlast report {study}, or wanderlast info {study}",
+        )
+    if path.is_file():
         return path
+    near = _nearest(study, [*known, *map(str, sorted(path.parent.glob("*.toml")))])
+    if path.is_dir():
+        raise BadInput("this is a folder", where=study, expected="a study file (TOML)", remedy=near)
+    if path.suffix or len(path.parts) > 1:
+        raise BadInput("the study file cannot be read: no such file", where=study, remedy=near)
     raise BadInput(
         "no such file, and no built-in study of that name",
         where=study,
         expected=f"a path, or one of {', '.join(known)}",
-        remedy=_nearest(study, known),
+        remedy=near,
     )
+
+
+def refuse_study(path: Path) -> None:
+    """Tell what to do where a study stands in place of an archive. Raises BadInput."""
+    is_built_in = str(path) in built_in() and not path.exists()
+    if is_built_in or (path.suffix == ".toml" and path.is_file()):
+        raise BadInput(
+            f"this is a {'built-in study' if is_built_in else 'study file'}, not an archive of results",
+            where=str(path),
+            expected="an archive (.nc)",
+            remedy=f"first wanderlast run {path}, then the same with {path.stem}.nc",
+        )
+
+
+def as_typed(study: str) -> str:
+    """What to type for a study whose file has this name.
+
+    >>> as_typed(str(find_study("asymmetry")))
+    'asymmetry'
+    """
+    return next((name for name, path in built_in().items() if str(path) == study), study)
 
 
 def start_text(kind: str) -> str:
@@ -88,6 +121,6 @@ def _files(folder: Path) -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def _nearest(name: str, known: Mapping[str, Path]) -> str:
-    near = get_close_matches(name, known, n=1)
+def _nearest(name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name, list(known), n=1)
     return f'did you mean "{near[0]}"?' if near else ""

@@ -127,7 +127,7 @@ def report(archive: Path, folder: Path | None) -> None:
 
     One self-contained HTML page, and the figures as SVG and PNG beside it.
     """
-    _refuse_unfinished(archive)
+    _refuse_what_is_no_archive(archive)
     from studies.commands import console
     from studies.reporting.report import write_report
 
@@ -142,7 +142,7 @@ def info(archive: Path) -> None:
 
     Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
     """
-    _refuse_unfinished(archive)
+    _refuse_what_is_no_archive(archive)
     from results_schema.store.archive import describe
     from studies.commands import console
 
@@ -194,21 +194,25 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
             return run_to_archive(loaded, archive or Path(f"{path.stem}.nc"), options, progress=progress, stop=stop)
 
 
-def _refuse_unfinished(archive: Path) -> None:
-    """Tell of an unfinished run where its archive is not there yet. Raises BadInput."""
-    from results_schema.store.parts import finished_so_far
+def _refuse_what_is_no_archive(archive: Path) -> None:
+    """Tell of a study in its place, and of an unfinished run where it is not there yet. Raises BadInput."""
+    from results_schema.store.parts import finished_so_far, unfinished_study
+    from studies.commands import catalogue
 
+    catalogue.refuse_study(archive)
     if archive.exists() or (parts := finished_so_far(archive)) is None:
         return
     variants = {int(number) for part in parts for number in part}
     pieces = sum(part.size == 0 for part in parts)
     so_far = counted(pieces, "finished piece") if pieces else f"parts with {counted(len(variants), 'finished variant')}"
+    study = catalogue.as_typed(unfinished_study(archive))
+    again = f"wanderlast run {study} -o {archive}" if study else "the same command that began it"
     raise BadInput(
         "not there yet; an unfinished run of it is",
         where=str(archive),
         expected="a finished archive",
         received=so_far,
-        remedy=f"wait for the run if one is at work, or go on from there: wanderlast run STUDY -o {archive}",
+        remedy=f"wait for the run if one is at work, or go on from there: {again}",
     )
 
 

@@ -68,7 +68,8 @@ def run_to_archive(
         return _found_finished(run)
     parts = kind.parts(study)
     files.check_free(archive.parent, parts.disk_bytes, parts.words)
-    with PartStore(archive, run_key(study, parts.names), partial(_look, run), discard=options.overwrite) as store:
+    key, name = run_key(study, parts.names), study.source.name
+    with PartStore(archive, key, partial(_look, run), study=name, discard=options.overwrite) as store:
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)

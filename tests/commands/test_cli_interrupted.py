@@ -93,7 +93,7 @@ def test_an_unfinished_run_is_told(
     before = {path: path.read_bytes() for path in Path("small.nc.parts").iterdir()}
     assert main([name, "small.nc"]) == 2
     message = capsys.readouterr().err
-    assert f"{kept} finished variant" in message and "wanderlast run STUDY -o small.nc" in message
+    assert f"{kept} finished variant" in message and "wanderlast run small.toml -o small.nc" in message
     assert {path: path.read_bytes() for path in Path("small.nc.parts").iterdir()} == before
 
 

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, Strict, Tag
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh
 from engine.bodies.modal.modal_body import ModalBody
 from engine.bodies.modal.outline import ALONG, HELD_AT, Elastic, Held, Outline, straight
+from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
@@ -40,6 +41,11 @@ class Spring(Spec):
 
 _ENDS = tuple("-".join(ends) for ends in product(END_WORDS, repeat=2))
 _MEANT = {
+    "pinned": "pinned-pinned",
+    "clamped": "clamped-clamped",
+    "free": "free-free",
+    "fixed": "clamped-clamped",
+    "hinged": "pinned-pinned",
     "simply-supported": "pinned-pinned",
     "hinged-hinged": "pinned-pinned",
     "fixed-fixed": "clamped-clamped",
@@ -135,6 +141,9 @@ class Beam(Body):
 
     def dampers(self) -> list[tuple[str, float | str, float]]:
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
+
+    def doubts(self, here: str) -> list[Doubt]:
+        return section_doubts(here, f"{here}.length")
 
     def checks(self, here: str) -> list[Check]:
         checks = []

@@ -19,6 +19,7 @@ from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import Outline
+from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.checks import Check
 from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
 from engine.study_file.units import (
@@ -318,6 +319,9 @@ class Frame(Body):
                 rates = zip(words, getattr(spring, key), strict=True)
                 found += [(f"spring.{name}.{key}.{i}", f"spring.{name}.{w}", c) for i, (w, c) in enumerate(rates)]
         return found
+
+    def doubts(self, here: str) -> list[Doubt]:
+        return [doubt for name in self.section for doubt in section_doubts(f"{here}.section.{name}", f"{here}.length")]
 
     def checks(self, here: str) -> list[Check]:
         return []

@@ -11,9 +11,10 @@ from pydantic import Field, PrivateAttr, Strict, Tag
 
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import Outline, straight
+from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside
-from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Spec, by_amount_form, by_form, nearest
+from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Hint, Spec, by_amount_form, by_form, nearest
 from engine.study_file.units import Dimensionless, Rate, Time
 from results_schema.errors import BadInput, shortened
 
@@ -28,7 +29,7 @@ class Rayleigh(Spec):
     rayleigh: Annotated[tuple[Annotated[Rate, Field(ge=0)], Annotated[Time, Field(ge=0)]], Strict(False)]
 
 
-Ratio = Annotated[Dimensionless, Field(ge=0, lt=1)]
+Ratio = Annotated[Dimensionless, Field(ge=0, lt=1), Hint('a part of critical damping: 0.02 or "2 %"')]
 Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
 DampingRatio = Annotated[
     Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
@@ -147,6 +148,10 @@ class Body(Spec):
     @abstractmethod
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""
+
+    def doubts(self, here: str) -> list[Doubt]:
+        """Its numbers at the dotted key `here` that are likely only within limits."""
+        return []
 
     def check_spot(self, spot: Spot) -> None:
         """Raise BadInput, with the key within the sensor as its place, for a place that cannot be read."""

@@ -1,0 +1,71 @@
+"""Numbers that no beam has, nearly always because they are in another unit than SI, and what they may be meant as."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from engine.study_file.checks import Check
+from engine.study_file.units import AREA, DENSITY, LENGTH, PRESSURE, SECOND_MOMENT, Unit
+
+
+@dataclass(frozen=True)
+class Doubt(Check):
+    """A condition that a study may break, but hardly means to; `needs` begins with the number in doubt.
+
+    others: units in which that number may have been thought.
+    """
+
+    unit: Unit
+    others: tuple[str, ...]
+
+    def amount(self, values: Mapping[str, Any]) -> str:
+        """The number in doubt with its unit."""
+        return f"{values[self.needs[0]]:.6g} {self.unit.symbol}"
+
+    def meant(self, values: Mapping[str, Any]) -> str:
+        """The number with other units that make it likely, as a question, or ""."""
+        number = self.needs[0]
+        texts = (f"{values[number]:.6g} {unit}" for unit in self.others)
+        likely = [f'"{text}"' for text in texts if self.met({**values, number: self.unit.si(text)})]
+        return f"did you mean {' or '.join(likely)}?" if likely else ""
+
+
+def section_doubts(here: str, length: str) -> list[Doubt]:
+    """Of a uniform section with its material at the dotted key `here`, of a body whose length has the key `length`.
+
+    A study in which neither the modulus nor the density is that of a material has units of its own, and no doubts.
+    """
+    material = (f"{here}.youngs_modulus", f"{here}.density")
+
+    def doubt(unit: Unit, others: str, needs: tuple[str, ...], expected: str, likely: Callable[..., Any]) -> Doubt:
+        def holds(*values: Any) -> Any:
+            modulus, density = values[-2:]
+            return likely(*values[:-2]) | ~(np.asarray(_modulus_of_matter(modulus)) | _density_of_matter(density))
+
+        what = "no beam has this"
+        return Doubt(needs[0], (*needs, *material), holds, what, expected, unit, tuple(others.split()))
+
+    area, inertia = f"{here}.area", f"{here}.second_moment"
+    return [
+        doubt(PRESSURE, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),
+        doubt(DENSITY, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
+        doubt(LENGTH, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
+        doubt(AREA, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
+              lambda size, along: size <= along**2 / 4),
+        doubt(SECOND_MOMENT, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",
+              lambda size, across, along: size <= across * along**2 / 16),
+    ]  # fmt: skip
+
+
+def _modulus_of_matter(modulus: Any) -> Any:
+    """From rubber to diamond, Pa."""
+    return (modulus >= 1e5) & (modulus <= 2e12)
+
+
+def _density_of_matter(density: Any) -> Any:
+    """From foam to osmium, kg/m3; and where the area is 1, of what masses per length (kg/m) there are."""
+    return (density >= 20) & (density <= 50_000)

@@ -1,0 +1,107 @@
+"""Mistakes that people make: the exit code, and the words by which they find out what to change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from studies.commands.cli import main
+from tests.studies.small import SMALL
+
+SWEEP = SMALL[SMALL.index("speed = { of") : SMALL.index("[solver]")]
+OTHER = SMALL.replace("density = 1000.0", "density = 7850.0")
+
+
+def axis(text: str) -> str:
+    """The study with this sweep."""
+    return SMALL.replace(SWEEP, text + "\n")
+
+
+# what was written instead of what -> exit code, words
+MISTAKES = {
+    "a swept scheme": (axis('scheme = { of = "solver.scheme", values = ["auto"] }'), 2, ["word cannot be swept"]),
+    "swept supports": (axis('s = { of = "body.beam.supports", values = ["free-free"] }'), 2, ["word cannot be swept"]),
+    "second moment in mm4": (
+        OTHER.replace("= 1e-6", "= 1e6"), 2, ["body.beam.second_moment", "no beam has this", '"1e+06 mm^4"'],
+    ),
+    "modulus without GPa": (OTHER.replace("= 1e9", "= 210"), 0, ["youngs_modulus = 210 Pa", '"210 GPa"']),
+    "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
+    "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
+    "a way in mm": (SMALL.replace("end = 1.0", "end = 1000"), 0, ["goes from 0 to 1000 m", "units"]),
+    "gravity below sweep": (axis(SWEEP + "gravity = 1.62"), 2, ["sweep.gravity", "at the top of the file"]),
+    "gravity below a sensor": (SMALL.replace("at = 0.5", "at = 0.5\ngravity = 9.81"), 2, ["at the top of the file"]),
+    "scheme below sweep": (axis(SWEEP + 'scheme = "auto"'), 2, ["scheme is a key of [solver]"]),
+    "an axis as a list": (axis("mass = [1, 2]"), 2, ["sweep.mass", "{ of = "]),
+    "an axis of half a key": (axis('v = { of = "speed", values = [1] }'), 2, ["carriage.trolley.motion.speed"]),
+    "a key of another kind": (SMALL.replace("mass = 1.0\n", "mass = 1.0\nstiffness = 1e6\n"), 2, ['kind "oscillator"']),
+    "a body without a name": (SMALL.replace("[body.beam]", "[body]"), 2, ["[body.NAME]"]),
+    "a list of tables": (
+        SMALL.replace("[sensor.midspan]", "[[sensor]]"), 2, ["sensor", "[sensor.NAME]"],
+    ),
+    "half of supports": (SMALL.replace("pinned-pinned", "pinned"), 2, ['did you mean "pinned-pinned"']),
+    "damping in per cent": (SMALL.replace("ratio = 0.02", "ratio = 2"), 2, ["damping_ratio", '0.02 or "2 %"']),
+    "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
+    "a decimal comma": (SMALL.replace("length = 1.0", "length = 2,5"), 2, ["line 7", "decimal point: 2.5"]),
+    "a thousands comma": (SMALL.replace("density = 1000.0", "density = 7,850"), 2, ["7850"]),
+    "a unit without quotes": (SMALL.replace("length = 1.0", "length = 2.5 m"), 2, ["line 7", '"2.5 m"']),
+    "Gpa": (SMALL.replace("= 1e9", '= "210 Gpa"'), 2, ['did you mean "GPa"']),
+    "kmh": (SMALL.replace("speed = 5.0", 'speed = "60 kmh"'), 2, ['did you mean "km/h"']),
+    "True": (SMALL.replace('steps = "auto"', "static_correction = True"), 2, ["small letters: true"]),
+    "a colon": (SMALL.replace("length = 1.0", "length: 1.0"), 2, ["line 7", "equals sign"]),
+    "JSON": ('{\n  "kind": "passage"\n}\n', 2, ["JSON", "[body.bed]"]),
+    "curly quotes": (SMALL.replace('"small"', "\u201csmall\u201d"), 2, ["straight quotation marks"]),
+    "an open quote": (SMALL.replace('"small"', '"small'), 2, ["line 2", "quotation mark is missing"]),
+    "a sum": (SMALL.replace("= 1e-6", "= 0.01*0.1"), 2, ["write the result"]),
+    "a key twice": (SMALL.replace("length = 1.0", "length = 1.0\nlength = 2.0"), 2, ["line 8", "keep one"]),
+    "nothing": ("", 2, ["empty", "wanderlast init"]),
+    "UTF-16": (SMALL.encode("utf-16"), 2, ["UTF-16", "save it as UTF-8"]),
+    "Latin-1": (SMALL.replace("small", "kl\u00f6ner").encode("latin-1"), 2, ["line 2", "save it as UTF-8"]),
+    "a byte-order mark": (b"\xef\xbb\xbf" + SMALL.encode(), 0, ["16 = 8 speed x 2 mass"]),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty working folder, and a screen wide enough for sentences."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "300")
+
+
+def told(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> str:
+    """What a command that ends with this code says."""
+    capsys.readouterr()
+    assert main(list(arguments)) == code
+    output = capsys.readouterr()
+    assert code == 0 or (output.out == "" and output.err.startswith("wanderlast: "))
+    return output.out + output.err
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_study_file(mistake: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text, code, words = MISTAKES[mistake]
+    Path("study.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    message = told(capsys, code, "check", "study.toml")
+    assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "x.nc"], ["archive of results", "wanderlast report x.nc"]),
+        (["check", "x.nc"], ["archive of results", "wanderlast info x.nc"]),
+        (["check", "folder"], ["this is a folder"]),
+        (["check", "smal.toml"], ["no such file", 'did you mean "small.toml"']),
+        (["check", "small"], ['did you mean "small.toml"']),
+        (["report", "small.toml"], ["study file", "wanderlast run small.toml", "small.nc"]),
+        (["info", "small.toml"], ["study file", "wanderlast run small.toml"]),
+        (["report", "passage"], ["built-in study", "wanderlast run passage", "passage.nc"]),
+    ],
+    ids=" ".join,
+)
+def test_a_file_of_another_sort(arguments: list[str], words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    Path("small.toml").write_text(SMALL)
+    Path("x.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+    Path("folder").mkdir()
+    message = told(capsys, 2, *arguments)
+    assert all(word in message for word in words), message
