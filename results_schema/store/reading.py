@@ -89,7 +89,7 @@ def _check_signature(path: Path) -> None:
     if not path.exists():
         raise BadInput("no such file", where=str(path))
     if not path.is_file():
-        raise BadInput("not a file", where=str(path))
+        raise BadInput("not a file", where=str(path), expected="an archive (.nc)")
     try:
         with path.open("rb") as stream:
             start = stream.read(len(_SIGNATURE))
