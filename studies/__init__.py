@@ -7,6 +7,32 @@ True
 
 from __future__ import annotations
 
-from studies.protocol.study import Kind, kind_named, kind_names, run
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["Kind", "kind_named", "kind_names", "run"]
+if TYPE_CHECKING:
+    from studies.protocol.study import Kind, kind_named, kind_names, run
+    from studies.reporting.answers import answer, figures
+    from studies.reporting.report import report
+    from studies.runs.datasets import write
+
+_HOMES = {
+    "Kind": "studies.protocol.study",
+    "kind_named": "studies.protocol.study",
+    "kind_names": "studies.protocol.study",
+    "run": "studies.protocol.study",
+    "answer": "studies.reporting.answers",
+    "figures": "studies.reporting.answers",
+    "write": "studies.runs.datasets",
+    "report": "studies.reporting.report",
+}
+__all__ = ["Kind", "answer", "figures", "kind_named", "kind_names", "report", "run", "write"]
+
+
+def __getattr__(name: str) -> Any:
+    """Names are imported when they are first used."""
+    if name in _HOMES:
+        found = getattr(import_module(_HOMES[name]), name)
+        globals()[name] = found
+        return found
+    raise AttributeError(f"module 'studies' has no attribute {name!r}")

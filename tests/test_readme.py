@@ -9,6 +9,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from engine.batch.plan import make_plan
 from engine.scene.study import load
 from studies.protocol.study import kind_of
@@ -67,12 +69,19 @@ def test_pieces_of_study_files_are_toml() -> None:
     assert all(tomllib.loads(block) for _, block in examples("toml"))
 
 
-def test_the_python_example_runs() -> None:
-    (block,) = [block for page, block in examples("python") if page == "python.md"]
-    lines = [line for line in block.splitlines() if "engine.load" not in line and not line.endswith(".plot()")]
+def test_the_python_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One after another, those after the first with its study as the file that they load."""
+    monkeypatch.chdir(tmp_path)
+    first, *others = [block for page, block in examples("python") if page == "python.md"]
+    lines = [line for line in first.splitlines() if "engine.load" not in line and not line.endswith(".plot()")]
     names: dict[str, Any] = {}
     exec("\n".join(lines), names)
     assert names["ds"].dynamic_amplification.sel(sensor="midspan", mass=100).shape == (40,)
+    Path("my-study.toml").write_text(names["study"].source.text, encoding="utf-8")
+    for block in others:
+        exec(block, names)
+    assert Path("my-study.nc").exists() and Path("my-report/report.html").exists()
+    assert 0.0 < names["both"].midspan_max.std("scheme").max() < 1e-4
 
 
 def test_every_folder_of_code_is_told_of() -> None:

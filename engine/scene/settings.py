@@ -86,15 +86,20 @@ class Every(Spec):
     every: int = Field(ge=1, le=MAX_STEPS)
 
 
-class Output(Spec):
-    """What the archive keeps of the histories.
+Percentile = Annotated[float, Field(ge=0, le=100)]
 
-    unreduced: number of variants, spread over the sweep, that are computed again by the unreduced finite-element model.
+
+class Output(Spec):
+    """What the archive keeps of the histories, and what is told of the results.
+
+    percentiles: of every result over the sweep, in per cent. unreduced: number of variants, spread over the sweep, that
+    are computed again by the unreduced finite-element model.
     """
 
     histories: Annotated[
         Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
     ] = "auto"
+    percentiles: Annotated[tuple[Percentile, ...], Strict(False), Field(max_length=20)] = ()
     unreduced: int = Field(default=0, ge=0, le=1000)
 
 
@@ -112,9 +117,14 @@ def as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, str) else value
 
 
-Amount = Annotated[float | int | str, PlainValidator(read_amount)]
+Amount = Annotated[float | int | str, PlainValidator(read_amount, json_schema_input_type=float | int | str)]
 Amounts = Annotated[tuple[Amount, ...], Strict(False), Field(min_length=1)]
-Paths = Annotated[tuple[str, ...], Strict(False), BeforeValidator(as_tuple), Field(min_length=1, max_length=100)]
+Paths = Annotated[
+    tuple[str, ...],
+    Strict(False),
+    Field(min_length=1, max_length=100),
+    BeforeValidator(as_tuple, json_schema_input_type=str | list[str]),
+]
 
 
 class SweepAxis(Spec):

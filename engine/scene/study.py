@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
+from pydantic import AfterValidator, Field, PrivateAttr, Strict, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
@@ -19,18 +19,20 @@ from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
-from engine.study_file.spec import Keys, Noun, Spec, field_at, nearest, refuse
+from engine.study_file.spec import Keys, Noun, Spec, field_at, nearest, one_of, refuse
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.quantities import QUANTITIES
+from results_schema.status import Status, label
 from results_schema.variables import RESERVED, expand, sensor_unit
 
 SCHEMA_VERSION = 1
 STANDARD_GRAVITY = 9.80665
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
+EXPECTABLE = tuple(label(status) for status in Status if status != Status.OK)
 # numbers that do not belong to the model
-FIXED = ("schema_version", "sweep", "output", "question", "solver.audit", "envelope")
+FIXED = ("schema_version", "expected", "sweep", "output", "question", "solver.audit", "envelope")
 
 
 def _known_version(version: int) -> int:
@@ -46,12 +48,16 @@ def _kind_name(kind: str) -> str:
     return kind
 
 
+Statuses = Annotated[tuple[Annotated[str, AfterValidator(one_of(*EXPECTABLE))], ...], Strict(False)]
+
+
 class Scene(Spec):
     """Every table of a study file, each valid by itself; `Study` adds what must hold between them."""
 
     schema_version: Annotated[int, AfterValidator(_known_version)] = SCHEMA_VERSION
     title: str = Field(default="", max_length=500)
     kind: Annotated[str, AfterValidator(_kind_name), Noun('a kind of study, such as kind = "passage"')]
+    expected: Statuses = ()  # statuses that belong to the study's answer
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
     initial: Literal["rest", "equilibrium"] | None = None
     body: dict[str, AnyBody] = Field(default_factory=dict)
@@ -78,7 +84,7 @@ class Study(Scene):
     _data: dict[str, Any] = PrivateAttr()
 
     def __init__(self, document: Document | None = None, /, **keywords: Any) -> None:
-        given = document if document is not None else document_of(keywords)
+        given = document if document is not None else document_of({"schema_version": SCHEMA_VERSION, **keywords})
         try:
             super().__init__(**given.data)
         except ValidationError as error:
@@ -157,6 +163,18 @@ class Study(Scene):
         """The base scene alone."""
         data = {key: table for key, table in self._data.items() if key != "sweep"}
         return Study(document_of(data, self._source.name))
+
+
+def json_schema(kinds: Sequence[str]) -> dict[str, Any]:
+    """The JSON schema of a study file. kinds: the kinds of study that there are."""
+    found = Scene.model_json_schema(by_alias=True)
+    found["properties"]["kind"]["enum"] = list(kinds)
+    found["properties"]["sweep"] = {
+        "type": "object",
+        "properties": {"zip": {"type": "boolean"}},
+        "additionalProperties": {"$ref": "#/$defs/SweepAxis"},
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "wanderlast study", **found}
 
 
 def load(path_or_text: str | Path) -> Study:

@@ -13,7 +13,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from results_schema.errors import shortened
@@ -23,6 +24,7 @@ _COMMA = re.compile(r",(\d+)(.*)")
 _FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|1(?=\s*/)")
 _OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
 _SUPERSCRIPTS = {"²": 2, "³": 3, "⁴": 4}
+_BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}  # JSON schema's
 _BASE = ("meter", "kilogram", "second")
 _COMMON = {
     name: (Fraction(factor), base)
@@ -58,6 +60,11 @@ class Unit:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.read, handler(source))
 
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        words = {"type": "string", "pattern": r"^\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*\D"}
+        number = {_BOUNDS.get(key, key): value for key, value in handler(schema).items()}
+        return {"anyOf": [number, words], "description": self.article}
+
     def read(self, value: Any) -> Any:
         """A string such as "210 GPa" as SI float; anything else unchanged. Raises PydanticCustomError."""
         return self.si(value) if isinstance(value, str) else value
@@ -79,6 +86,15 @@ class Unit:
             return float(Fraction(number) * factor)
         except OverflowError:
             raise fault("beyond the range of numbers", expected=self.article, received=shortened(text)) from None
+
+    def written(self, text: str) -> tuple[str, float]:
+        """The unit of a number with a unit as it was written, and one of it in SI.
+
+        >>> Unit("speed", "m s-1", (1, 0, -1)).written("72 km/h")[0]
+        'km/h'
+        """
+        unit = _split(text, self)[1]
+        return unit, self.si(f"1 {unit}")
 
     @property
     def article(self) -> str:

@@ -94,12 +94,13 @@ def draw(study: str, folder: Path | None) -> None:
 @click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
 @click.option("--overwrite", is_flag=True, help="Replace another archive, and unfinished parts of another study.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+@click.option("-v", "--verbose", is_flag=True, help="Tell also how it was computed.")
 @_THREADS
 @_JSON
-def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
+def run(study: str, archive: Path | None, as_json: bool, verbose: bool, **how: Any) -> int:
     """Run STUDY and write its archive.
 
-    With a progress bar, and a summary at the end. Started again after any interruption it goes on from what is
+    With a progress bar, and the answer at the end. Started again after any interruption it goes on from what is
     finished.
     """
     from studies.commands import console
@@ -115,6 +116,8 @@ def run(study: str, archive: Path | None, as_json: bool, **how: Any) -> int:
         console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
     else:
         console.show_outcome(outcome)
+        if verbose:
+            console.show_details(outcome)
     console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))
     return code
 
@@ -137,8 +140,10 @@ def report(archive: Path, folder: Path | None) -> None:
 
 @commands.command()
 @click.argument("archive", type=_FILE)
-def info(archive: Path) -> None:
-    """Tell what is inside ARCHIVE and whether it is whole.
+@click.option("--all", "every", is_flag=True, help="Every attribute and variable.")
+@click.option("--study", "text", is_flag=True, help="The study file's text and nothing else.")
+def info(archive: Path, every: bool, text: bool) -> None:
+    """Tell what is inside ARCHIVE and whether it is whole, on one screen.
 
     Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
     """
@@ -147,9 +152,56 @@ def info(archive: Path) -> None:
     from studies.commands import console
 
     found = describe(archive)
-    console.show_archive(found)
+    if text:
+        console.say(*str(found.attributes.get("study", "")).splitlines())
+    elif every:
+        console.show_everything(found)
+    else:
+        console.show_archive(found)
     if not found.whole:
         raise ArchiveError(found.damage)
+
+
+@commands.command()
+@click.argument("first", type=_FILE)
+@click.argument("second", type=_FILE)
+def compare(first: Path, second: Path) -> int:
+    """Tell what differs between the archives FIRST and SECOND: studies, statuses, results beyond their errors.
+
+    Ends with 3 where variants of both differ by more than their errors explain, or in status.
+    """
+    from results_schema.store.archive import open_archive
+    from studies.commands import console
+    from studies.reporting.comparison import compare as compared
+    from studies.runs.archived import results_of
+
+    found = compared(results_of(open_archive(first)), results_of(open_archive(second)))
+    console.show_comparison(found)
+    return 0 if found.agree else 3
+
+
+@commands.command()
+@click.argument("archive", type=_FILE)
+@click.argument("file", type=_FILE)
+def export(archive: Path, file: Path) -> None:
+    """Write ARCHIVE as a table, FILE.csv or FILE.parquet: one row per variant (and position)."""
+    from results_schema.store.archive import open_archive
+    from studies.commands import console
+    from studies.reporting.tabulated import write_table
+    from studies.runs.archived import results_of
+
+    left_out = write_table(results_of(open_archive(archive)), file)
+    console.say(f"wrote {file}", *([f"without {', '.join(left_out)}"] if left_out else []))
+
+
+@commands.command()
+def schema() -> None:
+    """Print the JSON schema of study files, with which editors complete and check them."""
+    from engine.scene.study import json_schema
+    from studies.commands import console
+    from studies.protocol.study import kind_names
+
+    console.say_json(json_schema(kind_names()))
 
 
 @commands.command(name="list")
@@ -190,8 +242,9 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
 
         path = catalogue.find_study(study)
         loaded = engine.load(path)
-        with console.progress_bar(path.stem) as progress:
-            return run_to_archive(loaded, archive or Path(f"{path.stem}.nc"), options, progress=progress, stop=stop)
+        with console.progress_bar(path.stem) as bar:
+            place = archive or Path(f"{path.stem}.nc")
+            return run_to_archive(loaded, place, options, progress=bar.show, stage=bar.say, stop=stop)
 
 
 def _refuse_what_is_no_archive(archive: Path) -> None:

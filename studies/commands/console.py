@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 from rich.console import Console
@@ -20,16 +21,20 @@ from studies.commands.error_exit import drop_stdout
 from studies.results.formatting import counted, number, quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
+
+    from rich.console import JustifyMethod
 
     from results_schema.store.archive import Summary
     from studies.commands.bench import Throughput
     from studies.commands.catalogue import Entry
     from studies.commands.preview import Preview
+    from studies.reporting.comparison import Comparison
+    from studies.reporting.summary import Range
     from studies.runs.runner import Outcome
 
-WIDTH_OF_FILES = 140  # of output that no terminal shows
-LONGEST_CELL = 200
+WIDTH = 80  # of output that no terminal shows
+LONGEST_CELL = 400
 
 _NUMBER = re.compile(r"-?[\d.,e-]+( [^\s\d]\S*)*")
 
@@ -44,7 +49,9 @@ class _Output(Console):
 
 def _output() -> Console:
     console = _Output(highlight=False, emoji=False, markup=False, soft_wrap=False)
-    return console if console.is_terminal else _Output(highlight=False, emoji=False, markup=False, width=WIDTH_OF_FILES)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = WIDTH
+    return console
 
 
 def say(*lines: str) -> None:
@@ -66,26 +73,47 @@ def say_json(content: Mapping[str, Any]) -> None:
     _output().out(json.dumps(_finite(content), indent=2, allow_nan=False))
 
 
+def paragraphs(*texts: str) -> None:
+    """Print sentences, wrapped between words, with nothing between them but line breaks."""
+    console = _output()
+    for text in texts:
+        console.print(Text(printable(text, 10_000)))
+
+
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table of text; columns of numbers stand to the right."""
     cells = [[printable(cell, LONGEST_CELL) for cell in row] for row in rows]
-    shown = Table(box=None, padding=(0, 2, 0, 0))
+    shown = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for place, heading in enumerate(headings):
         numeric = all(_NUMBER.fullmatch(row[place]) for row in cells)
-        shown.add_column(Text(heading, "dim"), justify="right" if numeric else "left", overflow="fold")
+        side: JustifyMethod = "right" if numeric else "left"
+        shown.add_column(Text(heading, "dim"), justify=side, overflow="fold", no_wrap=place == 0)
     for row in cells:
         shown.add_row(*map(Text, row))
     console = _output()
-    console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
+    if title:
+        console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
     console.print(shown)
-    console.print()
+    console.line()
+
+
+def _heading(title: str) -> None:
+    _output().print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
+    _output().line()
+
+
+class Bar(NamedTuple):
+    """What moves a progress bar: call `show` with what is done and the total, `say` with what is being done."""
+
+    show: Callable[[int, int], None]
+    say: Callable[[str], None]
 
 
 @contextmanager
-def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error, if that is a terminal; call what it gives with what is done and the total."""
+def progress_bar(label: str) -> Iterator[Bar]:
+    """A progress bar on standard error, if that is a terminal."""
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
     bar = Progress(*columns, TimeRemainingColumn(), console=console, disable=not console.is_terminal, transient=True)
     with bar:
         task = bar.add_task(label, total=None)
@@ -93,7 +121,11 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
         def show(finished: int, total: int) -> None:
             bar.update(task, completed=finished, total=total)
 
-        yield show
+        def say_stage(words: str) -> None:
+            if console.is_terminal:
+                bar.console.print(Text(f"{label}: {printable(words, LONGEST_CELL)}", "dim"))
+
+        yield Bar(show, say_stage)
 
 
 def show_preview(shown: Preview) -> None:
@@ -112,38 +144,138 @@ def show_studies(entries: Iterable[Entry], kinds: Iterable[tuple[str, str]]) -> 
 
 
 def show_archive(summary: Summary) -> None:
-    """What is inside an archive, who made it, is it whole."""
+    """What is inside an archive, who made it, is it whole: on one screen."""
+    from studies.commands.preview import size
+
+    attributes, root = summary.attributes, [v for v in summary.variables if v.group == "/"]
+    state = "whole" if summary.whole else "DAMAGED"
+    paragraphs(f"{summary.path}: {state}, {size(summary.file_bytes)}")
+    grid = next((v.dims for v in root if v.name == "status"), ())
+    shape = " x ".join(f"{name} {summary.dimensions[name]:,}" for name in grid)
+    own = [v.name for v in root if v.dims[: len(grid)] == grid and v.name not in grid and v.units]
+    results = [name for name in own if not name.endswith("_position")]
+    histories = [v.name for v in root if "history" in v.dims]
+    groups = sorted({v.group for v in summary.variables} - {"/"})
+    said = {
+        "title": attributes.get("title", ""),
+        "kind": attributes.get("study_kind", ""),
+        "variants": f"{sum(summary.status_counts.values()):,}{f' = {shape}' if len(grid) > 1 else ''}",
+        "status": ", ".join(f"{name} {count:,}" for name, count in summary.status_counts.items()),
+        "results": ", ".join(results),
+        "histories": ", ".join(histories),
+        "groups": ", ".join(groups),
+        "made": attributes.get("history", ""),
+        "in": f"{number(float(attributes['run_seconds']))} s" if "run_seconds" in attributes else "",
+        "on": attributes.get("machine", ""),
+    }
+    table("", ("", ""), [(name, _line(value)) for name, value in said.items() if value])
+    paragraphs(
+        f"wanderlast info {summary.path} --all lists every variable with its meaning, --study prints the study file."
+    )
+
+
+def show_everything(summary: Summary) -> None:
+    """Every attribute, dimension and variable of an archive."""
     from studies.commands.preview import size
 
     say(f"{summary.path}: {'whole' if summary.whole else 'DAMAGED'}, {size(summary.file_bytes)}", "")
     table("Made", ("", ""), [(key, _line(value)) for key, value in summary.attributes.items()])
     table("Dimensions", ("dimension", "length"), [(name, str(length)) for name, length in summary.dimensions.items()])
     table("Status", ("status", "variants"), [(name, f"{count:,}") for name, count in summary.status_counts.items()])
-    rows = [(v.name, v.group, ", ".join(v.dims), v.dtype, v.units, v.long_name) for v in summary.variables]
-    table("Variables", ("name", "group", "dimensions", "type", "unit", "meaning"), rows)
+    for group in sorted({v.group for v in summary.variables}):
+        rows = [(v.name, ", ".join(v.dims), v.units, v.long_name) for v in summary.variables if v.group == group]
+        table(f"Variables of {group}", ("name", "dimensions", "unit", "meaning"), rows)
 
 
 def show_outcome(outcome: Outcome) -> None:
-    """What a run found: the range of every result and the variants there, statuses, the archive."""
+    """The answer of a run in sentences, the results that were asked for, their accuracy, and what to do next."""
+    from studies.reporting import summary
+    from studies.reporting.answers import answer_of
+    from studies.results.results import Results
+    from studies.runs.audit import told_accuracy
+
+    results = Results.of(outcome.results)
+    _heading(outcome.results.attrs["title"])
+    paragraphs(*answer_of(results))
+    _ranges(summary.asked(results), results.study.output.percentiles)
+    accuracy = told_accuracy(outcome.audit, results)
+    statuses = _about_statuses(summary.counts(outcome.results), summary.noun(outcome.results), results.study.expected)
+    paragraphs(*statuses, *([f"Accuracy: {accuracy}"] if accuracy else []))
+    paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
+
+
+def show_details(outcome: Outcome) -> None:
+    """How a run was computed: the range of every result with both variants, models, schemes, work, and the audit."""
     from studies.findings.numerics_used import told_choices
     from studies.reporting import summary
     from studies.results.results import Results
     from studies.runs.audit import told_audit
 
-    results, whole = outcome.results, Results.of(outcome.results)
+    results = Results.of(outcome.results)
+    rows = [
+        (_name(found), found.said(end.value), end.where)
+        for found in summary.ranges(results)
+        for end in (found.smallest, found.largest)
+    ]
+    _output().line()
+    table("Smallest and largest of every result", ("result", "value", "where"), rows)
+    paragraphs(*told_choices(results), *told_audit(outcome.audit, results))
+
+
+def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
+    """Each result with its range, and the variant of the end of larger size."""
+    axes = list(dict.fromkeys(name for one in found for name in one.extreme.words))
+    _output().line()
+    if not axes:
+        table("", ("result", "value"), [(_name(one), one.said(one.extreme.value)) for one in found])
+        return
+    parts = [f"{number(part)} %" for part in percentiles]
+    where = f"extreme at {', '.join(name.replace('_', ' ') for name in axes)}"
     rows = [
         (
-            f"{found.name} {found.sensor}".strip(),
-            quantity(found.smallest.value, found.units, beside=found.size),
-            found.smallest.where,
-            quantity(found.largest.value, found.units, beside=found.size),
-            found.largest.where,
+            _name(one),
+            *(one.said(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
+            ", ".join(one.extreme.words.values()),
         )
-        for found in summary.ranges(whole)
+        for one in found
     ]
-    table(results.attrs["title"], ("result", "smallest", "where", "largest", "where"), rows)
-    told = [*told_choices(whole), *told_audit(outcome.audit, whole)]
-    say(*_about_statuses(summary.counts(results), summary.noun(results)), *told, _about_work(outcome))
+    table("", ("result", "smallest", *parts, "largest", where), rows)
+
+
+def _name(found: Range) -> str:
+    return f"{found.name} {found.sensor}".strip()
+
+
+def show_comparison(found: Comparison) -> None:
+    """What differs between two archives."""
+    changes = [(change.key, _value(change.first), _value(change.second)) for change in found.changes]
+    if changes:
+        table("The studies differ", ("key", "first", "second"), changes)
+    only = f"; {found.only_first:,} only in the first, {found.only_second:,} only in the second"
+    apart = only if found.only_first or found.only_second else ""
+    paragraphs(f"{counted(found.variants, 'variant')} in both{apart}.")
+    paragraphs(*(f"{count:,} of them: {old} -> {new}" for (old, new), count in found.statuses.items()))
+    rows = [
+        (
+            one.name,
+            quantity(one.largest, one.units),
+            "no estimate" if one.beyond is None else f"{one.beyond:,}",
+            one.where,
+        )
+        for one in found.differences
+        if one.largest
+    ]
+    if rows:
+        _output().line()
+        table("", ("result", "largest difference", "beyond both errors", "at"), rows)
+    same = [one.name for one in found.differences if not one.largest]
+    if same:
+        paragraphs(f"Equal in every variant: {', '.join(same)}.")
+    paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
+
+
+def _value(value: Any) -> str:
+    return "-" if value is None else str(value)
 
 
 def show_throughput(found: Throughput) -> None:
@@ -157,11 +289,11 @@ def show_throughput(found: Throughput) -> None:
     )
 
 
-def _about_statuses(counts: Mapping[str, int], noun: str) -> Iterator[str]:
+def _about_statuses(counts: Mapping[str, int], noun: str, expected: Sequence[str]) -> Iterator[str]:
     for status in Status:
-        if label(status) in counts:
-            message = "" if status == Status.OK else f" ({status.message})"
-            yield f"{counted(counts[label(status)], noun)} {label(status)}{message}"
+        if (count := counts.get(label(status), 0)) and status != Status.OK:
+            part = "as the study expects, " if label(status) in expected else ""
+            yield f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}: {part}{status.message}."
 
 
 def _about_work(outcome: Outcome) -> str:
@@ -170,7 +302,7 @@ def _about_work(outcome: Outcome) -> str:
 
     variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))
     if outcome.was_finished:
-        return f"{outcome.archive} holds the finished results of this very study; nothing to do"
+        return f"{outcome.archive} held the finished results of this study: nothing to do"
     resumed = f"{outcome.resumed:,} of them" if is_marched(outcome.results) else counted(outcome.resumed, "piece")
     earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
     return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"

@@ -16,12 +16,13 @@ from engine.batch.plan import Plan
 from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
 from engine.model.variant_values import VariantValues, moving_mass
-from engine.scene.sweep import Cases, expand
+from engine.scene.sweep import Axis, Cases, expand
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
 from studies.results.formatting import counted, number, unit_text
+from studies.results.results import typed_unit
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -59,7 +60,7 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     plan = parts.plan
     seen = forecast(plan, threads)
     tables = (
-        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.cases), _ratios(plan)),
+        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.study, plan.cases), _ratios(plan)),
         Table(seen.title, chosen.HEADINGS, seen.rows),
     )
     room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
@@ -107,7 +108,7 @@ def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:
     base = base_scene(study)
     yield _bodies(base)
     yield from _checks(base)
-    yield _sweep(cases)
+    yield _sweep(study, cases)
 
 
 def duration(seconds: float) -> str:
@@ -165,17 +166,25 @@ def _checks(base: SceneModel) -> Iterator[Table]:
         yield Table(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
 
 
-def _sweep(cases: Cases) -> Table:
+def _sweep(study: Study, cases: Cases) -> Table:
     rows = [
         (
             axis.name,
             str(len(axis.values)),
-            f"{span(axis.values)} {unit_text(axis.units)}".strip(),
+            _range(study, axis),
             ", ".join(axis.paths),
         )
         for axis in cases.axes
     ]
     return Table("Sweep", ("axis", "values", "range", "sets"), rows)
+
+
+def _range(study: Study, axis: Axis) -> str:
+    """Smallest and largest value of a swept number, in the unit of the study file."""
+    typed = typed_unit(study, axis.name)
+    if typed is None:
+        return f"{span(axis.values)} {unit_text(axis.units)}".strip()
+    return f"{span(axis.values * typed.factor)} {typed.unit}"
 
 
 def _ratios(plan: Plan) -> Table:

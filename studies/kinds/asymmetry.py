@@ -196,7 +196,7 @@ def _where_late(results: Results, late: Mask) -> str:
         axis = results.axis(ending)
         if axis is not None:
             value = float(pick(results.everywhere(results.dataset[axis.name])[late]))
-            said += f", {words.format(f'{axis.noun} {quantity(value, axis.units)}')}"
+            said += f", {words.format(f'{axis.noun} {axis.in_words(value)}')}"
     return said
 
 
@@ -245,7 +245,7 @@ def _lag(results: Results, sensor: str) -> str:
         return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in every variant."
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
     return (
-        f"{sensor}: up to {quantity(limit, axis.units)} every variant lags within {percent(CLOSE)} of {formula}, as "
+        f"{sensor}: up to {axis.in_words(limit)} every variant lags within {percent(CLOSE)} of {formula}, as "
         f"damping alone would have it: {calm}. Beyond, vibration left over from the turns (or the start) takes over, "
         f"and the lag ranges from {span}."
     )
@@ -285,8 +285,7 @@ def _mass(results: Results) -> list[str]:
     change = np.asarray(((high - low) / high).where(high > 0.0).values, dtype=np.float64)
     if not np.isfinite(change).any():
         return []
-    at = f" at {quantity(float(speed.values.min()), speed.units)}" if speed is not None else ""
-    span = f"{quantity(float(mass.values.min()), mass.units)} to {quantity(float(mass.values.max()), mass.units)}"
+    at = f" at {speed.in_words(float(speed.values.min()))}" if speed is not None else ""
     worst = float(np.nanmax(change))
     verdict = "hardly feels" if worst < CLOSE else "depends on"
-    return [f"The lag {verdict} the mass: from {span} it changes by {percent(worst)} at most{at}."]
+    return [f"The lag {verdict} the mass: from {mass.span} it changes by {percent(worst)} at most{at}."]

@@ -11,7 +11,7 @@ from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
-from studies.results.formatting import counted, listed, number, quantity
+from studies.results.formatting import counted, number, quantity
 from studies.results.results import VARIANT, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
@@ -68,22 +68,22 @@ def _largest(results: Results, sensor: str) -> str:
     top, best = (extreme(np.where(held, values, np.nan)) for values in (size, gain))
     assert top is not None
     shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""
-    said = f"{sensor}: {shown}the largest value is {_value(results, sensor, top)}"
+    said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
     if best is None:
-        return f"{said}."
-    amplified = f"{number(float(gain[best]), 4)} times the static value"
+        return f"{said}{in_words(results, top)}."
+    amplified = f"{number(float(gain[best]))} times the static one"
     if best == top:
-        return f"{said}, {amplified}."
-    return f"{said}; the largest amplification is {amplified}{in_words(results, best)}."
+        return f"{said}, {amplified},{in_words(results, top)}."
+    return f"{said}{in_words(results, top)}; relative to statics it is largest{in_words(results, best)}: {amplified}."
 
 
 def _value(results: Results, sensor: str, place: Index) -> str:
-    """The extreme of larger size of one variant, and where it and the carriage are."""
+    """The extreme of larger size of one variant, and where the carriage is then."""
     sides = {side: float(results.dataset[f"{sensor}_{side}"].values[place]) for side in ("max", "min")}
     side = max(sides, key=lambda name: abs(sides[name]))
     at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
-    then = f" (with {results.carriage_name} at {quantity(at, 'm')})" if np.isfinite(at) else ""
-    return f"{quantity(sides[side], results.sensors[sensor])}{in_words(results, place)}{then}"
+    then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else ""
+    return f"{quantity(sides[side], results.sensors[sensor])}{then}"
 
 
 def _contact(results: Results, carriage: str) -> list[str]:
@@ -99,28 +99,31 @@ def _contact(results: Results, carriage: str) -> list[str]:
         least = extreme(-force)
         assert least is not None
         return [
-            f"{carriage}: the contact holds everywhere; its smallest force is {quantity(float(force[least]), 'N')}"
-            f"{in_words(results, least)}."
+            f"{carriage} keeps its contact everywhere; the smallest contact force is "
+            f"{quantity(float(force[least]), 'N')}{in_words(results, least)}."
         ]
     return [_onset(results, carriage, opened, known)]
 
 
 def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
     """From which speed on the contact opens, for up to five masses."""
-    shown = f"{carriage}: the contact opens in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
+    shown = f"{carriage} would lift off in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
     speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
     if speed is None:
         return f"{shown}. {BEYOND}"
     if VARIANT in (speed.dim, speed.dim if group is None else group.dim):
         return f"{shown}; {_worst(results, carriage, opened)}. {BEYOND}"
     if group is None:
-        return f"{shown}, {_first_speed(results, speed, opened, known)}. {BEYOND}"
+        return f"{shown}, {_first_speed(results, speed, opened)}. {BEYOND}"
     along = results.everywhere(results.dataset[group.name])
-    parts = []
-    for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
-        label = group.at(int(np.flatnonzero(group.values == value)[0]))
-        parts.append(f"{label}: {_first_speed(results, speed, opened & (along == value), known & (along == value))}")
-    return f"{shown} ({listed(parts)}). {BEYOND}"
+    opening = sorted(set(along[opened].tolist()))
+    told = [
+        f"at {group.in_words(value)} {_first_speed(results, speed, opened & (along == value))}"
+        for value in chosen(opening, MOST_GROUPS)
+    ]
+    calm = group.values[group.values < opening[0]]
+    below = f"; up to {group.in_words(float(calm.max()))} never" if calm.size else ""
+    return f"{shown}: {', '.join(told)}{below}. {BEYOND}"
 
 
 def _worst(results: Results, carriage: str, opened: Mask) -> str:
@@ -132,16 +135,12 @@ def _worst(results: Results, carriage: str, opened: Mask) -> str:
     return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"
 
 
-def _first_speed(results: Results, speed: Axis, opened: Mask, known: Mask) -> str:
+def _first_speed(results: Results, speed: Axis, opened: Mask) -> str:
     """The lowest speed at which the contact opens, with its ratio to the critical speed where that is known."""
     along = results.everywhere(results.dataset[speed.name])
-    if not known.any():
-        return "no values"
-    if not opened.any():
-        return f"not up to {quantity(float(along[known].max()), speed.units)}"
     first = float(along[opened].min())
-    text = f"first at {quantity(first, speed.units)}"
+    text = f"first at {speed.in_words(first)}"
     if "speed_ratio" not in results.dataset.coords:
         return text
     ratio = results.everywhere(results.dataset["speed_ratio"])
-    return f"{text} (speed ratio {number(float(ratio[opened & (along == first)].min()))})"
+    return f"{text} ({number(float(ratio[opened & (along == first)].min()), 2)} of the critical speed)"

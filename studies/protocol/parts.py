@@ -34,7 +34,7 @@ SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 class Work:
     """How parts are computed: on how many threads, who is told of the progress, and whether somebody asked to stop.
 
-    chunk: variants of a task where that is fixed, as of `engine.run`.
+    stage: told in words what is being done. chunk: variants of a task where that is fixed, as of `engine.run`.
     """
 
     def __init__(
@@ -43,10 +43,12 @@ class Work:
         stop: Stop | None = None,
         progress: Progress | None = None,
         chunk: int | None = None,
+        stage: Callable[[str], None] | None = None,
     ) -> None:
         self.threads = (os.cpu_count() or 1) if threads is None else threads
         self.stop = stop or Stop()
         self.progress: Progress = progress or (lambda finished, total: None)
+        self.stage: Callable[[str], None] = stage or (lambda words: None)
         self.chunk = chunk
 
     def halted(self) -> bool:
@@ -138,6 +140,7 @@ class Variants:
         done = np.unique(np.concatenate([np.empty(0, np.int64), *store.finished().values()]))
         work.progress(int(done.size), self.plan.size)
         if done.size < self.plan.size:
+            work.stage("measuring what each variant needs, then marching")
             how: dict[str, Any] = {"threads": work.threads, "chunk": work.chunk, "stop": work.stop.event}
             try:
                 with Gatherer(lambda chunk: store.write(chunk.name, chunk.tables)) as parts:
@@ -241,6 +244,7 @@ class Pieces:
         left = [piece for piece in self.pieces if piece.name not in done]
         for count, piece in enumerate(left, len(done) + 1):
             work.check()
+            work.stage(piece.words)
             try:
                 jobs, keep = [partial(_compute, piece, work)], partial(_keep, store, piece)
                 share_out(jobs, 1, keep, stop=work.stop.event, grace=GRACE_SECONDS)

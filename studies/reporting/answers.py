@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
-from studies.results.findings_common import told_envelopes
+from studies.results.findings_common import told_envelopes, told_statuses
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from studies.pictures.common.figures import Figure
 
 
-def findings(dataset: xr.Dataset) -> list[str]:
+MOST_SAID = 4
+
+
+def answer(dataset: xr.Dataset) -> list[str]:
     """The answer in sentences, the most important first."""
     return findings_of(Results.of(dataset))
 
@@ -23,6 +26,12 @@ def findings(dataset: xr.Dataset) -> list[str]:
 def figures(dataset: xr.Dataset) -> list[Figure]:
     """The figures of the report, the most important first."""
     return figures_of(Results.of(dataset))
+
+
+def answer_of(results: Results) -> list[str]:
+    """The answer in two to five sentences: what the kind of study says first."""
+    told = kind_named(results.study.kind).findings(results)
+    return [text for text in told if text not in told_statuses(results)][:MOST_SAID]
 
 
 def findings_of(results: Results) -> list[str]:

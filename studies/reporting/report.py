@@ -28,15 +28,19 @@ from studies.pictures.common.figures import Figure, png, svg
 from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, findings_of
 from studies.reporting.summary import noun, ranges
-from studies.results.formatting import counted, number, quantity, unit_text
+from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
 from studies.runs import audit
 from studies.runs.archived import results_of
 from studies.runs.audit import told_audit
+from studies.runs.datasets import archive_of
 from studies.runs.unreduced import GROUP, told_unreduced
 
 if TYPE_CHECKING:
+    import xarray as xr
     from jinja2 import Template
+
+    from engine.scene.study import Study
 
 PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
@@ -89,13 +93,26 @@ class Page:
 
 
 def write_report(archive: Path | str, folder: Path | str) -> Path:
-    """Write the page and its figures (SVG and PNG) into a folder; the page's path.
+    """Write the page of an archive and its figures (SVG and PNG) into a folder; the page's path.
 
     Raises BadInput (no such archive, no such place) and ArchiveError before anything is written, and OutputFailed.
     """
     folder = Path(folder)
     check_folder(folder, PAGE)
-    source = open_archive(archive)
+    return _write(open_archive(archive), folder)
+
+
+def report(dataset: xr.Dataset, folder: Path | str, study: Study | None = None) -> Path:
+    """Write the page of a dataset of `studies.run` as `write_report` does that of an archive; the page's path.
+
+    study: as of `studies.write`. Raises BadInput and OutputFailed.
+    """
+    folder = Path(folder)
+    check_folder(folder, PAGE)
+    return _write(archive_of(dataset, folder.name, study), folder)
+
+
+def _write(source: Archive, folder: Path) -> Path:
     results = results_of(source)
     figures = [
         *figures_of(results),
@@ -269,16 +286,14 @@ def _plain(value: Any) -> str:
 
 def _sweep_row(results: Results, place: int) -> Row:
     axis = results.axes[place]
-    low, high = (quantity(float(end), axis.units) for end in (axis.values.min(), axis.values.max()))
-    span = f"{low} to {high}" if len(axis.values) > 1 else low
-    return Row(axis.noun, f"{span}, {counted(len(axis.values), 'value')}", ", ".join(axis.paths))
+    return Row(axis.noun, f"{axis.span}, {counted(len(axis.values), 'value')}", ", ".join(axis.paths))
 
 
 def _results(results: Results) -> list[tuple[str, ...]]:
     """Name, sensor, smallest and largest with their places, of every result that is a number per variant."""
     rows: list[tuple[str, ...]] = []
     for found in ranges(results):
-        ends = [quantity(end.value, found.units, 4) for end in (found.smallest, found.largest)]
+        ends = [found.said(end.value, 4) for end in (found.smallest, found.largest)]
         rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where))
     return rows
 

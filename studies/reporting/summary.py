@@ -10,7 +10,7 @@ import numpy as np
 
 from results_schema.status import Status, label
 from results_schema.variables import expand
-from studies.findings.numerics_used import is_marched
+from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.formatting import quantity
 
@@ -27,34 +27,45 @@ _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 @dataclass(frozen=True)
 class Extreme:
-    """One end of a result's range: its value, and the swept numbers (or names) of that variant by name, with units."""
+    """One end of a result's range: its value, the swept numbers (or names) of that variant by name, and in words."""
 
     value: float
-    variant: Mapping[str, tuple[float | str, str]]
+    variant: Mapping[str, float | str]
+    words: Mapping[str, str]
 
     @property
     def where(self) -> str:
         """The variant in words."""
-        return ", ".join(
-            f"{name} {value if isinstance(value, str) else quantity(value, unit)}"
-            for name, (value, unit) in self.variant.items()
-        )
+        return ", ".join(f"{name} {words}" for name, words in self.words.items())
 
 
 @dataclass(frozen=True)
 class Range:
-    """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor."""
+    """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor.
+
+    percentiles: its value at each of `output.percentiles`.
+    """
 
     name: str
     sensor: str
     units: str
     smallest: Extreme
     largest: Extreme
+    percentiles: tuple[float, ...] = ()
+
+    @property
+    def extreme(self) -> Extreme:
+        """The end of larger magnitude."""
+        return max(self.largest, self.smallest, key=lambda end: abs(end.value))
 
     @property
     def size(self) -> float:
         """The larger magnitude, beside which rounding shows."""
-        return max(abs(self.smallest.value), abs(self.largest.value))
+        return abs(self.extreme.value)
+
+    def said(self, value: float, digits: int = 3) -> str:
+        """One of its values with the unit."""
+        return quantity(value, self.units, digits, beside=self.size)
 
 
 def is_measured(results: xr.Dataset) -> bool:
@@ -76,15 +87,16 @@ def counts(results: xr.Dataset) -> dict[str, int]:
 def exit_code(outcome: Outcome) -> int:
     """Exit code of a finished run: 3 where some variants are not ok, or an audit found the tolerance missed.
 
-    A study that measures asks where methods fail: a method that diverges is its answer, and nothing that a script has
-    to look after. So it ends with 0.
+    Statuses that the study expects belong to its answer. A study that measures asks where methods fail: a method that
+    diverges is its answer, and nothing that a script has to look after. So it ends with 0.
     """
+    from studies.results.results import Results
     from studies.runs.audit import Verdict
 
     if outcome.audit is not None and not Verdict.of(outcome.audit).held:
         return SOME_NOT_OK
-    all_ok = bool((outcome.results["status"].values == Status.OK).all())
-    return 0 if is_measured(outcome.results) or all_ok else SOME_NOT_OK
+    expected = {label(Status.OK), *Results.of(outcome.results).study.expected}
+    return 0 if is_measured(outcome.results) or set(counts(outcome.results)) <= expected else SOME_NOT_OK
 
 
 def ranges(study_results: Results) -> Iterator[Range]:
@@ -96,17 +108,17 @@ def ranges(study_results: Results) -> Iterator[Range]:
         beside = () if is_measured(results) else _beside_the_grid(study_results.study)
         for name, array in results.data_vars.items():
             if array.dtype.kind == "f" and name not in beside:
-                yield from _range(results, str(name), "", array)
+                yield from _range(study_results, str(name), "", array)
         return
     for name, array in results.data_vars.items():
         if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
             continue
         of_places = len(array.dims) == len(grid) + 1 and str(array.dims[-1]).endswith("_place")
         if array.dims == grid or of_places:
-            yield from _range(results, str(name), "", array)
+            yield from _range(study_results, str(name), "", array)
         elif array.dims == (*grid, "sensor"):
             for place, sensor in enumerate(results["sensor"].values):
-                yield from _range(results, str(name), str(sensor), array.isel(sensor=place))
+                yield from _range(study_results, str(name), str(sensor), array.isel(sensor=place))
 
 
 def _beside_the_grid(study: Study) -> set[str]:
@@ -142,6 +154,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
                 "units": found.units,
                 "smallest": _end_as_json(found.smallest),
                 "largest": _end_as_json(found.largest),
+                "percentiles": dict(zip(map(str, told.study.output.percentiles), found.percentiles, strict=True)),
             }
             for found in ranges(told)
         ],
@@ -149,27 +162,42 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
 
 
 def _end_as_json(end: Extreme) -> dict[str, Any]:
-    return {"value": end.value, "at": {name: value for name, (value, _) in end.variant.items()}}
+    return {"value": end.value, "at": dict(end.variant)}
 
 
-def _range(results: xr.Dataset, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
-    values = array.values
+def asked(study_results: Results) -> list[Range]:
+    """The ranges that answer: extremes, contact forces and the results of the kind of study; without means of squares,
+    estimated errors and work."""
+    beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
+    return [found for found in ranges(study_results) if found.name not in beside]
+
+
+def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
+    values, results = array.values, study_results.dataset
     if not np.isfinite(values).any():
         return
     units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
-    smallest, largest = (_extreme(results, array, pick(values)) for pick in (np.nanargmin, np.nanargmax))
-    yield Range(name, sensor, units, smallest, largest)
+    smallest, largest = (_extreme(study_results, array, pick(values)) for pick in (np.nanargmin, np.nanargmax))
+    percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
+    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)))
 
 
-def _extreme(results: xr.Dataset, array: xr.DataArray, flat: np.intp) -> Extreme:
+def _extreme(results: Results, array: xr.DataArray, flat: np.intp) -> Extreme:
     place = dict(zip(array.dims, np.unravel_index(flat, array.shape), strict=True))
-    variant: dict[str, tuple[float | str, str]] = {}
-    for name, coordinate in results.coords.items():
+    swept_axes = {axis.name: axis for axis in results.axes}
+    variant: dict[str, float | str] = {}
+    words: dict[str, str] = {}
+    for name, coordinate in results.dataset.coords.items():
         swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "ifU"
         if swept and name not in _DERIVED:
-            value = coordinate.values[place[coordinate.dims[0]]].item()
-            variant[str(name)] = (value, str(coordinate.attrs.get("units", "1")))
-    return Extreme(float(array.values.reshape(-1)[flat]), variant)
+            variant[str(name)] = value = coordinate.values[place[coordinate.dims[0]]].item()
+            if isinstance(value, str):
+                words[str(name)] = value
+            elif name in swept_axes:
+                words[str(name)] = swept_axes[str(name)].in_words(value)
+            else:
+                words[str(name)] = quantity(value, str(coordinate.attrs.get("units", "1")))
+    return Extreme(float(array.values.reshape(-1)[flat]), variant, words)
 
 
 _DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

@@ -49,8 +49,8 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
     along = results.everywhere(results.dataset[axis.name])
     lowest = float(along[beyond].min())
     if lowest == axis.values.min():
-        return f"exceeds {percent(threshold)} already at {quantity(lowest, axis.units)}"
-    return f"first exceeds {percent(threshold)} at {quantity(lowest, axis.units)}"
+        return f"exceeds {percent(threshold)} already at {axis.in_words(lowest)}"
+    return f"first exceeds {percent(threshold)} at {axis.in_words(lowest)}"
 
 
 def told_envelopes(results: Results) -> list[str]:

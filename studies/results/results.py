@@ -14,7 +14,7 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.status import Status, label
 from results_schema.variables import sensor_unit
-from studies.results.formatting import axis_title, quantity
+from studies.results.formatting import Scale, axis_title, number, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,13 +29,17 @@ Index = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along it."""
+    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along it, in SI units.
+
+    typed: the unit in which the study file has it, in which people read it again; None where it was typed without one.
+    """
 
     name: str
     dim: str
     paths: tuple[str, ...]
     values: Array
     units: str
+    typed: Scale | None = None
 
     @property
     def noun(self) -> str:
@@ -45,11 +49,33 @@ class Axis:
     @property
     def title(self) -> str:
         """Name and unit as on a figure's axis."""
-        return axis_title(self.noun, self.units)
+        return f"{self.noun} ({self.typed.unit})" if self.typed else axis_title(self.noun, self.units)
+
+    @property
+    def shown(self) -> Array:
+        """(n,) its values in the unit of its title."""
+        return self.values * self.factor
+
+    @property
+    def factor(self) -> float:
+        """What turns its values (SI) into those of its title."""
+        return self.typed.factor if self.typed else 1.0
+
+    def in_words(self, value: float) -> str:
+        """A value (SI) with its unit."""
+        if self.typed is None:
+            return quantity(value, self.units)
+        return f"{number(value * self.typed.factor, 4)} {self.typed.unit}"
+
+    @property
+    def span(self) -> str:
+        """Its smallest and largest value, or its one value, with units."""
+        low, high = (self.in_words(float(end)) for end in (self.values.min(), self.values.max()))
+        return low if low == high else f"{low} to {high}"
 
     def value(self, index: int) -> str:
         """One value with its unit."""
-        return quantity(float(self.values[index]), self.units)
+        return self.in_words(float(self.values[index]))
 
     def at(self, index: int) -> str:
         """One value with name and unit."""
@@ -92,7 +118,8 @@ class Results:
         """The results of a dataset that carries its study's text. Raises BadInput where the text is no study."""
         import engine
 
-        return cls(dataset, engine.load(f"{dataset.attrs['study']}\n"))
+        text = str(dataset.attrs["study"])
+        return cls(dataset, engine.load(text if "\n" in text else f"{text}\n"))
 
     @cached_property
     def dims(self) -> tuple[str, ...]:
@@ -117,7 +144,8 @@ class Results:
             coordinate = self.dataset[name]
             values = np.asarray(coordinate.values, dtype=np.float64)
             units = str(coordinate.attrs.get("units", "1"))
-            found.append(Axis(name, str(coordinate.dims[0]), axis.of, values, "" if units == "1" else units))
+            unit = "" if units == "1" else units
+            found.append(Axis(name, str(coordinate.dims[0]), axis.of, values, unit, typed_unit(self.study, name)))
         return tuple(found)
 
     def axis(self, *endings: str) -> Axis | None:
@@ -129,6 +157,10 @@ class Results:
     def sensors(self) -> dict[str, str]:
         """Name and unit of every sensor."""
         return sensor_units(self.study)
+
+    def noun(self, sensor: str) -> str:
+        """What a sensor measures, as a word."""
+        return self.study.sensor[sensor].quantity.replace("_", " ")
 
     @property
     def carriage(self) -> Carriage:
@@ -157,7 +189,11 @@ class Results:
     @cached_property
     def held(self) -> Mask:
         """Where values are kept and the contact holds, in the sweep's shape: beyond, the equations say no more."""
-        return np.asarray(self.kept.values & (self.dataset["status"].values != int(Status.SEPARATED)))
+        opened = self.dataset["status"].values == int(Status.SEPARATED)
+        for carriage in self.study.carriage:  # a status that comes before this one hides it
+            if (name := f"{carriage}_separation_position") in self.dataset:
+                opened = opened | np.isfinite(self.dataset[name].transpose(*self.dims).values)
+        return np.asarray(self.kept.values & ~opened)
 
     @cached_property
     def with_values(self) -> Mask:
@@ -259,6 +295,17 @@ class Results:
             return np.asarray(stored.sel(history=flat).values, dtype=np.float64)
         places = {dim: i for dim, i in zip(self.dims, index, strict=True) if dim in stored.dims}
         return np.asarray(stored.isel(places).values, dtype=np.float64)
+
+
+def typed_unit(study: Study, axis: str) -> Scale | None:
+    """The unit in which a study file has the values of a swept number; None where they are plain numbers."""
+    written, unit = study.data["sweep"][axis], study.unit(study.sweep.axes[axis].of[0])
+    values = written.get("values", (written.get("from"), written.get("to")))
+    text = next((value for value in values if isinstance(value, str)), None)
+    if text is None or unit is None:
+        return None
+    name, size = unit.written(text)
+    return Scale(1.0 / size, name)
 
 
 def sensor_units(study: Study) -> dict[str, str]:

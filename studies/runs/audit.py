@@ -13,7 +13,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
-from studies.findings.numerics_used import is_marched
+from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results
@@ -154,6 +154,25 @@ class Verdict:
             marked=int(np.count_nonzero(~ours)),
             marked_worst=float(over[known & ~ours].max()) if (known & ~ours).any() else np.nan,
         )
+
+
+def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
+    """In one sentence what was asked, estimated and observed; "" of results without estimates."""
+    if not is_marched(results.dataset) or "tolerance" not in results.dataset:
+        return ""
+    fine = results.dataset["status"].values == int(Status.OK)
+    estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
+    if not estimates.size or not tolerances.size:
+        return ""
+    span = " to ".join(scientific(float(end)) for end in sorted({tolerances.min(), tolerances.max()}))
+    said = f"estimated errors at most {scientific(float(estimates.max()))} of the static size where {span} was asked"
+    if group is None or not (verdict := Verdict.of(group)).count:
+        return f"{said}; no variant was audited."
+    audit = f"{counted(verdict.count, 'variant')} computed again with more of everything"
+    if not verdict.held:
+        beyond = counted(verdict.missed + verdict.unknown, "variant")
+        return f"{said}; but of {audit}, {beyond} did not hold it."
+    return f"{said}; {audit} differ by at most {scientific(_worst(group, verdict)[1])}."
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:

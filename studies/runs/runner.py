@@ -52,9 +52,16 @@ class Outcome:
 
 
 def run_to_archive(
-    study: Study, archive: Path, options: RunOptions, *, progress: Progress | None = None, stop: Stop | None = None
+    study: Study,
+    archive: Path,
+    options: RunOptions,
+    *,
+    progress: Progress | None = None,
+    stage: Callable[[str], None] | None = None,
+    stop: Stop | None = None,
 ) -> Outcome:
-    """Run a study and write its archive, or find it finished there.
+    """Run a study and write its archive, or find it finished there. progress, stage: told what is done, and what is
+    being done.
 
     Raises BadInput, and OutputFailed where nothing can be written or the disk is too small, before anything is
     computed or written; later Interrupted, OutputFailed and ArchiveBusy with finished work kept; ArchiveError when
@@ -73,7 +80,7 @@ def run_to_archive(
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)
-        work = Work(options.threads, stop, progress)
+        work = Work(options.threads, stop, progress, stage=stage)
         resumed = parts.compute(store, work)
         work.check()
         root = _as_declared(parts.gather(store), study)
@@ -104,6 +111,7 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
     from engine.batch.dataset import model_groups
 
     plan = parts.plan
+    work.stage("audit: some variants once more with more of everything")
     audit = audit_group(plan, root, work)
     models = with_first_frequency(model_groups(plan.base), Results(root, plan.study))
     return models | unreduced_group(plan, root, work.check) | audit

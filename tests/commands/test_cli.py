@@ -54,7 +54,7 @@ def test_run_writes_an_archive_and_a_summary(here: Path, capsys: Captured) -> No
     assert main(["run", "small.toml"]) == 0
     output = capsys.readouterr()
     assert output.err == ""
-    for words in ("small", "midspan_max", "trolley_contact_force_min", "16 variants ok", "small.nc"):
+    for words in ("small", "midspan_max", "trolley_contact_force_min", "16 variants", "small.nc"):
         assert words in output.out
     archive = open_archive("small.nc")
     assert archive.root.sizes["speed"] == 8 and archive.root.sizes["mass"] == 2
@@ -210,7 +210,7 @@ def test_info_tells_what_is_inside(here: Path, capsys: Captured) -> None:
     capsys.readouterr()
     assert main(["info", "small.nc"]) == 0
     output = capsys.readouterr().out
-    for words in ("whole", "midspan_max", "/model/beam", "numpy", "speed", "ok"):
+    for words in ("whole", "midspan_max", "/model/beam", "speed", "ok", "--all"):
         assert words in output
 
 

@@ -78,7 +78,7 @@ def test_a_contact_that_would_lift_is_flagged() -> None:
     found = studies.run(engine.load(text))
     opened = bool((found.contact_force < 0.0).any())
     assert opened and int(found.status) == Status.SEPARATED
-    assert any("separated" in text for text in answers.findings(found))
+    assert any("separated" in text for text in answers.answer(found))
 
 
 def test_a_table_on_contacts() -> None:
@@ -87,7 +87,7 @@ def test_a_table_on_contacts() -> None:
     np.testing.assert_allclose(found.contact_force.sum("contact"), weight, rtol=1e-9)
     assert found.contact.values.tolist() == ["car.rear", "car.middle", "car.front"]
     assert found.on_body.values.tolist() == ["bed", "table"]
-    assert "Contact forces lie between" in " ".join(answers.findings(found))
+    assert "Contact forces lie between" in " ".join(answers.answer(found))
 
 
 # ---- comparisons ----
@@ -115,7 +115,7 @@ def test_readings_agree_with_the_unreduced_model(carriage: str) -> None:
         error, against = reading_errors(Results.of(found), sensor)
         assert against == "the unreduced model" and error[0].max() < 1e-4 < error[1, 0].max()
     assert float(np.abs(found.contact_force_difference).max()) < 1e-4
-    text = " ".join(answers.findings(found))
+    text = " ".join(answers.answer(found))
     assert "with static correction from 3 modes of every body on" in text
 
 
@@ -210,7 +210,7 @@ def test_a_table_must_stand_on_its_body() -> None:
 
 def test_sentences_of_frequencies_follow_the_data() -> None:
     found = small.run("eigenfrequencies", "positions = 9\nmodes = 4", MASS)
-    text = "\n".join(answers.findings(found))
+    text = "\n".join(answers.answer(found))
     base = found.base_frequency
     assert f"{float(base.sel(position=2.0, mode=1)):.4g}" in text and "with car at 2 m" in text
     change = (base.max("position") - base.min("position")) / base.min("position")
@@ -222,14 +222,14 @@ def test_sentences_of_frequencies_follow_the_data() -> None:
 
 def test_sentences_of_readings_follow_the_data() -> None:
     found = small.run("influence", sweep=MASS)
-    text = "\n".join(answers.findings(found))
+    text = "\n".join(answers.answer(found))
     largest = 1e3 * float(found.middle.max())
     assert f"to {largest:.4g} mm at mass 50 kg with car at 2 m" in text
     own = 5.0 * 78.5 * 9.80665 * 4.0**4 / (384.0 * 210e9 * 8e-6)
     assert f"({100 * own / float(found.middle.max()):.2g} % of that by own weight)" in text
     assert "Contact forces" not in text  # a single mass presses with its weight
     still = small.run("influence", "positions = [1.0, 1.5]", carriage=small.CAR.replace("40.0", "1e-13"))
-    assert "wherever car stands" in "\n".join(answers.findings(still))
+    assert "wherever car stands" in "\n".join(answers.answer(still))
 
 
 @pytest.mark.parametrize("kind", KINDS)

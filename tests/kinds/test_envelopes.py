@@ -47,7 +47,7 @@ def test_every_kind_that_marches(kind: str) -> None:
     names = [figure.name for figure in answers.figures(dataset)]
     told = {figure.name for part in (choice, estimates) for figure in part.pictures(Results.of(dataset))}
     assert [name for name in names if name not in told][-1] == "envelopes"
-    assert any("the largest bending moment along bed is" in text for text in answers.findings(dataset))
+    assert any("the largest bending moment along bed is" in text for text in answers.answer(dataset))
 
 
 def test_the_report_has_them(tmp_path: Path) -> None:
@@ -62,13 +62,13 @@ def test_the_report_has_them(tmp_path: Path) -> None:
 
 def test_the_sentence_names_value_place_and_variant() -> None:
     dataset = scenes.run("passage", MASSES, extra=EXTRA)
-    said = next(text for text in answers.findings(dataset) if text.startswith("shape: "))
+    said = next(text for text in answers.answer(dataset) if text.startswith("shape: "))
     values = dataset.shape_envelope_max.values
     which, place = np.unravel_index(np.argmax(values), values.shape)
     assert f"{1000.0 * values.max():.3g} mm" in said
     assert f"at {dataset.shape_place.values[place]:g} m of its track" in said
     assert said.endswith(f"(mass {dataset.mass.values[which]:g} kg).")
-    alone = answers.findings(scenes.run("passage", extra=EXTRA))
+    alone = answers.answer(scenes.run("passage", extra=EXTRA))
     assert any(re.search(r"^shape: .* m of its track\.$", text) for text in alone)
 
 
@@ -90,7 +90,7 @@ def test_failed_variants_are_left_out() -> None:
     assert all(np.isfinite(line.get_ydata()).all() for line in figure.drawing.axes[0].get_lines())
     nothing = scenes.with_failures(scenes.run("passage", MASSES, extra=EXTRA), 1)
     assert envelopes.pictures(Results.of(nothing)) == []
-    assert "shape: no variant has values." in answers.findings(nothing)
+    assert "shape: no variant has values." in answers.answer(nothing)
 
 
 def test_what_is_not_as_declared_is_found() -> None:

@@ -142,7 +142,7 @@ def test_the_automatic_choice_is_in_the_archive() -> None:
     assert (dataset.automatic_error > 0.0).all() and (dataset.automatic_error <= dataset.asked_tolerance).all()
     assert (dataset.automatic_seconds_per_variant > 0.0).all() and (dataset.automatic_steps >= 32).all()
     assert (dataset.automatic_modes >= 2).all()
-    told = [text for text in answers.findings(dataset) if text.startswith("The automatic choice at ")]
+    told = [text for text in answers.answer(dataset) if text.startswith("The automatic choice at ")]
     assert [text.split()[4] for text in told] == ["0.1", "0.01"]
 
 

@@ -62,7 +62,7 @@ def test_the_sentence_follows_from_the_points(tolerance: float) -> None:
 
 
 def test_findings_say_what_diverged_and_what_orders_are() -> None:
-    text = "\n".join(answers.findings(precision.small()))
+    text = "\n".join(answers.answer(precision.small()))
     gone = int((precision.small().status == int(Status.DIVERGED)).sum())
     assert f"{gone} points of {precision.small().status.size} diverged, which is an answer too" in text
     assert "a quarter of the error" in text and "a sixteenth of the error" in text and "nan" not in text

@@ -92,7 +92,7 @@ def test_report_of_every_kind(kind: str, tmp_path: Path) -> None:
         for ending, start in ((".svg", b"<?xml"), (".png", b"\x89PNG")):
             (file,) = page.parent.glob(f"*-{figure.name}{ending}")
             assert file.read_bytes().startswith(start)
-    for sentence in answers.findings(dataset):
+    for sentence in answers.answer(dataset):
         words = sentence.partition(": ")[2] or sentence
         assert words.replace(MINUS, "-") in reader.text.replace(MINUS, "-")
     for name in dataset.data_vars:

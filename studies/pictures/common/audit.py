@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
-from studies.results.formatting import axis_title, counted
+from studies.results.formatting import counted
 from studies.results.results import PACES, Axis, Results
 from studies.runs.audit import relative_errors
 
@@ -35,13 +35,13 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
 
 def _draw(group: xr.Dataset, axis: Axis, drawing: Drawing) -> None:
     axes = drawing.subplots()
-    along = np.asarray(group[axis.name].values, dtype=np.float64)
+    along = axis.factor * np.asarray(group[axis.name].values, dtype=np.float64)
     axes.axhline(1.0, color=MUTED, linewidth=1.0, label="tolerance")
     for name, mark, colour in (("observed", "o", BLUE), ("estimated", "x", VERMILION)):
         worst = _worst(relative_errors(group, f"{name}_error"))
         axes.plot(along, np.maximum(worst, LEAST), mark, color=colour, markersize=4.5, label=name)
     logarithmic(axes.yaxis)
-    axes.set_xlabel(axis_title(axis.noun, axis.units))
+    axes.set_xlabel(axis.title)
     axes.set_ylabel("error over tolerance")
     legend_beside(axes)
 

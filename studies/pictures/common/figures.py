@@ -10,6 +10,7 @@ import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 import matplotlib
@@ -85,6 +86,10 @@ class Figure:
     title: str
     caption: str
     drawing: Drawing
+
+    def _repr_html_(self) -> str:
+        """How notebooks show it."""
+        return f"<h4>{escape(self.title)}</h4>{svg(self)}<p>{escape(self.caption)}</p>"
 
 
 def draw(name: str, title: str, caption: str, height: float, fill: Callable[[Drawing], None]) -> Figure:

@@ -69,7 +69,7 @@ class View:
     def along(self, axis: Axis, values: Any = None) -> Array:
         """Values (n,) along one axis in the order of `plane`: its own, or others that depend on it alone."""
         array = None if values is None else self.cut(values)
-        own = axis.values if array is None or array.dims != (axis.dim,) else np.asarray(array.values, dtype=np.float64)
+        own = axis.shown if array is None or array.dims != (axis.dim,) else np.asarray(array.values, dtype=np.float64)
         return own[_order(axis)]
 
     def curves(self, values: Any, along: Any = None) -> list[Curve]:
@@ -136,7 +136,7 @@ def along_axis(axes: Axes, seen: View, title: str = "", values: Array | None = N
     """Label and scale of the horizontal axis."""
     assert seen.x is not None
     axes.set_xlabel(title or seen.x.title)
-    if is_logarithmic(seen.x.values if values is None else values):
+    if is_logarithmic(seen.x.shown if values is None else values):
         logarithmic(axes.xaxis)
 
 
@@ -159,7 +159,7 @@ def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
     if seen.y is None:
         axes.scatter(curve.x, curve.y, color=BLUE, **style)
         return
-    points = axes.scatter(curve.x, curve.y, c=seen.y.values, cmap=SEQUENTIAL, **style)
+    points = axes.scatter(curve.x, curve.y, c=seen.y.shown, cmap=SEQUENTIAL, **style)
     axes.figure.colorbar(points, ax=axes, label=seen.y.title, pad=0.02).outline.set_visible(False)
 
 

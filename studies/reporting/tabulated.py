@@ -1,0 +1,91 @@
+"""An archive as a table: one row per variant (and position), for programs that read CSV or Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.errors import BadInput
+from results_schema.store import files
+from studies.results.results import Results
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+MOST_COLUMNS = 64  # of one result
+WRITERS = {".csv": "to_csv", ".parquet": "to_parquet"}
+
+
+def write_table(results: Results, path: Path) -> list[str]:
+    """Write the table of an archive as the path's ending asks; the results that have no place in it.
+
+    Raises BadInput (unknown ending, no such place, a file is there, pyarrow is not installed) and OutputFailed.
+    """
+    if path.suffix not in WRITERS:
+        expected = f"a name that ends in {' or '.join(WRITERS)}"
+        raise BadInput("unknown sort of table", where=str(path), expected=expected, received=path.suffix or "no ending")
+    files.check_output_place(path)
+    if path.exists():
+        raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
+    table, left_out = table_of(results)
+    try:
+        files.write_whole(path, partial(getattr(table, WRITERS[path.suffix]), index=False))
+    except ImportError:
+        raise BadInput(
+            "Parquet needs a package that is not installed",
+            where=str(path),
+            remedy="pip install pyarrow, or write a .csv",
+        ) from None
+    return left_out
+
+
+def table_of(results: Results) -> tuple[pd.DataFrame, list[str]]:
+    """The table, and the results that have no place in it: histories, shapes, and what belongs to no variant.
+
+    Swept numbers and results in the archive's units, which stand in the headings; flags as words.
+    """
+    import pandas as pd
+    import xarray as xr
+
+    dataset = results.dataset
+    rows = (*results.dims, *(("position",) if "position" in dataset.dims else ()))
+    like = xr.zeros_like(dataset["status"], dtype=float)
+    if len(rows) > len(results.dims):
+        like = like.expand_dims(position=dataset["position"]).transpose(*rows)
+    columns, left_out = {}, []
+    for name, array in [*((n, dataset[n]) for n in (*dataset.coords, "status")), *dataset.data_vars.items()]:
+        own = tuple(dim for dim in array.dims if dim not in rows)
+        if prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS or (own and not set(array.dims) & set(rows)):
+            left_out += [str(name)] if name in dataset.data_vars else []
+            continue
+        for heading, one in _columns(str(name), array, own):
+            columns[heading] = _words(xr.broadcast(one, like)[0].transpose(*rows).values.reshape(-1), array.attrs)
+    return pd.DataFrame(columns), left_out
+
+
+def _words(values: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
+    """Flags as the words that the archive has for them; other values as they are."""
+    if "flag_meanings" not in attributes:
+        return values
+    words = dict(zip(np.atleast_1d(attributes["flag_values"]), attributes["flag_meanings"].split(), strict=True))
+    return np.array([words[value].replace("_", "-") for value in values])
+
+
+def _columns(name: str, array: xr.DataArray, own: tuple[str, ...]) -> list[tuple[str, xr.DataArray]]:
+    """A result by the labels of the dimensions that are not those of the rows, with its heading."""
+    units = str(array.attrs.get("units", "1"))
+    unit = "" if units in ("1", "") else f" ({units})"
+    found = []
+    for places in product(*(range(array.sizes[dim]) for dim in own)):
+        at = dict(zip(own, places, strict=True))
+        labels = "".join(f" {array[dim].values[place]}" for dim, place in at.items())
+        found.append((f"{name}{labels}{unit}", array.isel(at).drop_vars(own, errors="ignore")))
+    return found

@@ -1,0 +1,49 @@
+"""A dataset that `studies.run` gave, as the archive that the command `run` would have written, without its audit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engine.model.distinct_models import base_scene
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from results_schema.store import files
+from results_schema.store.archive import Archive, write_archive
+from studies.protocol.study import kind_of
+from studies.results.results import Results
+from studies.runs.archived import with_first_frequency
+from studies.runs.identity import run_key
+from studies.runs.provenance import attributes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Archive:
+    """An archive in memory: the dataset with what an archive says of its making, and the bodies beside it.
+
+    study: the one that gave the dataset, needed where it names files that are not below the working folder; else it
+    is read from the dataset. Raises BadInput where that is no study.
+    """
+    from engine.batch.dataset import model_groups
+
+    results = Results.of(dataset) if study is None else Results(dataset, study)
+    key = run_key(results.study, kind_of(results.study).parts(results.study).names)
+    root = dataset.assign_attrs(attributes(results.study, key, float(dataset.attrs.get("run_seconds", 0.0))))
+    models = model_groups(base_scene(results.study))
+    return Archive(Path(path), root, with_first_frequency(models, results) if results.study.carriage else models)
+
+
+def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Path:
+    """Write a dataset of `studies.run` as an archive, which every command reads; the archive's path.
+
+    study: as of `archive_of`. Raises BadInput where there is something at that place, and OutputFailed.
+    """
+    path = Path(path)
+    files.check_output_place(path)
+    if path.exists():
+        raise BadInput("there is a file already", where=str(path), remedy="choose another path, or remove it first")
+    archive = archive_of(dataset, path, study)
+    write_archive(path, archive.root, archive.groups)
+    return path

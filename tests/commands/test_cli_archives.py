@@ -1,0 +1,143 @@
+"""What commands do with finished archives: tables, comparisons, the study's text; and the same from Python."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import engine
+import studies
+from results_schema.store.archive import open_archive
+from studies.commands import catalogue
+from studies.commands.cli import main
+from tests.studies.small import SEPARATED, SMALL, write
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder, and a screen of 80 columns."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    return tmp_path
+
+
+def output(capsys: Captured, *arguments: str, code: int = 0) -> str:
+    """What a command prints that ends with this code."""
+    capsys.readouterr()
+    assert main(list(arguments)) == code
+    return capsys.readouterr().out
+
+
+def test_screens_fit_80_columns_and_speak_the_units_of_the_file(here: Path, capsys: Captured) -> None:
+    typed = SMALL.replace("from = 0.5, to = 10.0", 'from = "1.8 km/h", to = "36 km/h"')
+    write(here, typed)
+    shown = output(capsys, "run", "small.toml", "-v")
+    assert "36 km/h" in shown and "m/s" not in shown
+    screens = [shown, *(output(capsys, *command) for command in (["info", "small.nc"], ["list"]))]
+    assert all(len(line) <= 80 for screen in screens for line in screen.splitlines())
+    assert "1.8 to 36 km/h" in output(capsys, "check", "small.toml")
+
+
+def test_statuses_that_a_study_expects_end_with_0(here: Path, capsys: Captured) -> None:
+    write(here, SEPARATED)
+    assert main(["run", "small.toml"]) == 3
+    calm = SEPARATED.replace('steps = "auto"', "audit = 0")  # the fixed number of modes would miss the tolerance
+    write(here, 'expected = ["separated"]\n' + calm, "calm.toml")
+    assert "as the study expects" in output(capsys, "run", "calm.toml")
+    write(here, 'expected = ["seperated"]\n' + SEPARATED, "wrong.toml")
+    assert main(["check", "wrong.toml"]) == 2
+    assert 'did you mean "separated"' in capsys.readouterr().err
+
+
+def test_export_writes_one_row_per_variant(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    assert "wrote small.csv" in output(capsys, "export", "small.nc", "small.csv")
+    rows = list(csv.DictReader(Path("small.csv").read_text(encoding="utf-8").splitlines()))
+    root = open_archive("small.nc").root
+    assert len(rows) == 16 and {row["status"] for row in rows} == {"ok"}
+    for row in rows:
+        at = root.sel(speed=float(row["speed (m s-1)"]), mass=float(row["mass (kg)"]))
+        assert float(row["midspan_max (m)"]) == float(at.midspan_max)
+        assert float(row["dynamic_amplification midspan"]) == float(at.dynamic_amplification.sel(sensor="midspan"))
+    assert main(["export", "small.nc", "small.csv"]) == 2
+    assert main(["export", "small.nc", "small.xls"]) == 2
+
+
+def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
+    write(here)
+    write(here, SMALL.replace("damping_ratio = 0.02", "damping_ratio = 0.03"), "damped.toml")
+    write(here, SMALL.replace("modes = 4", "modes = 5"), "finer.toml")
+    write(here, SMALL[: SMALL.index("mass  = {" if "mass  = {" in SMALL else "mass = {")], "other.toml")
+    for name in ("small", "damped", "finer", "other"):
+        assert main(["run", f"{name}.toml"]) in (0, 3)
+    shown = output(capsys, "compare", "small.nc", "damped.nc", code=3)
+    assert "body.beam.damping_ratio" in shown and "midspan_max" in shown and "They differ" in shown
+    assert "agree within" in output(capsys, "compare", "small.nc", "small.nc")
+    assert main(["compare", "small.nc", "other.nc"]) == 2
+    apart = open_archive("finer.nc").root.midspan_max - open_archive("small.nc").root.midspan_max
+    from studies.reporting.comparison import compare
+    from studies.runs.archived import results_of
+
+    found = compare(results_of(open_archive("small.nc")), results_of(open_archive("finer.nc")))
+    told = next(one for one in found.differences if one.name == "midspan_max")
+    assert abs(told.largest) == pytest.approx(float(abs(apart).max()), rel=1e-12)
+    assert [(change.key, change.first, change.second) for change in found.changes] == [("body.beam.modes", 4, 5)]
+
+
+def test_info_prints_the_study_file(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    assert output(capsys, "info", "small.nc", "--study") == SMALL
+    assert "numpy" in output(capsys, "info", "small.nc", "--all")
+
+
+def test_the_schema_knows_every_key_of_every_built_in_study(capsys: Captured) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(output(capsys, "schema"))
+    for path in (*catalogue.built_in().values(), *catalogue.starts().values()):
+        tables = engine.load(path).data if path in catalogue.built_in().values() else None
+        if tables is not None:
+            jsonschema.validate(json.loads(json.dumps(tables)), schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"kind": "passage", "boddy": {}}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"kind": "pasage"}, schema)
+
+
+def test_percentiles_are_told(here: Path, capsys: Captured) -> None:
+    write(here, f"{SMALL}\n[output]\npercentiles = [5, 50]\n")
+    capsys.readouterr()
+    assert main(["run", "small.toml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    values = open_archive("small.nc").root.midspan_max.values
+    told = next(entry for entry in found["results"] if entry["name"] == "midspan_max")["percentiles"]
+    assert told == {"5.0": np.percentile(values, 5), "50.0": np.percentile(values, 50)}
+    assert "50 %" in output(capsys, "run", "small.toml")
+
+
+def test_python_writes_and_reports_what_the_command_does(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml", "-o", "command.nc"]) == 0
+    dataset = studies.run(engine.load("small.toml"))
+    studies.write(dataset, "python.nc")
+    first, second = open_archive("command.nc"), open_archive("python.nc")
+    assert set(first.root.variables) == set(second.root.variables)
+    for name in first.root.variables:
+        np.testing.assert_array_equal(first.root[name].values, second.root[name].values)
+    assert set(second.groups) == {group for group in first.groups if group != "/audit"}
+    assert first.root.attrs["results_key"] == second.root.attrs["results_key"]
+    assert main(["compare", "command.nc", "python.nc"]) == 0
+    page = studies.report(dataset, "page").read_text(encoding="utf-8")
+    assert main(["report", "python.nc", "-o", "other"]) == 0
+    other = Path("other/report.html").read_text(encoding="utf-8")
+    leads = [[line for line in text.splitlines() if '<p class="lead"' in line] for text in (page, other)]
+    assert leads[0] and leads[0] == leads[1]
+    assert main(["info", "python.nc"]) == 0
+    assert "<svg" in studies.figures(dataset)[0]._repr_html_()
