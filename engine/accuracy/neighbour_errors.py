@@ -1,7 +1,7 @@
 """What the measured errors of pilots tell of the variants around them.
 
-The largest error of a variant's nearest pilots bounds its own, times a margin that pilots would have needed, had they
-been left out.
+The largest error but one of a variant's nearest pilots bounds its own, times a margin that pilots would have needed,
+had they been left out. Without the largest, as one pilot at a resonance is a neighbour of many.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ class NeighbourErrors:
 
     def errors(self, marches: Numbers) -> Array:
         """(R, V) estimated errors by the marches (V, k) of neighbours; NaN where no estimate exists."""
-        error = np.max(self.error[marches], axis=1)  # of (V, k, R)
+        error = worst_but_one(self.error[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(error), error, np.nan).T
 
     def worst(self, rung: Numbers, neighbours: Numbers, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        follows, own = np.max(self.held[:, rung[:, None], neighbours], axis=2)
-        return np.asarray(np.maximum(follows / tighter, own))
+        follows, own = self.held[:, rung[:, None], neighbours]
+        return worst_but_one(np.maximum(follows / tighter[:, None], own), axis=1)
 
 
 def neighbour_errors_of(
@@ -63,6 +63,7 @@ def neighbour_errors_of(
     follow = tuple(r if r.follows else r._replace(tolerance=np.nan) for r in decisive)
     parts = follow, tuple(r._replace(tolerance=np.nan) if r.follows else r for r in decisive)
     margin, held_margin = _margins(measured, others, len(results), (TELLING[0] * span[0], TELLING[1] * span[1]))
+    margin = np.where(np.isfinite(tolerances(decisive)), held_margin, margin)
     error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
     if measured.free:  # what is told is what decides
         wanted = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
@@ -80,6 +81,12 @@ def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> A
     dearer marches of their neighbours could hardly be told to hold."""
     most: Array = np.array([DOUBTED * r.tolerance * (least if r.follows else 1.0) for r in results])
     return np.where(most < measured.reference.T, 0.0, measured.reference.T)
+
+
+def worst_but_one(errors: Array, axis: int) -> Array:
+    """The largest but one along an axis, the only one where there is one; NaN counts as the largest."""
+    place = max(0, errors.shape[axis] - 2)
+    return np.asarray(np.take(np.partition(errors, place, axis=axis), place, axis=axis))
 
 
 def nearest_others(pilots: Array, count: int) -> Numbers:
@@ -101,10 +108,10 @@ def _margins(measured: Measured, others: Numbers, results: int, telling: tuple[f
     if not others.shape[1]:
         return np.ones(results), 1.0
     held, march = measured.held[measured.marched], measured.march[measured.marched]
-    most = np.max(held[:, others], axis=2)
+    most = worst_but_one(held[:, others], axis=2)
     near = np.nonzero(np.isfinite(most) & np.isfinite(held) & (most > telling[0]) & (most < telling[1]))
     own = measured.error[march[near]]
-    tell = np.max(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
+    tell = worst_but_one(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
     return np.array([_quantile(own[:, r], tell[:, r]) for r in range(results)]), _quantile(held[near], most[near])
 
 

@@ -28,26 +28,28 @@ def nearest(points, pilots, found):
 
 
 @piece
-def worst_of(held, rung, near, limit):
-    """The largest of the errors ``held`` (2, rungs, P) on a rung of the pilots ``near`` (k,): of the first over the
-    variant's ``limit``, of the second as they are."""
-    worst = 0.0
+def worst_but_one(held, rung, near, limit):
+    """The largest but one of the errors ``held`` (2, rungs, P) on a rung of the pilots ``near`` (k,), the only one if
+    k = 1: the first count over the variant's ``limit``, the second as they are."""
+    worst, second = 0.0, 0.0
     for p in near:
-        follows, own = held[0, rung, p] / limit, held[1, rung, p]
-        worst = follows if not follows <= worst else worst
-        worst = own if not own <= worst else worst
-    return worst
+        error = max(held[0, rung, p] / limit, held[1, rung, p])
+        if error > worst:
+            worst, second = error, worst
+        elif error > second:
+            second = error
+    return second if near.size > 1 else worst
 
 
 @kernel
 def cheapest(held, order, worth, neighbours, limit, found):
-    """found (V,): the first rung in this order on which all neighbours (V, k) of a variant hold, by `worst_of` with its
+    """found (V,): the first rung in this order that holds by `worst_but_one` of a variant's neighbours (V, k) with its
     ``limit`` (V,); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
     for v in range(neighbours.shape[0]):
         found[v] = -1
         least = np.inf
         for place in range(order.shape[0]):
-            worst = worst_of(held, order[place], neighbours[v], limit[v])
+            worst = worst_but_one(held, order[place], neighbours[v], limit[v])
             if worst <= 1.0:
                 found[v] = order[place]
                 break
@@ -55,7 +57,7 @@ def cheapest(held, order, worth, neighbours, limit, found):
                 least = worst if worst < least else least
         if found[v] < 0:
             for rung in order[:worth]:
-                if worst_of(held, rung, neighbours[v], limit[v]) <= ALIKE * least:
+                if worst_but_one(held, rung, neighbours[v], limit[v]) <= ALIKE * least:
                     found[v] = rung
                     break
             found[v] = order[worth - 1] if found[v] < 0 else found[v]

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.ladder import Measured
-from engine.accuracy.neighbour_errors import nearest_others, neighbour_errors_of
+from engine.accuracy.neighbour_errors import nearest_others, neighbour_errors_of, worst_but_one
 from engine.accuracy.results import results_of
 from engine.march.outcome import Asked
 from tests.accuracy.chosen import run_of
@@ -48,6 +48,22 @@ def test_neighbours_of_a_pilot_are_others() -> None:
     assert found.shape == (COUNT, NEAR)
     assert np.all(found != np.arange(COUNT)[:, None])
     assert set(found[20, :2].tolist()) == {19, 21}
+
+
+def test_the_worst_is_left_out_and_what_is_unknown_is_the_worst() -> None:
+    errors = np.random.default_rng(3).random((5, 7))
+    np.testing.assert_array_equal(worst_but_one(errors, axis=1), np.sort(errors, axis=1)[:, -2])
+    np.testing.assert_array_equal(worst_but_one(errors[:, :1], axis=1), errors[:, 0])
+    errors[:, 2] = np.nan
+    np.testing.assert_array_equal(worst_but_one(errors, axis=1), np.nanmax(errors, axis=1))
+
+
+def test_one_pilot_at_a_resonance_is_not_believed_by_all_around() -> None:
+    error = np.full(COUNT, 0.1 * TOLERANCE)
+    error[20] = 50.0 * TOLERANCE
+    found = neighbour_errors_of(asked(), measured(error), others(), (1.0, 1.0))
+    rung, beside = np.zeros(1, dtype=np.int32), others()[[21]]
+    assert 20 in beside and found.worst(rung, beside, np.ones(1)) < 0.2
 
 
 def test_margins_are_what_pilots_that_are_left_out_need() -> None:
