@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from results_schema.arrays import Array
 from results_schema.variables import Variable
+from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +24,18 @@ DYNAMIC_AMPLIFICATION = Variable(
     "value is zero (velocities, accelerations)",
     nan_allowed=True,
 )
+
+
+def sizes(results: Results, sensor: str) -> Array:
+    """The largest absolute value of a sensor, in the sweep's shape."""
+    sides = (results.dataset[f"{sensor}_{side}"].transpose(*results.dims) for side in ("max", "min"))
+    return np.asarray(np.maximum(*(np.abs(side.values) for side in sides)), dtype=np.float64)
+
+
+def largest(results: Results, values: Array) -> Index | None:
+    """The variant with the largest of values, among those whose contact holds where there are such."""
+    held = results.held if np.isfinite(values[results.held]).any() else np.isfinite(values)
+    return extreme(np.where(held, values, np.nan))
 
 
 def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -8,7 +8,7 @@ import numpy as np
 
 from results_schema.arrays import Mask
 from results_schema.variables import MARCH, declare
-from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, number, quantity
@@ -60,13 +60,9 @@ KIND = Passage()
 def _largest(results: Results, sensor: str) -> str:
     """The largest value and the largest amplification of one sensor, and where they are, while the contact holds."""
     gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-    sides = (results.dataset[f"{sensor}_{side}"] for side in ("max", "min"))
-    size = np.asarray(np.maximum(*(np.abs(side.values) for side in sides)), dtype=np.float64)
-    if np.isnan(size).all():
+    top, best = (largest(results, values) for values in (sizes(results, sensor), gain))
+    if top is None:
         return f"{sensor}: no variant has values."
-    held = results.held if np.isfinite(size[results.held]).any() else np.isfinite(size)
-    top, best = (extreme(np.where(held, values, np.nan)) for values in (size, gain))
-    assert top is not None
     shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""
     said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
     if best is None:

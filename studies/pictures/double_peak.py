@@ -18,10 +18,11 @@ from studies.pictures.common.sweep_view import (
     SPEEDS,
     View,
     along_axis,
-    along_x,
-    along_y,
     draw_curves,
     draw_map,
+    one_legend,
+    per_shown,
+    ratio_above,
     view,
 )
 from studies.pictures.common.traces import picked
@@ -90,8 +91,7 @@ def _draw_cycle(results: Results, sensors: list[str], shown: list[Index], drawin
     for row, sensor in zip(grid, sensors, strict=True):
         for axes, index in zip(row, shown, strict=True):
             _draw_one_cycle(axes, results, sensor, index)
-        unit = row[0].get_ylabel()
-        row[0].set_ylabel(f"{sensor} ({unit})" if unit else sensor)
+        row[0].set_ylabel(results.label(sensor, row[0].get_ylabel()))
     for axes, index in zip(grid[0], shown, strict=True):
         axes.set_title(results.at(index).replace(", ", "\n") or " ")
     for axes in grid[-1]:
@@ -112,15 +112,24 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
         for end in (0.25, 0.75):
             axes.axvline(end, color=look.MUTED, linewidth=0.7, zorder=1)
     axes.set_xlim(0.0, 1.0)
+    if results.sensors[sensor] == "m":
+        axes.invert_yaxis()
     axes.set_ylabel(scale.unit)
 
 
-def _ratio(seen: View) -> tuple[Any, str]:
-    return along_x(seen, theory.frequency_ratio(seen.results), "frequency ratio Ω/ω₁")
+def _ratios(seen: View) -> tuple[float | None, float | None]:
+    """Frequency ratio per unit of the horizontal axis and mass ratio per unit of the vertical one, where they follow
+    from these axes alone."""
+    mass = seen.results.dataset.coords.get("mass_ratio")
+    return per_shown(seen, seen.x, theory.frequency_ratio(seen.results)), per_shown(seen, seen.y, mass)
+
+
+def _frequency_ratio(axes: Axes, seen: View) -> None:
+    ratio_above(axes, seen, theory.frequency_ratio(seen.results), "frequency ratio Ω/ω₁")
 
 
 def _map(seen: View, sensor: str) -> Figure:
-    ways = _ratio(seen)[0], along_y(seen)[0]
+    ways = _ratios(seen)
     lines = ways[0] is not None and _held_mass(seen, ways[1]) is not None
     caption = seen.caption(
         "Number of peaks in the last cycle.",
@@ -137,25 +146,27 @@ def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) 
     axes = drawing.subplots()
     colours, norm = ListedColormap(PEAK_COLOURS), BoundaryNorm(PEAK_BANDS, len(PEAK_COLOURS))
     counts = seen.results.of_sensor("peaks_per_cycle", sensor).clip(1.0, float(len(PEAK_COLOURS)))
-    mesh = draw_map(axes, seen, counts, ways, cmap=colours, norm=norm)
-    axes.set(xlabel=_ratio(seen)[1], ylabel=along_y(seen)[1])
+    mesh = draw_map(axes, seen, counts, cmap=colours, norm=norm)
     bar = colour_bar(axes, mesh, "peaks per cycle", ticks=range(1, len(PEAK_COLOURS) + 1))
     bar.ax.set_yticklabels(["0-1", "2", "3", "4", "5", "6 +"])
     if ways[0] is not None:
-        _draw_resonances(axes, seen, ways[1])
+        _draw_resonances(axes, seen, *ways)
+    else:
+        _frequency_ratio(axes, seen)
 
 
-def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
-    """Lines n Ω = ωₑ over the mass ratio; upright where the mass is not on the vertical axis."""
+def _draw_resonances(axes: Axes, seen: View, frequency: float, mass: float | None) -> None:
+    """Lines n Ω = ωₑ over the mass; upright where the mass is not on the vertical axis. frequency, mass: ratios per
+    unit of the axes."""
     results, held = seen.results, _held_mass(seen, mass)
     left, right = axes.get_xlim()
     low, high = axes.get_ylim()
     if held is None:
         return
     along = np.linspace(max(low, 0.0), high, 100) if mass is not None else np.array([low, high])
-    own = along if mass is not None else np.full(2, held)
+    own = along * mass if mass is not None else np.full(2, held)
     for order in theory.ORDERS:
-        ratio = theory.breakdown(results, own, order)
+        ratio = theory.breakdown(results, own, order) / frequency
         if ratio.max() < left or ratio.min() > right:
             continue
         axes.plot(ratio, along, color="white", linewidth=2.6, alpha=0.8)
@@ -166,7 +177,7 @@ def _draw_resonances(axes: Axes, seen: View, mass: Any) -> None:
     axes.set(xlim=(left, right), ylim=(low, high))
 
 
-def _held_mass(seen: View, mass: Any) -> float | None:
+def _held_mass(seen: View, mass: float | None) -> float | None:
     """The one mass ratio of a view (any number where it stands on an axis); None where there is none."""
     if mass is not None:
         return 0.0
@@ -182,15 +193,14 @@ def _count(seen: View, sensor: str) -> Figure:
 
 def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
     axes = drawing.subplots()
-    way, title = _ratio(seen)
-    (curve,) = seen.curves(seen.results.of_sensor("peaks_per_cycle", sensor), way)
+    (curve,) = seen.curves(seen.results.of_sensor("peaks_per_cycle", sensor))
     order = np.argsort(curve.x)
     axes.plot(curve.x[order], curve.y[order], "o-", color=look.BLUE, drawstyle="steps-mid", markersize=3)
     axes.set_ylim(0.0, max(5.0, float(np.nanmax(curve.y, initial=0.0)) + 1.0))
-    along_axis(axes, seen, title, curve.x)
+    along_axis(axes, seen)
     axes.set_ylabel("peaks per cycle")
-    if way is not None:
-        _draw_resonances(axes, seen, None)
+    if (frequency := _ratios(seen)[0]) is not None:
+        _draw_resonances(axes, seen, frequency, None)
 
 
 def _gain(seen: View, sensors: list[str]) -> Figure:
@@ -211,18 +221,19 @@ def _halves(seen: View, sensors: list[str]) -> Figure:
 
 def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) -> None:
     rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
-    way, title = _ratio(seen)
+    words = variable.replace("_", " ").replace("ratio", "harmonics")
     for axes, sensor in zip(rows, sensors, strict=True):
-        curves = seen.curves(seen.results.of_sensor(variable, sensor), way)
+        curves = seen.curves(seen.results.of_sensor(variable, sensor))
         draw_curves(axes, seen, curves)
         values = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
         if values.size and values.min() > 0.0 and values.max() > 30.0 * values.min():
             logarithmic(axes.yaxis)
             axes.set_ylim(bottom=max(0.5 * float(values.min()), LEAST_RATIO))
-        axes.set_ylabel(sensor)
-        if axes is not rows[0] and axes.get_legend() is not None:
-            axes.get_legend().remove()
-    along_axis(rows[-1], seen, title, curves[0].x)
+        axes.set_title(sensor.replace("_", " "))
+        axes.set_ylabel(f"{words}\n{seen.results.place(sensor)}")
+    one_legend(list(rows))
+    along_axis(rows[-1], seen)
+    _frequency_ratio(rows[0], seen)
 
 
 def _harmonics(results: Results, sensor: str, shown: list[Index]) -> Figure:

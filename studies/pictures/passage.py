@@ -1,4 +1,4 @@
-"""Figures of a passage: amplification, contact force with the line of separation, the response on the way."""
+"""Figures of a passage: the largest values, their amplification, the contact force, the response on the way."""
 
 from __future__ import annotations
 
@@ -9,112 +9,161 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from results_schema.arrays import Array
+from studies.findings.amplification import largest, sizes
 from studies.findings.theory import body_mass
-from studies.pictures.common.figures import VERMILION, Figure, colour_bar, draw, legend_of_all, shades, zero_line
+from studies.pictures.common.figures import (
+    HAIR,
+    VERMILION,
+    Figure,
+    colour_bar,
+    draw,
+    legend_of_all,
+    shades,
+    zero_line,
+)
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MASSES,
     SPEEDS,
     View,
     along_axis,
-    along_x,
-    along_y,
     draw_curves,
     draw_map,
+    one_legend,
+    ratio_above,
     view,
 )
-from studies.pictures.common.traces import over_position, picked
-from studies.results.formatting import scale_for
+from studies.pictures.common.traces import nearest, over_way, picked
+from studies.results.findings_common import in_words
+from studies.results.formatting import number, quantity, scale_for
 from studies.results.results import Index, Results, chosen, extreme
 
-MOST_SENSORS = 3
+MOST_SENSORS = 4
+MOST_HISTORIES = 4
 MANY = 6  # values of the second axis from which on a map says more than curves
+FLAT = 0.1  # a map of ratios that vary less shows nothing
+LEFT = 0.02  # of the way: what is recorded beyond it is free vibration
+DOWN = "Displacements point down, as the body hangs."
 
 
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow."""
-    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
-    found = []
-    seen = view(results, SPEEDS, (*MASSES, *DAMPING))
+    sensors = list(chosen([name for name in results.sensors if np.isfinite(sizes(results, name)).any()], MOST_SENSORS))
+    if not sensors:
+        return []
+    top = largest(results, sizes(results, sensors[0]))
+    assert top is not None
+    seen, found = view(results, SPEEDS, (*MASSES, *DAMPING), top), []
     if seen.x is not None:
-        found.append(_amplification(seen, sensors))
-        if seen.y is not None and len(seen.y.values) > MANY and _amplified(results, sensors[0]):
+        found.append(_largest(seen, sensors, top))
+        if seen.y is not None and len(seen.y.values) > MANY and _varies(seen, _gain(results, sensors[0])):
             found.append(_map(seen, sensors[0]))
-        found += [_contact(seen, name) for name in results.study.carriage if _has_contact(results, name)]
-    shown = picked(results, _rank(results, sensors), 4)
-    return [*found, *([_response(results, sensors, shown)] if shown else [])]
+        found += [_contact(seen, name) for name in results.study.carriage if _has_contact(seen, name)]
+    size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
+    shown = nearest(results, top, picked(results, size, MOST_HISTORIES))[-MOST_HISTORIES:]
+    return [*found, *([_response(results, sensors, shown, top)] if shown else [])]
 
 
-def _rank(results: Results, sensors: list[str]) -> Array | None:
-    """Amplification of the first sensor that has one, of the variants whose contact holds where there are such."""
-    for sensor in sensors:
-        if _amplified(results, sensor):
-            gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-            held = np.where(results.held, gain, np.nan)
-            return held if np.isfinite(held).any() else gain
-    return None
+def _gain(results: Results, sensor: str) -> Any:
+    return results.of_sensor("dynamic_amplification", sensor)
 
 
-def _amplified(results: Results, sensor: str) -> bool:
-    return extreme(results.of_sensor("dynamic_amplification", sensor)) is not None
+def _varies(seen: View, values: Any) -> bool:
+    """Whether ratios differ over the shown part of the sweep by more than an eye sees in colours."""
+    known = seen.plane(values)
+    known = known[np.isfinite(known)]
+    return bool(known.size and np.ptp(known) > FLAT)
 
 
-def _has_contact(results: Results, carriage: str) -> bool:
-    name = f"{carriage}_contact_force_min"
-    inertial = results.study.carriage[carriage].inertial
-    return inertial and name in results.dataset and extreme(results.dataset[name]) is not None
+def _has_contact(seen: View, carriage: str) -> bool:
+    """Whether there is a force of a carriage that varies; what is the same everywhere the findings say."""
+    inertial = seen.results.study.carriage[carriage].inertial
+    has = inertial and f"{carriage}_contact_force_min" in seen.results.dataset
+    return has and _varies(seen, _relative_force(seen, carriage))
 
 
-def _ratio(seen: View) -> tuple[Any, str]:
-    return along_x(seen, seen.results.dataset.coords.get("speed_ratio"), "speed ratio v/(ω₁ L/π)")
+def _speed_ratio(axes: Any, seen: View) -> None:
+    ratio_above(axes, seen, seen.results.dataset.coords.get("speed_ratio"), "speed over the critical speed ω₁ L/π")
 
 
-def _amplification(seen: View, sensors: list[str]) -> Figure:
-    caption = seen.caption("Largest absolute value over the largest absolute static value of the same model.")
-    height = 0.6 + 2.2 * len(sensors)
-    return draw("amplification", "Dynamic amplification", caption, height, partial(_draw_amplification, seen, sensors))
+def _largest(seen: View, sensors: list[str], top: Index) -> Figure:
+    results, first = seen.results, sensors[0]
+    amplified = any(np.isfinite(seen.plane(_gain(results, sensor))).any() for sensor in sensors)
+    value = quantity(float(sizes(results, first)[top]), results.sensors[first])
+    title = f"The largest {results.noun(first)} {results.place(first)} is {value},{in_words(results, top)}"
+    hang = " Displacements point down." if "m" in map(results.sensors.get, sensors) else ""
+    held = " While the contact holds the answer counts; lines go on beyond." if not results.held.all() else ""
+    right = "; right: over the largest absolute static value of the same model" if amplified else ""
+    caption = seen.caption(f"{'Left: l' if amplified else 'L'}argest absolute values{right}.{hang}{held}")
+    height = 0.9 + 1.9 * len(sensors)
+    return draw("largest", title, caption, height, partial(_draw_largest, seen, sensors, 1 + amplified))
 
 
-def _draw_amplification(seen: View, sensors: list[str], drawing: Drawing) -> None:
-    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
-    way, title = _ratio(seen)
-    for axes, sensor in zip(rows, sensors, strict=True):
-        name = "dynamic_amplification" if _amplified(seen.results, sensor) else f"{sensor}_max"
-        values = seen.results.dataset[name]
-        curves = seen.curves(values.sel(sensor=sensor) if "sensor" in values.dims else values, way)
-        draw_curves(axes, seen, curves)
-        axes.set_ylabel(f"{sensor}, max/static" if name == "dynamic_amplification" else f"{sensor}, max")
-        if axes is not rows[0] and axes.get_legend() is not None:
-            axes.get_legend().remove()
-    along_axis(rows[-1], seen, title, curves[0].x)
+def _draw_largest(seen: View, sensors: list[str], columns: int, drawing: Drawing) -> None:
+    results = seen.results
+    grid = drawing.subplots(len(sensors), columns, squeeze=False, sharex=True)
+    for row, sensor in zip(grid, sensors, strict=True):
+        units, size = results.sensors[sensor], seen.results.dataset["status"].copy(data=sizes(results, sensor))
+        scale = scale_for(float(np.nanmax(seen.plane(size), initial=0.0)), units)
+        draw_curves(row[0], seen, [curve._replace(y=curve.y * scale.factor) for curve in seen.curves(size)])
+        row[0].set_ylabel(results.label(sensor, scale.unit, "largest"))
+        row[0].set_title(sensor.replace("_", " "))
+        row[0].set_ylim(0.0, None)
+        if units == "m":
+            row[0].invert_yaxis()
+        if columns == 1:
+            continue
+        if np.isfinite(seen.plane(_gain(results, sensor))).any():
+            draw_curves(row[1], seen, seen.curves(_gain(results, sensor)))
+            row[1].set_ylabel(f"dynamic amplification\n{results.place(sensor)}")
+        else:
+            row[1].set_visible(False)
+    one_legend([axes for row in grid for axes in row[::-1]])
+    for axes in grid[-1]:
+        along_axis(axes, seen)
+    for axes in grid[0]:
+        _speed_ratio(axes, seen)
+    drawing.align_ylabels()
 
 
 def _map(seen: View, sensor: str) -> Figure:
-    caption = seen.caption("Dynamic amplification over the plane of both.")
-    title = f"Where it is amplified: {sensor}"
-    return draw("amplification-map", title, caption, 3.2, partial(_draw_map, seen, sensor))
+    results = seen.results
+    best = extreme(seen.cut(_gain(results, sensor)))
+    assert best is not None
+    peak = float(seen.cut(_gain(results, sensor)).values[best])
+    title = f"{sensor.replace('_', ' ')}: statics are exceeded {number(peak)} times at most"
+    return draw("amplification-map", title, seen.caption(), 3.4, partial(_draw_map, seen, sensor))
 
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
     axes = drawing.subplots()
-    ways, titles = zip(_ratio(seen), along_y(seen), strict=True)
-    mesh = draw_map(axes, seen, seen.results.of_sensor("dynamic_amplification", sensor), ways, cmap="viridis")
-    axes.set(xlabel=titles[0], ylabel=titles[1])
-    colour_bar(axes, mesh, f"{sensor}, max/static")
+    mesh = draw_map(axes, seen, _gain(seen.results, sensor), cmap="viridis")
+    _speed_ratio(axes, seen)
+    colour_bar(axes, mesh, "dynamic amplification")
 
 
 def _contact(seen: View, carriage: str) -> Figure:
-    line = "; the line is where that begins" if _has_line(seen, _relative_force(seen, carriage)) else ""
+    force = _relative_force(seen, carriage)
+    line = "; the line is where that begins" if _has_line(seen, force) else ""
     caption = seen.caption(
         "Smallest contact force on 0-98 % of the span over the weight.",
-        "Below zero the carriage would lift off."
-        if seen.y is None
-        else f"Where it is negative the carriage would lift off{line}.",
+        f"Below zero the carriage would lift off{line}.",
     )
-    title = f"Contact force: {carriage}"
-    height = 3.2 if seen.y is not None else 2.6
+    least = float(np.nanmin(seen.plane(force)))
+    title = f"{carriage} keeps its contact, with at least {number(least, 2)} of its weight"
+    if least < 0.0:
+        title = f"{carriage} would lift off{_from(seen, force)}"
+    height = 3.4 if seen.y is not None else 2.8
     return draw(f"contact-{carriage}", title, caption, height, partial(_draw_contact, seen, carriage))
+
+
+def _from(seen: View, force: Any) -> str:
+    """From which value of the horizontal axis on a force turns negative anywhere in the shown part."""
+    assert seen.x is not None
+    grid = seen.plane(force)
+    opened = (np.nan_to_num(grid) < 0.0).reshape(len(grid), -1).any(axis=1)
+    first = float(seen.along(seen.x)[opened].min())
+    return f" from {seen.x.noun} {seen.x.in_words(first / seen.x.factor)} on"
 
 
 def _relative_force(seen: View, carriage: str) -> Any:
@@ -138,53 +187,67 @@ def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
     force = _relative_force(seen, carriage)
     axes = drawing.subplots()
     if seen.y is None:
-        way, title = _ratio(seen)
-        draw_curves(axes, seen, seen.curves(force, way))
+        draw_curves(axes, seen, seen.curves(force))
         zero_line(axes)
-        along_axis(axes, seen, title)
+        along_axis(axes, seen)
         axes.set_ylabel("smallest contact force / weight")
-        return
-    ways, titles = zip(_ratio(seen), along_y(seen), strict=True)
-    mesh = draw_map(axes, seen, force, ways, cmap="PuOr", vmin=-1.0, vmax=1.0)
-    axes.set(xlabel=titles[0], ylabel=titles[1])
-    colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
-    if not _has_line(seen, force):
-        return
-    x, y = (seen.along(axis, way) for axis, way in zip((seen.x, seen.y), ways, strict=True) if axis is not None)
-    axes.contour(x, y, seen.plane(force).T, [0.0], colors=VERMILION, linewidths=1.8)
-    line = Line2D([], [], color=VERMILION, linewidth=1.8)
-    axes.legend([line], ["contact opens"], loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1)
+    else:
+        mesh = draw_map(axes, seen, force, cmap="PuOr", vmin=-1.0, vmax=1.0)
+        colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
+    _speed_ratio(axes, seen)
+    if seen.y is not None and seen.x is not None and _has_line(seen, force):
+        x, y = seen.along(seen.x), seen.along(seen.y)
+        axes.contour(x, y, seen.plane(force).T, [0.0], colors=VERMILION, linewidths=1.8)
+        line = Line2D([], [], color=VERMILION, linewidth=1.8)
+        axes.legend([line], ["contact opens"], loc="lower right", framealpha=0.85, frameon=True)
 
 
-def _response(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
+def _response(results: Results, sensors: list[str], shown: list[Index], top: Index) -> Figure:
+    first, own = sensors[0], shown[-1]
+    way = over_way(results, first, own)
+    at = int(np.argmax(np.abs(way.values)))
+    value = quantity(float(way.values[at]), results.sensors[first])
+    where = quantity(float(way.position[at]), "m")
+    title = f"{first.replace('_', ' ')} reaches {value} when {results.carriage_name} has come to {where}"
+    whose = "the variant of the answer" if own == top else "the kept history nearest to the variant of the answer"
+    hang = f" {DOWN}" if "m" in map(results.sensors.get, sensors) else ""
     caption = (
-        "Kept histories over the position of the carriage, up to the one with the largest amplification while the "
-        "contact holds. Displacements point down, as the body hangs."
+        (f"Brightest line: {whose}. " if len(shown) > 1 else "")
+        + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
+        + hang
     )
-    height = 0.8 + 2.0 * len(sensors)
-    return draw("response", "Response on the way", caption, height, partial(_draw_response, results, sensors, shown))
+    height = 0.8 + 1.9 * len(sensors)
+    return draw("response", title, caption, height, partial(_draw_response, results, sensors, shown))
 
 
 def _draw_response(results: Results, sensors: list[str], shown: list[Index], drawing: Drawing) -> None:
     rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
     for axes, sensor in zip(rows, sensors, strict=True):
-        ways = [over_position(results, sensor, index) for index in shown]
+        ways = [over_way(results, sensor, index) for index in shown]
         scale = scale_for(max(float(np.abs(way.values).max(initial=0.0)) for way in ways), results.sensors[sensor])
-        factors, label = [scale.factor] * len(shown), f"{sensor} ({scale.unit})" if scale.unit else sensor
-        if _amplified(results, sensor) and len(shown) > 1:
-            factors, label = [1.0 / _static(results, sensor, index) for index in shown], f"{sensor} / static"
-        for index, way, factor, colour in zip(shown, ways, factors, shades(len(shown)), strict=True):
-            axes.plot(way.position, way.values * factor, color=colour, label=results.at(index).replace(", ", "\n"))
+        for index, way, colour in zip(shown, ways, shades(len(shown)), strict=True):
+            axes.plot(
+                way.position, way.values * scale.factor, color=colour, label=results.at(index).replace(", ", "\n")
+            )
         zero_line(axes)
+        _shade_left(axes, results, shown[-1], max(float(way.position.max(initial=0.0)) for way in ways))
         if results.sensors[sensor] == "m":
             axes.invert_yaxis()
-        axes.set_ylabel(label)
+        axes.set_ylabel(results.label(sensor, scale.unit))
+        axes.set_title(sensor.replace("_", " "))
     if len(shown) > 1:
         legend_of_all(drawing, rows[0])
-    rows[-1].set_xlabel(f"position of {results.carriage_name} (m)")
+    rows[-1].set_xlabel(f"way of {results.carriage_name} (m)")
+    drawing.align_ylabels()
 
 
-def _static(results: Results, sensor: str, index: Index) -> float:
-    """Largest absolute static value of one variant, from its amplification."""
-    largest = max(abs(float(results.dataset[f"{sensor}_{side}"].values[index])) for side in ("max", "min"))
-    return largest / float(np.asarray(results.of_sensor("dynamic_amplification", sensor).values)[index])
+def _shade_left(axes: Any, results: Results, index: Index, end: float) -> None:
+    """Grey where the first carriage has left its body; at most twice the way on it, for the slow are soon still."""
+    position = results.trace(f"{results.carriage_name}_position", index).values
+    on = position[np.isfinite(position)]
+    if not on.size or on[-1] <= on[0]:
+        return
+    end = min(end, 2.0 * on[-1] - on[0])
+    if end > on[-1] + LEFT * (on[-1] - on[0]):
+        axes.axvspan(on[-1], end, color=HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
+        axes.set_xlim(on[0], end)

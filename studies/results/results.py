@@ -162,6 +162,21 @@ class Results:
         """What a sensor measures, as a word."""
         return self.study.sensor[sensor].quantity.replace("_", " ")
 
+    def place(self, sensor: str) -> str:
+        """Where a sensor reads, in words."""
+        own = self.study.sensor[sensor]
+        if own.rides is not None:
+            return f"{'under' if own.under else 'of'} {own.rides}"
+        if own.at is None:
+            return f"at {own.node or own.point}"
+        swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)
+        return f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
+
+    def label(self, sensor: str, unit: str, of: str = "") -> str:
+        """Quantity, place and unit of a sensor as on a figure's axis."""
+        words = f"{of} {self.noun(sensor)}".strip()
+        return f"{words}\n{self.place(sensor)}{f' ({unit})' if unit else ''}"
+
     @property
     def carriage(self) -> Carriage:
         """The first carriage."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,15 +13,26 @@ from matplotlib.collections import PathCollection, QuadMesh
 
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
-from studies.pictures.common.figures import BLUE, SEQUENTIAL, is_logarithmic, legend_beside, logarithmic, shades, widen
+from studies.pictures.common.figures import (
+    ALIKE,
+    BLUE,
+    MUTED,
+    SEQUENTIAL,
+    is_logarithmic,
+    legend_beside,
+    logarithmic,
+    shades,
+    widen,
+)
 from studies.results.formatting import listed
-from studies.results.results import VARIANT, Axis, Results, spread, statuses
+from studies.results.results import VARIANT, Axis, Index, Results, spread, statuses
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 MOST_CURVES = 6
+UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
 SPEEDS = (".motion.speed", ".motion.frequency")
 MASSES = (".mass", ".force")
@@ -37,12 +49,16 @@ class Curve(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A sweep seen along `x` and, for several curves or a map, `y`; every other dimension is held at an index."""
+    """A sweep seen along `x` and, for several curves or a map, `y`; every other dimension is held at an index.
+
+    drawn: a place along `y` that is always among the curves.
+    """
 
     results: Results
     x: Axis | None
     y: Axis | None
     held: dict[str, int]
+    drawn: int | None = None
 
     @property
     def is_sampled(self) -> bool:
@@ -66,23 +82,23 @@ class View:
         ordered = full.isel({dim: _order(axis) for dim, axis in axes.items()})
         return np.asarray(ordered.values, dtype=np.float64)
 
-    def along(self, axis: Axis, values: Any = None) -> Array:
-        """Values (n,) along one axis in the order of `plane`: its own, or others that depend on it alone."""
-        array = None if values is None else self.cut(values)
-        own = axis.shown if array is None or array.dims != (axis.dim,) else np.asarray(array.values, dtype=np.float64)
-        return own[_order(axis)]
+    def along(self, axis: Axis) -> Array:
+        """The values (n,) of an axis in the order of `plane`, in the unit of its title."""
+        return axis.shown[_order(axis)]
 
-    def curves(self, values: Any, along: Any = None) -> list[Curve]:
-        """Values as curves over x (or over the values of `along`), at most 6 of the second axis."""
+    def curves(self, values: Any) -> list[Curve]:
+        """Values as curves over x, at most 6 of the second axis."""
         assert self.x is not None
-        grid = self.plane(values)
-        ways = self.along(self.x) if along is None else self.plane(along)
-        ways = np.broadcast_to(ways.reshape(ways.shape + (1,) * (grid.ndim - ways.ndim)), grid.shape)
+        grid, way = self.plane(values), self.along(self.x)
         if grid.ndim == 1:
-            return [Curve("", ways, grid)]
+            return [Curve("", way, grid)]
         assert self.y is not None
         order = _order(self.y)
-        return [Curve(self.y.value(int(order[i])), ways[:, i], grid[:, i]) for i in spread(len(order), MOST_CURVES)]
+        places = spread(len(order), MOST_CURVES)
+        if self.drawn is not None:
+            wanted = int(np.flatnonzero(order == self.drawn)[0])
+            places = places if wanted in places else sorted({*places, wanted} - {_nearest(places, wanted)})
+        return [Curve(self.y.value(int(order[i])), way, grid[:, i]) for i in places]
 
     @property
     def words(self) -> str:
@@ -106,25 +122,38 @@ class View:
         return " ".join(text for text in (*sentences, self.words, self.missing) if text)
 
 
-def view(results: Results, x: Sequence[str] = SPEEDS, y: Sequence[str] = (*DAMPING, *MASSES)) -> View:
+def view(
+    results: Results, x: Sequence[str] = SPEEDS, y: Sequence[str] = (*DAMPING, *MASSES), at: Index | None = None
+) -> View:
     """A view along the first axis whose key ends like one of `x`, and one like `y`; else along what there is.
 
-    Axes that are not shown are held in the middle of their values.
+    Axes that are not shown are held where a variant is, such as the one that the answer names, or in the middle of
+    their values.
     """
     varied = [axis for axis in results.axes if len(axis.values) > 1]
     first = results.axis(*x) or (varied[0] if varied else None)
     rest = [axis for axis in varied if axis is not first and first and (axis.dim == VARIANT) == (first.dim == VARIANT)]
     second = next((axis for ending in y for axis in rest if axis.sets(ending)), rest[0] if rest else None)
     shown = {axis.dim for axis in (first, second) if axis is not None}
-    held = {dim: size // 2 for dim, size in zip(results.dims, results.shape, strict=True) if dim not in shown}
-    return View(results, first, second, held)
+    middle = tuple(size // 2 for size in results.shape)
+    places = dict(zip(results.dims, middle if at is None else at, strict=True))
+    held = {dim: place for dim, place in places.items() if dim not in shown}
+    on_grid = second is not None and second.dim != VARIANT and at is not None
+    return View(results, first, second, held, places[second.dim] if second is not None and on_grid else None)
 
 
 def alone(seen: View) -> View:
     """The same view without its second axis, which is then held in the middle too."""
     if seen.y is None or seen.x is None or seen.y.dim == seen.x.dim:
         return View(seen.results, seen.x, None, seen.held)
-    return View(seen.results, seen.x, None, {**seen.held, seen.y.dim: len(seen.y.values) // 2})
+    place = len(seen.y.values) // 2 if seen.drawn is None else seen.drawn
+    return View(seen.results, seen.x, None, {**seen.held, seen.y.dim: place})
+
+
+def _nearest(places: Sequence[int], wanted: int) -> int:
+    """The place that is nearest to a wanted one, but never an end."""
+    inner = places[1:-1] or [wanted]
+    return min(inner, key=lambda place: abs(place - wanted))
 
 
 def _order(axis: Axis) -> Counts:
@@ -132,25 +161,67 @@ def _order(axis: Axis) -> Counts:
     return np.arange(len(axis.values)) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
 
 
-def along_axis(axes: Axes, seen: View, title: str = "", values: Array | None = None) -> None:
+def along_axis(axes: Axes, seen: View) -> None:
     """Label and scale of the horizontal axis."""
     assert seen.x is not None
-    axes.set_xlabel(title or seen.x.title)
-    if is_logarithmic(seen.x.shown if values is None else values):
+    axes.set_xlabel(seen.x.title)
+    if is_logarithmic(seen.x.shown):
         logarithmic(axes.xaxis)
 
 
 def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
-    """Curves in ordered colours with a legend beside; points, coloured by the second axis, where it is sampled."""
+    """Curves in ordered colours with a legend beside; points, coloured by the second axis, where it is sampled.
+
+    Curves that no eye can tell apart are one, with a remark.
+    """
     if seen.is_sampled:
         _draw_points(axes, seen, curves[0])
         return
+    if seen.y is not None and coincide(curves):
+        axes.set_title(f"the same for {seen.y.noun} {seen.y.span}", loc="right", color=MUTED)
+        curves = [curves[-1]._replace(label="")]
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
         marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
         axes.plot(curve.x, curve.y, color=colour, marker=marker, label=curve.label)
     if seen.y is not None and len(curves) > 1:
         legend_beside(axes, seen.y.noun)
     widen(axes, [curve.y for curve in curves])
+
+
+def coincide(curves: Sequence[Curve]) -> bool:
+    """Whether several curves lie on each other as far as an eye can tell."""
+    x, y = np.array([curve.x for curve in curves]), np.array([curve.y for curve in curves])
+    known = y[np.isfinite(y)]
+    if len(curves) < 2 or not known.size or np.ptp(x, axis=0).any() or (np.isfinite(y) != np.isfinite(y[0])).any():
+        return False
+    height = max(float(np.ptp(known)), ALIKE * float(np.abs(known).max()))
+    return bool(np.nan_to_num(np.ptp(y, axis=0)).max() <= UNSEEN * height)
+
+
+def one_legend(rows: Sequence[Axes]) -> None:
+    """Keep the first legend of axes below each other, whose colours mean the same; beside the uppermost."""
+    legends = [legend for axes in rows if (legend := axes.get_legend()) is not None]
+    for legend in legends[1:]:
+        legend.remove()
+
+
+def ratio_above(axes: Axes, seen: View, ratio: Any, title: str) -> None:
+    """A second scale above the plot: a ratio, such as that to the critical speed, where it grows with what is swept."""
+    assert seen.x is not None
+    factor = per_shown(seen, seen.x, ratio)
+    if factor is not None and axes.get_xscale() == "linear":
+        there, back = partial(np.multiply, factor), partial(np.multiply, 1.0 / factor)
+        above = axes.secondary_xaxis("top", functions=(there, back))
+        above.set_xlabel(title)
+
+
+def per_shown(seen: View, axis: Axis | None, ratio: Any) -> float | None:
+    """A ratio over the shown values of an axis, where it depends on them alone and in proportion."""
+    if axis is None or ratio is None or seen.cut(ratio).dims != (axis.dim,) or axis.dim == VARIANT:
+        return None
+    factors = np.asarray(seen.cut(ratio).values, dtype=np.float64) / np.where(axis.shown, axis.shown, np.nan)
+    known = factors[np.isfinite(factors)]
+    return float(known[0]) if known.size and np.ptp(known) <= ALIKE * abs(known[0]) and known[0] > 0.0 else None
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
@@ -163,13 +234,10 @@ def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
     axes.figure.colorbar(points, ax=axes, label=seen.y.title, pad=0.02).outline.set_visible(False)
 
 
-def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None, None), **style: Any) -> Any:
-    """Values over the plane of two axes as coloured cells, or as coloured points where the sweep is sampled.
-
-    ways: other values than the axes' own to draw over, e.g. the speed ratio.
-    """
+def draw_map(axes: Axes, seen: View, values: Any, **style: Any) -> Any:
+    """Values over the plane of two axes as coloured cells, or as coloured points where the sweep is sampled."""
     assert seen.x is not None and seen.y is not None
-    x, y = (seen.along(axis, way) for axis, way in zip((seen.x, seen.y), ways, strict=True))
+    x, y = seen.along(seen.x), seen.along(seen.y)
     grid = seen.plane(values)
     axes.grid(visible=False)
     mesh: QuadMesh | PathCollection
@@ -186,6 +254,7 @@ def draw_map(axes: Axes, seen: View, values: Any, ways: tuple[Any, Any] = (None,
             ends(0.0, None)  # the lowest cell reaches below its value
         if is_logarithmic(way):
             logarithmic(axis)
+    axes.set(xlabel=seen.x.title, ylabel=seen.y.title)
     return mesh
 
 
@@ -197,24 +266,3 @@ def _edges(values: Array) -> Array:
     middle = 0.5 * (spaced[1:] + spaced[:-1])
     edges = np.concatenate([[1.5 * spaced[0] - 0.5 * spaced[1]], middle, [1.5 * spaced[-1] - 0.5 * spaced[-2]]])
     return np.exp(edges) if is_logarithmic(values) else edges
-
-
-def _depends_on(seen: View, values: Any, axis: Axis | None) -> bool:
-    """Whether values, cut to the view, vary along exactly this axis."""
-    return axis is not None and seen.cut(values).dims == (axis.dim,)
-
-
-def along_x(seen: View, ratio: Any, title: str) -> tuple[Any, str]:
-    """What stands on the horizontal axis: a ratio where it follows from that axis alone, else None for its values."""
-    if ratio is not None and _depends_on(seen, ratio, seen.x):
-        return ratio, title
-    assert seen.x is not None
-    return None, seen.x.title
-
-
-def along_y(seen: View) -> tuple[Any, str]:
-    """The same of the vertical axis and the mass ratio."""
-    mass = seen.results.dataset.coords.get("mass_ratio")
-    if mass is not None and _depends_on(seen, mass, seen.y):
-        return mass, "mass ratio"
-    return None, "" if seen.y is None else seen.y.title

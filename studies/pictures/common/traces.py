@@ -28,6 +28,30 @@ def picked(results: Results, rank: Array | None, most: int) -> list[Index]:
     return [traced[round((i + 1) * (len(traced) - 1) / most)] for i in range(most)]
 
 
+def nearest(results: Results, place: Index, others: list[Index]) -> list[Index]:
+    """The kept history of a variant, or that of the nearest on the sweep's grid, after others without it."""
+    traced = results.traced()
+    if not traced:
+        return []
+    step = np.maximum(np.array(results.shape, dtype=np.float64) - 1.0, 1.0)
+    own = min(traced, key=lambda index: float(np.abs((np.subtract(index, place)) / step).sum()))
+    return [*(index for index in others if index != own), own]
+
+
+def over_way(results: Results, sensor: str, index: Index) -> Way:
+    """The history of a sensor over the way of the first carriage, which goes on at the last speed when it has left."""
+    trace = results.trace(sensor, index)
+    position = results.trace(f"{results.carriage_name}_position", index).values
+    on = np.flatnonzero(np.isfinite(position))
+    if on.size > 1 and trace.elapsed is not None:
+        first, last = on[-2], on[-1]
+        speed = (position[last] - position[first]) / (trace.times[last] - trace.times[first])
+        gone = np.isnan(position) & (np.arange(position.size) > last)
+        position = np.where(gone, position[last] + speed * (trace.times - trace.times[last]), position)
+    kept = np.isfinite(trace.values) & np.isfinite(position)
+    return Way(position[kept], trace.values[kept])
+
+
 def over_position(results: Results, sensor: str, index: Index) -> Way:
     """The history of a sensor over the first carriage's position, without what was not recorded."""
     values = results.trace(sensor, index).values
