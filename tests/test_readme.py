@@ -13,7 +13,9 @@ import pytest
 
 from engine.batch.plan import make_plan
 from engine.scene.study import load
+from studies.commands import catalogue
 from studies.protocol.study import kind_of
+from tests import gallery
 from tests.readme import README
 
 
@@ -35,6 +37,14 @@ def examples(language: str) -> list[tuple[str, str]]:
         for page in pages()
         for block in re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
     ]
+
+
+def test_the_gallery_shows_every_built_in_study() -> None:
+    page = (README.parent / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert page == gallery.page(), "run: python -m tests.gallery NAME"
+    measured = catalogue.measured()
+    assert set(gallery.shown()) == set(measured)
+    assert all(made["code"] == 0 for made in measured.values())
 
 
 def test_links_lead_somewhere() -> None:

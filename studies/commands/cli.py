@@ -210,7 +210,9 @@ def list_() -> None:
     from studies.commands import catalogue, console
     from studies.protocol.study import kind_named, kind_names
 
-    console.show_studies(catalogue.entries(), [(kind, kind_named(kind).summary) for kind in kind_names()])
+    console.show_studies(
+        catalogue.entries(), catalogue.measured(), [(kind, kind_named(kind).summary) for kind in kind_names()]
+    )
 
 
 @commands.command()

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80  # of output that no terminal shows
 LONGEST_CELL = 400
+MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
 _NUMBER = re.compile(r"-?[\d.,e-]+( [^\s\d]\S*)*")
 
@@ -137,9 +138,14 @@ def show_preview(shown: Preview) -> None:
         say("", "Worth knowing", *(f"- {remark}" for remark in shown.remarks))
 
 
-def show_studies(entries: Iterable[Entry], kinds: Iterable[tuple[str, str]]) -> None:
-    """The built-in studies, and the kinds of study."""
-    table("Built-in studies", ("name", "kind", "title"), [(e.name, e.kind, e.title) for e in entries])
+def show_studies(
+    entries: Iterable[Entry], measured: Mapping[str, Mapping[str, Any]], kinds: Iterable[tuple[str, str]]
+) -> None:
+    """The built-in studies with the time they take, and the kinds of study."""
+    rows = [
+        (e.name, f"{measured[e.name]['seconds']:.0f} s" if e.name in measured else "minutes", e.title) for e in entries
+    ]
+    table("Built-in studies (wanderlast run NAME)", ("name", "about", "question"), rows)
     table('Kinds of study (start one with "wanderlast init KIND")', ("kind", "answers"), list(kinds))
 
 
@@ -197,7 +203,8 @@ def show_outcome(outcome: Outcome) -> None:
     results = Results.of(outcome.results)
     _heading(outcome.results.attrs["title"])
     paragraphs(*answer_of(results))
-    _ranges(summary.asked(results), results.study.output.percentiles)
+    if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
+        _ranges(summary.asked(results), results.study.output.percentiles)
     accuracy = told_accuracy(outcome.audit, results)
     statuses = _about_statuses(summary.counts(outcome.results), summary.noun(outcome.results), results.study.expected)
     paragraphs(*statuses, *([f"Accuracy: {accuracy}"] if accuracy else []))
@@ -239,7 +246,9 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         )
         for one in found
     ]
-    table("", ("result", "smallest", *parts, "largest", where), rows)
+    table("", ("result", "smallest", *parts, "largest", where), rows[:MOST_ROWS])
+    if rows[MOST_ROWS:]:
+        paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
 
 
 def _name(found: Range) -> str:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.arrays import Array
-from studies.results.formatting import MINUS
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -74,8 +73,9 @@ def lag_factor(results: Results, sensor: str) -> int:
 
 
 def lag_formula(results: Results, sensor: str) -> str:
-    """The formula in print, with its sign."""
-    return f"{MINUS}{'2 ' if lag_factor(results, sensor) == 2 else ''}ζ v/ω₁"
+    """The formula in words."""
+    twice = "2 × " if lag_factor(results, sensor) == 2 else ""
+    return f"{twice}damping ratio × speed / first circular frequency"
 
 
 def frequency_ratio(results: Results) -> Any:

@@ -31,7 +31,7 @@ THRESHOLDS = (0.01, 0.05)
 CLOSE = 0.05
 LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
 MOST_SENSORS = 3
-REMAINDER = "exp(−ζ ω₁ T (cycles − 1)) with the time T of a cycle"
+REMAINDER = "by the damping of the first mode"
 
 RESULTS = (
     Variable(

@@ -242,10 +242,20 @@ def _answer(results: Results, sensor: str) -> str:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
     place = tuple(int(i) for i in np.argwhere(other & (ratio == first))[0])
     return (
-        f"{sensor}: two peaks per cycle below Ω/ω₁ = {number(first)}, whatever else is varied; there the pattern "
+        f"{sensor}: two peaks per cycle below {_pace(results, first)}, whatever else is varied; there the pattern "
         f"breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: {share} of the "
         "variants."
     )
+
+
+def _pace(results: Results, ratio: float) -> str:
+    """A frequency of the cycle in words, from its ratio to the first natural one: as swept, where one value has it."""
+    axis, part = results.axis(*PACES), f"{number(ratio)} of the first natural frequency"
+    if axis is None:
+        return part
+    same = results.everywhere(theory.frequency_ratio(results)) == ratio
+    values = np.unique(results.everywhere(results.dataset[axis.name])[same])
+    return f"{axis.in_words(float(values[0]))} ({part})" if values.size == 1 else part
 
 
 def _slowest(results: Results, ratio: Array) -> Mask:
@@ -281,14 +291,14 @@ def _break(results: Results, ratio: Array, counts: Array, among: Mask) -> str:
     """Where among some variants the pattern of two peaks breaks, beside the nearest harmonic of the cycle."""
     other = among & (counts != EXPECTED)
     if not other.any():
-        return f"two peaks throughout, up to Ω/ω₁ = {number(float(ratio[among].max()))}"
+        return f"two peaks throughout, up to {_pace(results, float(ratio[among].max()))}"
     first = float(ratio[other].min())
     fine = among & (ratio < first)
     place = tuple(np.argwhere(other & (ratio == first))[0])
-    text = f"{counted(int(counts[place]), 'peak')} at Ω/ω₁ = {number(first)}"
+    text = f"{counted(int(counts[place]), 'peak')} at {_pace(results, first)}"
     if not fine.any():
-        return f"{counted(int(counts[place]), 'peak')} already at the lowest Ω/ω₁ = {number(first)}"
-    text = f"two peaks up to Ω/ω₁ = {number(float(ratio[fine].max()))}, {text}"
+        return f"{counted(int(counts[place]), 'peak')} already at the lowest, {_pace(results, first)}"
+    text = f"two peaks up to {_pace(results, float(ratio[fine].max()))}, {text}"
     mass = results.dataset.coords.get("mass_ratio")
     if mass is None:
         return text
@@ -297,7 +307,7 @@ def _break(results: Results, ratio: Array, counts: Array, among: Mask) -> str:
     near = min(lines, key=lambda order: abs(np.log(lines[order] / first)))
     if abs(lines[near] / first - 1.0) > NEAR:
         return text
-    return f"{text} ({near} Ω = ωₑ at {number(lines[near])})"
+    return f"{text} (harmonic {near} of the cycle meets the natural frequency with the mass at {number(lines[near])})"
 
 
 def _end_springs(results: Results, sensor: str) -> list[str]:
@@ -327,16 +337,17 @@ def _amplified(results: Results, sensor: str) -> list[str]:
     said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{in_words(results, top)}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]
-    below = f"up to Ω/ω₁ = {number(SLOW)} at most {number(float(gain[slow]), 4)} times"
+    below = f"below {number(SLOW)} of the first natural frequency at most {number(float(gain[slow]), 4)} times"
     return [f"{said}; {below}{in_words(results, slow)}{_rule(results, sensor, slow)}."]
 
 
 def _rule(results: Results, sensor: str, place: Index) -> str:
-    """The rule of thumb for midspan and a slow shuttle about the middle of a pinned beam, where it applies."""
+    """The rule of thumb 1 + (2.5 + 8.1 mu) (Omega/omega_1)^2 for midspan and a slow shuttle about the middle of a
+    pinned beam, where it applies."""
     expected = theory.shuttle_amplification(results, sensor)
     if expected is None or float(results.everywhere(theory.frequency_ratio(results))[place]) > SLOW:
         return ""
-    return f" (rule of thumb 1 + (2.5 + 8.1 μ)(Ω/ω₁)²: {number(float(expected[place]), 4)})"
+    return f" (rule of thumb: {number(float(expected[place]), 4)})"
 
 
 def _halves(results: Results, sensor: str) -> list[str]:
@@ -362,4 +373,4 @@ def _from_where(results: Results, odd: Array) -> str:
     unlike, known = odd > UNLIKE, np.isfinite(odd)
     if not unlike.any() or not (known & (ratio < ratio[unlike].min())).any():
         return ""
-    return f" by more than {percent(UNLIKE)} of the even harmonics from Ω/ω₁ = {number(float(ratio[unlike].min()))} on"
+    return f" by more than {percent(UNLIKE)} of the even harmonics from {_pace(results, float(ratio[unlike].min()))} on"

@@ -166,10 +166,11 @@ def _end_as_json(end: Extreme) -> dict[str, Any]:
 
 
 def asked(study_results: Results) -> list[Range]:
-    """The ranges that answer: extremes, contact forces and the results of the kind of study; without means of squares,
-    estimated errors and work."""
+    """The ranges that answer: the results of the kind of study, then extremes and contact forces; without means of
+    squares, estimated errors and work."""
     beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
-    return [found for found in ranges(study_results) if found.name not in beside]
+    found = [one for one in ranges(study_results) if one.name not in beside]
+    return sorted(found, key=lambda one: not one.sensor)
 
 
 def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:

@@ -172,7 +172,8 @@ def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
         return f"{said}; but of {audit}, {beyond} did not hold it."
-    return f"{said}; {audit} differ by at most {scientific(_worst(group, verdict)[1])}."
+    differ = "differ" if verdict.count > 1 else "differs"
+    return f"{said}; {audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:

@@ -20,7 +20,7 @@ from tests.studies import at_rest, scenes
 BUILT_IN = catalogue.built_in()
 TEXTS = {name: path.read_text(encoding="utf-8") for name, path in BUILT_IN.items()}
 STARTS = {kind: catalogue.start_text(kind) for kind in catalogue.starts()}
-AT_LEAST = {"asymmetry": 2000, "double-peak": 2000, "passage": 2000}
+AT_LEAST = {"asymmetry": 2000, "double-peak": 2000, "passage": 384}
 
 
 def read(text: str) -> Cases:
