@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator
 
 from results_schema.arrays import Array
-from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, printed
+from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, on_method, printed
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
 from studies.results.formatting import quantity
 from studies.results.results import Results, spread
@@ -113,7 +113,7 @@ def error_figure(results: Results, panels: Sequence[Errors], wanted: float, word
     title = "How many modes it takes"
     height = 0.5 + 2.3 * -(-len(panels) // 2)
     where = [quantity(float(place), "m") for place in results.dataset["checked_position"].values]
-    return draw("modes", title, caption, height, partial(_draw_errors, panels, wanted, where))
+    return on_method(draw("modes", title, caption, height, partial(_draw_errors, panels, wanted, where)))
 
 
 def _draw_errors(panels: Sequence[Errors], wanted: float, where: Sequence[str], drawing: Drawing) -> None:

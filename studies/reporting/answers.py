@@ -36,13 +36,19 @@ def answer_of(results: Results) -> list[str]:
 
 def findings_of(results: Results) -> list[str]:
     """What the kind of study finds, then what the envelopes say, then what every variant took."""
-    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results), *told_choices(results)]
+    return [*found_of(results), *told_choices(results)]
+
+
+def found_of(results: Results) -> list[str]:
+    """What the kind of study finds, then what the envelopes say."""
+    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results)]
 
 
 def figures_of(results: Results) -> list[Figure]:
-    """The figures of the kind of study, then the envelopes, then what every variant took, cost and left out."""
+    """The figures of the question, the most important first, then those on methods."""
     from studies.pictures.common import envelopes, estimates
     from studies.pictures.common import numerics_used as choice
 
-    own = kind_named(results.study.kind).figures(results)
-    return [*own, *envelopes.pictures(results), *choice.pictures(results), *estimates.pictures(results)]
+    found = [*kind_named(results.study.kind).figures(results), *envelopes.pictures(results)]
+    found.sort(key=lambda figure: figure.on_method)
+    return [*found, *choice.pictures(results), *estimates.pictures(results)]

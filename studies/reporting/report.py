@@ -22,17 +22,18 @@ from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.archive import Archive, open_archive
 from results_schema.variables import Variable, expand
+from studies.findings.numerics_used import told_choices
 from studies.pictures.common import audit as audited
 from studies.pictures.common import estimates, unreduced
-from studies.pictures.common.figures import Figure, png, svg
+from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
-from studies.reporting.answers import figures_of, findings_of
-from studies.reporting.summary import noun, ranges
+from studies.reporting.answers import figures_of, found_of
+from studies.reporting.summary import asked, noun
 from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
 from studies.runs import audit
 from studies.runs.archived import results_of
-from studies.runs.audit import told_audit
+from studies.runs.audit import told_accuracy, told_audit
 from studies.runs.datasets import archive_of
 from studies.runs.unreduced import GROUP, told_unreduced
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
 LONG_TEXT = 120
+MOST_OPEN = 6  # figures of the question that stand unfolded
 
 
 class Row(NamedTuple):
@@ -75,18 +77,27 @@ class Finding:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything that the template shows; plain text but for the drawings."""
+    """Everything that the template shows; plain text but for the drawings.
+
+    figures, more_figures: of the question, open and folded. accuracy: in one sentence; exactness, method_figures: how
+    exact the answer is and how it was computed, folded.
+    """
 
     title: str
     question: str
     noun: str
     facts: Sequence[Row]
     findings: Sequence[Finding]
+    accuracy: str
+    exactness: Sequence[str]
     figures: Sequence[Drawn]
+    more_figures: Sequence[Drawn]
+    method_figures: Sequence[Drawn]
     statuses: Sequence[Row]
     scene: Mapping[str, Sequence[Row]]
     sweep: Sequence[Row]
     results: Sequence[tuple[str, ...]]
+    percentiles: Sequence[str]
     declarations: Sequence[tuple[str, ...]]
     provenance: Sequence[Row]
     study_text: str
@@ -120,46 +131,56 @@ def _write(source: Archive, folder: Path) -> Path:
         *estimates.compared(source.groups.get(audit.GROUP)),
         *unreduced.pictures(results, source.groups.get(GROUP)),
     ]
-    page = page_of(source, results, figures)
+    drawn = [
+        Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
+        for place, figure in enumerate(figures, 1)
+    ]
+    page = page_of(source, results, drawn, sum(not figure.on_method for figure in figures))
     text = page_template(PAGE).render(page=page)
     files.make_folder(folder)
     files.check_output_place(folder / PAGE)
-    for figure, drawn in zip(figures, page.figures, strict=True):
-        files.write_text(folder / f"{drawn.files}.svg", f'<?xml version="1.0" encoding="utf-8"?>\n{drawn.svg}')
-        files.write_whole(folder / f"{drawn.files}.png", partial(_fill, png(figure)))
+    for figure, one in zip(figures, drawn, strict=True):
+        files.write_text(folder / f"{one.files}.svg", f'<?xml version="1.0" encoding="utf-8"?>\n{one.svg}')
+        files.write_whole(folder / f"{one.files}.png", partial(_fill, png(figure)))
     files.write_text(folder / PAGE, text)
     return folder / PAGE
 
 
-def page_of(source: Archive, results: Results, figures: Sequence[Figure]) -> Page:
-    """The page of an archive."""
+def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_question: int) -> Page:
+    """The page of an archive, with so many figures of the question before those on methods."""
     kind = kind_named(results.study.kind)
+    open_figures = min(of_question, MOST_OPEN)
     return Page(
         title=results.study.title or str(source.root.attrs.get("title", "")) or kind.name,
         question=kind.question,
         noun=noun(source.root),
         facts=_facts(results, noun(source.root)),
-        findings=[
-            _finding(results, text)
-            for text in (*findings_of(results), *_audited(source, results), *told_unreduced(source.groups.get(GROUP)))
-        ],
-        figures=[
-            Drawn(place, figure.title, figure.caption, f"{place:02d}-{figure.name}", svg(figure))
-            for place, figure in enumerate(figures, 1)
-        ],
+        findings=[_finding(results, text) for text in found_of(results)],
+        accuracy=_sentence(told_accuracy(source.groups.get(audit.GROUP), results)),
+        exactness=_exactness(source, results),
+        figures=drawn[:open_figures],
+        more_figures=drawn[open_figures:of_question],
+        method_figures=drawn[of_question:],
         statuses=_statuses(results, noun(source.root)),
         scene=_scene(results),
         sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
         results=_results(results),
+        percentiles=[f"{value:g} %" for value in results.study.output.percentiles],
         declarations=_declarations(results),
         provenance=_provenance(source),
         study_text=results.study.source.text,
     )
 
 
-def _audited(source: Archive, results: Results) -> list[str]:
-    """What the audit says, as sentences."""
-    return [f"{text[0].upper()}{text[1:]}." for text in told_audit(source.groups.get(audit.GROUP), results)]
+def _exactness(source: Archive, results: Results) -> list[str]:
+    """What every variant took, what the audit says, and the comparison with the unreduced model, as sentences."""
+    audited = [f"{_sentence(text)}." for text in told_audit(source.groups.get(audit.GROUP), results)]
+    return [*told_choices(results), *audited, *told_unreduced(source.groups.get(GROUP))]
+
+
+def _sentence(text: str) -> str:
+    """Text with a capital letter."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def page_template(name: str) -> Template:
@@ -202,18 +223,9 @@ def _fill(content: bytes, path: Path) -> None:
 
 def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
-    dataset = results.dataset
-    steps = dataset["steps_used"].values
-    low, high = int(steps.min()), int(steps.max())
-    modes = sorted({int(count) for count in dataset["modes_used"].values.ravel()})
     fine = results.status_counts.get(Status.OK, 0)
     counts = [Row(f"{noun}s", f"{results.size:,}"), Row("status ok", f"{fine:,}")]
-    return [
-        Row("kind of study", results.study.kind),
-        *(counts if _statuses(results, noun) else ()),
-        Row("modes", " to ".join(str(count) for count in dict.fromkeys((modes[0], modes[-1])))),
-        *([Row("steps", f"{low:,}" if low == high else f"{low:,} to {high:,}")] if high else []),
-    ]
+    return [Row("kind of study", results.study.kind), *(counts if _statuses(results, noun) else ())]
 
 
 def _finding(results: Results, text: str) -> Finding:
@@ -290,11 +302,12 @@ def _sweep_row(results: Results, place: int) -> Row:
 
 
 def _results(results: Results) -> list[tuple[str, ...]]:
-    """Name, sensor, smallest and largest with their places, of every result that is a number per variant."""
+    """Name, sensor, smallest and largest with their places, and percentiles, of the results that answer."""
     rows: list[tuple[str, ...]] = []
-    for found in ranges(results):
+    for found in asked(results):
         ends = [found.said(end.value, 4) for end in (found.smallest, found.largest)]
-        rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where))
+        between = [found.said(value, 4) for value in found.percentiles]
+        rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where, *between))
     return rows
 
 

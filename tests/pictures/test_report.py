@@ -101,6 +101,20 @@ def test_report_of_every_kind(kind: str, tmp_path: Path) -> None:
         assert text in reader.text
 
 
+def test_the_page_opens_with_six_figures_at_most_and_folds_methods(tmp_path: Path) -> None:
+    sweep = f'{scenes.pace("double-peak")}\nmass = {{ of = "carriage.table.mass", values = [50, 100, 200] }}'
+    dataset = scenes.run("double-peak", sweep, extra="[output]\npercentiles = [5, 50]")
+    found = answers.figures(dataset)
+    text = write_report(archive(tmp_path, dataset), tmp_path / "out").read_text(encoding="utf-8")
+    unfolded = re.sub(r"<details.*?</details>", "", text, flags=re.DOTALL)
+    assert unfolded.count("<figure>") == min(6, sum(not figure.on_method for figure in found))
+    assert text.count("<figure>") == len(found) and any(figure.on_method for figure in found)
+    assert "<h2>Answer</h2>" in unfolded and "How exact, and how it was computed" not in unfolded
+    assert "<th>5 %</th><th>50 %</th>" in unfolded
+    for table in re.findall(r"<tbody>(.*?)</tbody>", unfolded, flags=re.DOTALL):
+        assert table.count("<tr>") <= 10
+
+
 @pytest.mark.parametrize("kind", ["passage", "double-peak"])
 def test_hostile_titles_are_text(kind: str, tmp_path: Path) -> None:
     page = write_report(archive(tmp_path, scenes.run(kind, title=HOSTILE)), tmp_path / "out")

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
-from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
+from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic, on_method
 from studies.results.formatting import counted
 from studies.results.results import PACES, Axis, Results
 from studies.runs.audit import relative_errors
@@ -30,7 +30,7 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
         f"{counted(group.sizes['sample'], 'variant')} computed again with all terms, more modes and more steps, and "
         "one level beyond. Of every variant the largest error over its tolerance, among the results that have one."
     )
-    return [draw("audit", "Errors that the audit observed", caption, HEIGHT, partial(_draw, group, axis))]
+    return [on_method(draw("audit", "Errors that the audit observed", caption, HEIGHT, partial(_draw, group, axis)))]
 
 
 def _draw(group: xr.Dataset, axis: Axis, drawing: Drawing) -> None:

@@ -10,7 +10,17 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array, Mask
 from studies.findings.numerics_used import is_marched, known
-from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic
+from studies.pictures.common.figures import (
+    BLUE,
+    INK,
+    MUTED,
+    VERMILION,
+    Figure,
+    draw,
+    legend_beside,
+    logarithmic,
+    on_method,
+)
 from studies.results.formatting import counted, number, percent
 from studies.results.results import Results
 
@@ -39,7 +49,9 @@ def pictures(results: Results) -> list[Figure]:
     )
     lacking = f" Without an estimate of some: {counted(int(np.isnan(error).any(axis=1).sum()), 'variant')}."
     caption += lacking if np.isnan(error).any() else ""
-    return [draw("estimates", _title(*rows[0]), caption, 0.8 + 0.21 * len(shown), partial(_draw_results, shown))]
+    return [
+        on_method(draw("estimates", _title(*rows[0]), caption, 0.8 + 0.21 * len(shown), partial(_draw_results, shown)))
+    ]
 
 
 def _title(name: str, error: Array, tolerance: float) -> str:
@@ -91,7 +103,7 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
     caption += "" if both.all() else f" Not drawn: {counted(int((~both).sum()), 'number')} without one of both."
     held = np.broadcast_to(np.isfinite(group["tolerance"].values), both.shape)[both]
     fill = partial(_draw_compared, pairs, held, np.unique(known(group["tolerance"].values)))
-    return [draw("estimated-observed", title, caption, 3.9, fill)]
+    return [on_method(draw("estimated-observed", title, caption, 3.9, fill))]
 
 
 def _draw_compared(pairs: Array, held: Mask, tolerances: Array, drawing: Drawing) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
@@ -80,12 +80,16 @@ STYLE: Any = {
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A drawing with its plain file name, its title and its caption."""
+    """A drawing with its plain file name, its title and its caption.
+
+    on_method: it shows how exact the answer is or how it was computed, not the answer.
+    """
 
     name: str
     title: str
     caption: str
     drawing: Drawing
+    on_method: bool = False
 
     def _repr_html_(self) -> str:
         """How notebooks show it."""
@@ -99,6 +103,11 @@ def draw(name: str, title: str, caption: str, height: float, fill: Callable[[Dra
         FigureCanvasAgg(drawing)
         fill(drawing)
     return Figure(plain_name(name), title, caption, drawing)
+
+
+def on_method(figure: Figure) -> Figure:
+    """The figure as one that shows how exact the answer is or how it was computed."""
+    return replace(figure, on_method=True)
 
 
 def _settle(figure: Figure) -> None:

@@ -15,7 +15,7 @@ from results_schema.arrays import Array
 from results_schema.status import Fidelity
 from studies.findings.numerics_used import MODEL, MODES, NAMES, STEPS, WORK, is_marched, known, models, of_variants
 from studies.pictures.common import figures as look
-from studies.pictures.common.figures import Figure, colour_bar, draw, logarithmic
+from studies.pictures.common.figures import Figure, colour_bar, draw, logarithmic, on_method
 from studies.pictures.common.sweep_view import DAMPING, MASSES, View, along_axis, draw_map, view
 from studies.results.formatting import counted, listed
 from studies.results.results import PACES, VARIANT, Results, spread
@@ -45,7 +45,7 @@ def pictures(results: Results) -> list[Figure]:
     caption = seen.caption(f"{what}.", f"All: {listed(alike)}." if alike else "")
     height = 3.4 if seen.y is not None else 0.6 + 1.35 * len(varied)
     fill = partial(_draw_maps if seen.y is not None else _draw_lines, seen, varied)
-    return [draw("choice", _title(known(of_variants(results, WORK))), caption, height, fill)]
+    return [on_method(draw("choice", _title(known(of_variants(results, WORK))), caption, height, fill))]
 
 
 def _alike(results: Results, name: str) -> str:

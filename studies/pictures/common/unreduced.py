@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, zero_line
+from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, on_method, zero_line
 from studies.results.formatting import counted, scale_for
 from studies.results.results import Results
 from studies.runs.unreduced import compared_variants
@@ -31,7 +31,7 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
     height = 0.8 + 1.8 * len(names)
     caption = _caption(results, group, sample, len(names))
     title = "Against the unreduced finite-element model"
-    return [draw("unreduced", title, caption, height, partial(_draw, group, sample, names))]
+    return [on_method(draw("unreduced", title, caption, height, partial(_draw, group, sample, names)))]
 
 
 def _shown(group: xr.Dataset) -> list[str]:
