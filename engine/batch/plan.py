@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from math import prod
 
 import numpy as np
@@ -71,6 +72,16 @@ class Plan:
     def size(self) -> int:
         """Number of variants."""
         return self.cases.size
+
+    def _repr_html_(self) -> str:
+        """How notebooks show it: how much work it is."""
+        shape = " x ".join(f"{name} {length:,}" for name, length in zip(self.cases.dims, self.cases.shape, strict=True))
+        title = escape(self.study.title or self.study.kind)
+        return (
+            f"<b>{title}</b><br>{self.size:,} variants ({escape(shape or 'one')}) of "
+            f"{len(self.grids):,} scenes, at most {self.memory_bytes / 2**20:.0f} MiB of memory and "
+            f"{self.disk_bytes / 2**20:.1f} MiB on the disk"
+        )
 
     @property
     def converges(self) -> bool:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -104,6 +105,15 @@ class Study(Scene):
     def data(self) -> dict[str, Any]:
         """The tables as they were written, without defaults; not to be changed."""
         return self._data
+
+    def _repr_html_(self) -> str:
+        """How notebooks show it: title, kind, what is swept, and the file."""
+        axes = ", ".join(f"{name} ({axis.size})" for name, axis in self.sweep.axes.items()) or "nothing"
+        text = f"<pre>{escape(self.source.text)}</pre>"
+        return (
+            f"<b>{escape(self.title or self.kind)}</b><br>{escape(self.kind)}, swept: "
+            f"{escape(axes)}<details><summary>study file</summary>{text}</details>"
+        )
 
     @property
     def start(self) -> Literal["rest", "equilibrium"]:

@@ -148,8 +148,9 @@ def info(archive: Path, every: bool, text: bool) -> None:
     Where there is none yet, but an unfinished run of it (exit code 2): how far that has come, and how to go on.
     """
     _refuse_what_is_no_archive(archive)
-    from results_schema.store.archive import describe
+    from results_schema.store.archive import describe, open_archive
     from studies.commands import console
+    from studies.runs.archived import results_of
 
     found = describe(archive)
     if text:
@@ -158,6 +159,8 @@ def info(archive: Path, every: bool, text: bool) -> None:
         console.show_everything(found)
     else:
         console.show_archive(found)
+        if found.whole:
+            console.show_choices(results_of(open_archive(archive)))
     if not found.whole:
         raise ArchiveError(found.damage)
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from studies.commands.preview import Preview
     from studies.reporting.comparison import Comparison
     from studies.reporting.summary import Range
+    from studies.results.results import Results
     from studies.runs.runner import Outcome
 
 WIDTH = 80  # of output that no terminal shows
@@ -178,6 +179,13 @@ def show_archive(summary: Summary) -> None:
     paragraphs(
         f"wanderlast info {summary.path} --all lists every variable with its meaning, --study prints the study file."
     )
+
+
+def show_choices(results: Results) -> None:
+    """What variants were computed with."""
+    from studies.findings.numerics_used import told_choices
+
+    paragraphs(*told_choices(results))
 
 
 def show_everything(summary: Summary) -> None:

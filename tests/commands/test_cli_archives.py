@@ -140,4 +140,6 @@ def test_python_writes_and_reports_what_the_command_does(here: Path, capsys: Cap
     leads = [[line for line in text.splitlines() if '<p class="lead"' in line] for text in (page, other)]
     assert leads[0] and leads[0] == leads[1]
     assert main(["info", "python.nc"]) == 0
+    study = engine.load("small.toml")
+    assert "small" in study._repr_html_() and "16 variants" in engine.make_plan(study)._repr_html_()
     assert "<svg" in studies.figures(dataset)[0]._repr_html_()
