@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
+from results_schema.arrays import Array
 from studies.findings import theory
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, banded, colour_bar, draw, logarithmic, zero_line
@@ -25,13 +27,15 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import odd_part, over_position, picked, there_and_back
-from studies.results.formatting import percent, scale_for
-from studies.results.results import Index, Results, chosen
+from studies.results.findings_common import exceeds
+from studies.results.formatting import percent, quantity, scale_for
+from studies.results.results import Index, Results, chosen, extreme
 
 MOST_SENSORS = 3
 THRESHOLDS = (0.01, 0.05)
 BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent
 LAGS_SHOWN = 1.6
+NARROW = 22  # letters of a line in a legend beside
 VISIBLE = 0.03  # odd part that an eye sees in the response
 
 
@@ -41,13 +45,19 @@ def pictures(results: Results) -> list[Figure]:
     left_out = len(results.sensors) - len(sensors)
     more = f"{left_out} more sensors are in the archive." if left_out else ""
     found = [figure for sensor in sensors for figure in _response(results, sensor)]
-    seen = view(results, SPEEDS, (*DAMPING, *MASSES))
+    top = extreme(results.of_sensor("odd_rms", sensors[0]))
+    seen = view(results, SPEEDS, (*DAMPING, *MASSES), top)
     if seen.x is not None:
         found += [_lag(seen, sensors, more), _parts(seen, sensors, more)]
-        by_mass = view(results, SPEEDS, MASSES)
-        if by_mass.y is not None:
+        by_mass = view(results, SPEEDS, MASSES, top)
+        if by_mass.y is not None and np.nanmax(_odd(by_mass, sensors[0]), initial=0.0) > BANDS[0] / 100.0:
             found.append(_map(by_mass, sensors[0]))
     return found
+
+
+def _odd(seen: View, sensor: str) -> Array:
+    """The odd part over the shown plane, of the static range."""
+    return seen.plane(seen.results.of_sensor("odd_rms", sensor))
 
 
 def _response(results: Results, sensor: str) -> list[Figure]:
@@ -55,8 +65,9 @@ def _response(results: Results, sensor: str) -> list[Figure]:
     ranked = picked(results, odd, results.size)
     if not ranked:
         return []
+    largest = ranked[-1]
     modest = min(ranked, key=lambda index: abs(float(odd[index]) - VISIBLE))
-    shown = list(dict.fromkeys([modest, ranked[-1]]))
+    shown = list(dict.fromkeys([modest, largest]))
     which = (
         f"Of the kept histories, the one whose odd part is closest to {percent(VISIBLE)} of the static range (left) "
         "and the one with the largest (right)."
@@ -69,7 +80,10 @@ def _response(results: Results, sensor: str) -> list[Figure]:
     ).strip()
     if results.sensors[sensor] == "m":
         caption += " Above, displacements point down, as the body hangs."
-    title = f"Forward and backward: {sensor}"
+    title = (
+        f"{results.noun(sensor).capitalize()} {results.place(sensor)}: the two ways differ by "
+        f"{percent(float(odd[largest]))} of the static range"
+    )
     return [draw(f"response-{sensor}", title, caption, 4.2, partial(_draw_response, results, sensor, shown))]
 
 
@@ -103,7 +117,7 @@ def _draw_ways(results: Results, sensor: str, index: Index, axes: Sequence[Axes]
         ax.set_xlim(min(way.start, way.end), max(way.start, way.end))
     if units == "m":
         axes[0].invert_yaxis()
-    axes[0].set_ylabel(f"{sensor} ({scale.unit})" if scale.unit else sensor)
+    axes[0].set_ylabel(results.label(sensor, scale.unit))
     axes[1].set_ylabel(f"odd part ({small.unit})" if small.unit else "odd part")
     axes[1].set_xlabel(f"position of {results.carriage_name} (m)")
 
@@ -121,7 +135,19 @@ def _lag(seen: View, sensors: list[str], more: str) -> Figure:
         more,
     )
     height = 0.6 + 2.3 * len(sensors)
-    return draw("lag", "Lag against speed", caption, height, partial(_draw_lag, seen, sensors))
+    lags = np.concatenate([curve.y for curve in _lags(seen, sensors[0])])
+    return draw("lag", _lag_title(seen, sensors[0], lags), caption, height, partial(_draw_lag, seen, sensors))
+
+
+def _lag_title(seen: View, sensor: str, lags: Array) -> str:
+    """How far the response trails or runs ahead at most."""
+    trails, ahead = -float(np.nanmin(lags, initial=0.0)), float(np.nanmax(lags, initial=0.0))
+    parts = [
+        f"{words} by up to {quantity(size, 'm')}"
+        for words, size in (("trails", trails), ("runs ahead", ahead))
+        if size > 0.0
+    ]
+    return f"The {seen.results.noun(sensor)} {seen.results.place(sensor)} {' or '.join(parts) or 'has no lag'}"
 
 
 def _lags(seen: View, sensor: str) -> list[Curve]:
@@ -151,8 +177,10 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
         zero_line(axes)
         if limit > 0.0:
             axes.set_ylim(-1.08 * limit * scale.factor, 1.08 * limit * scale.factor)
-        axes.set_ylabel(f"lag of {sensor} ({scale.unit})")
-        if colours:
+        axes.set_ylabel(f"lag of {seen.results.noun(sensor)}\n{seen.results.place(sensor)} ({scale.unit})")
+        if axes is not rows[0] and axes.get_legend() is not None:
+            axes.get_legend().remove()
+        if colours and axes is rows[0]:
             _name_theory(axes, theory.lag_formula(seen.results, sensor), seen)
     assert seen.x is not None
     rows[-1].set_xlabel(seen.x.title)
@@ -163,7 +191,7 @@ def _name_theory(axes: Axes, formula: str, seen: View) -> None:
     handles, labels = axes.get_legend_handles_labels()
     dashes = Line2D([], [], color=look.MUTED, linestyle=(0, (4, 2)), linewidth=0.9)
     place = {**look.BESIDE, "title": seen.y.noun} if labels and seen.y is not None else {"loc": "best"}
-    axes.legend([*handles, dashes], [*labels, formula], **place)
+    axes.legend([*handles, dashes], [*labels, fill(formula, NARROW)], **place)
 
 
 def _parts(seen: View, sensors: list[str], more: str) -> Figure:
@@ -173,7 +201,13 @@ def _parts(seen: View, sensors: list[str], more: str) -> Figure:
         more,
     )
     height = 0.6 + 2.3 * len(sensors)
-    title = "What differs between the ways, and what they share"
+    results, first = seen.results, sensors[0]
+    even = np.nanmax(np.abs(seen.plane(results.of_sensor("even_excess", first))), initial=0.0)
+    title = (
+        f"{first.replace('_', ' ')}: the ways differ by up to "
+        f"{percent(float(np.nanmax(_odd(seen, first), initial=0.0)))} of the static range, their mean from statics by "
+        f"up to {percent(float(even))}"
+    )
     return draw("odd-and-even", title, caption, height, partial(_draw_parts, seen, sensors))
 
 
@@ -197,7 +231,9 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
 
 def _map(seen: View, sensor: str) -> Figure:
     caption = seen.caption("Rms of half the difference of forward and backward.")
-    title = f"Where forward and backward differ: {sensor}"
+    odd = np.asarray(seen.results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    told = exceeds(seen.results, odd, THRESHOLDS[0])
+    title = f"{sensor.replace('_', ' ')}: the difference of the ways {told}"
     return draw("odd-map", title, caption, 3.0, partial(_draw_map, seen, sensor))
 
 

@@ -15,7 +15,7 @@ from matplotlib.ticker import FixedLocator
 from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, on_method, printed
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
-from studies.results.formatting import quantity
+from studies.results.formatting import percent, quantity
 from studies.results.results import Results, spread
 
 MOST_CURVES = 6
@@ -110,10 +110,20 @@ def error_figure(results: Results, panels: Sequence[Errors], wanted: float, word
         if any((panel.errors < FLOOR).any() for panel in panels)
         else ""
     )
-    title = "How many modes it takes"
+    title = _enough_title(panels, wanted)
     height = 0.5 + 2.3 * -(-len(panels) // 2)
     where = [quantity(float(place), "m") for place in results.dataset["checked_position"].values]
     return on_method(draw("modes", title, caption, height, partial(_draw_errors, panels, wanted, where)))
+
+
+def _enough_title(panels: Sequence[Errors], wanted: float) -> str:
+    """From how many modes on all errors with static correction stay within what is wanted."""
+    worst = np.max([np.nan_to_num(panel.errors[0], nan=np.inf).max(axis=-1) for panel in panels], axis=0)
+    beyond = np.flatnonzero(worst > wanted)
+    first = beyond[-1] + 1 if beyond.size else 0
+    if first == worst.size:
+        return f"{panels[0].counts[-1]} modes of every body leave more than {percent(wanted)}"
+    return f"{panels[0].counts[first]} modes of every body are enough for {percent(wanted)}"
 
 
 def _draw_errors(panels: Sequence[Errors], wanted: float, where: Sequence[str], drawing: Drawing) -> None:

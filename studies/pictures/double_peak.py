@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.arrays import Array
 from studies.findings import theory
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, logarithmic, shades
@@ -26,8 +28,8 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import picked
-from studies.results.formatting import scale_for
-from studies.results.results import Index, Results, chosen
+from studies.results.formatting import listed, number, scale_for
+from studies.results.results import Index, Results, chosen, extreme
 
 MOST_SENSORS = 3
 MOST_CYCLES = 3
@@ -40,14 +42,17 @@ PEAK_COLOURS = ("#56b4e9", "#eef0f3", "#e69f00", "#0072b2", "#cc79a7", "#d55e00"
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow."""
     sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    gain = results.of_sensor("dynamic_amplification", sensors[0])
+    top = extreme(gain)
     shown = _typical(results, sensors[0])
     found = [_cycle(results, sensors, shown)] if shown else []
-    seen = view(results, SPEEDS, MASSES)
+    seen = view(results, SPEEDS, MASSES, top)
     if seen.x is not None:
         for sensor in sensors:
             axis = results.deciding_axis("peaks_per_cycle", sensor)
-            own = view(results, SPEEDS, axis.paths) if axis is not None else seen
-            found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
+            own = view(results, SPEEDS, axis.paths, top) if axis is not None else seen
+            if np.unique(_counts(own, sensor)).size > 1:
+                found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
         amplified = [sensor for sensor in sensors if _has_values(seen, "dynamic_amplification", sensor)]
         found += [_gain(seen, amplified)] if amplified else []
         if float(np.nanmax(results.dataset["odd_even_ratio"].values, initial=0.0)) > ALIKE:
@@ -56,13 +61,34 @@ def pictures(results: Results) -> list[Figure]:
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
 
 
+def _counts(seen: View, sensor: str) -> Array:
+    """The numbers of peaks that occur in a view, as often as they do."""
+    counts = seen.plane(seen.results.of_sensor("peaks_per_cycle", sensor))
+    return counts[np.isfinite(counts)]
+
+
+def _peaks_title(seen: View, sensor: str) -> str:
+    """Up to where the most frequent number of peaks holds, and what follows."""
+    assert seen.x is not None
+    counts, grid = _counts(seen, sensor), seen.plane(seen.results.of_sensor("peaks_per_cycle", sensor))
+    usual, name = int(Counter(counts.tolist()).most_common(1)[0][0]), sensor.replace("_", " ")
+    broken = (np.isfinite(grid) & (grid != usual)).reshape(len(grid), -1).any(axis=1)
+    fine = np.flatnonzero(np.cumsum(broken) == 0)
+    if seen.is_sampled or not fine.size:
+        return f"{name} has {counts.min():.0f} to {counts.max():.0f} peaks per cycle, most often {usual}"
+    until = seen.x.in_words(float(seen.along(seen.x)[fine[-1]]) / seen.x.factor)
+    others = listed([f"{count:.0f}" for count in np.unique(counts) if count != usual])
+    return f"{name} has {usual} peaks per cycle up to {until}; beyond, also {others}"
+
+
 def _has_values(seen: View, variable: str, sensor: str) -> bool:
     """Whether a result of a sensor has values in a view: without a static response there is no amplification."""
     return bool(np.isfinite(seen.plane(seen.results.of_sensor(variable, sensor))).any())
 
 
 def _typical(results: Results, sensor: str) -> list[Index]:
-    """At most three variants with a history: one of each number of peaks, and others from slow to fast."""
+    """At most three variants with a history: the one with the largest amplification, one of each number of
+    peaks, and others; from slow to fast."""
     ratio = results.everywhere(theory.frequency_ratio(results))
     counts = np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
     traced = sorted(results.traced(), key=lambda index: float(ratio[index]))
@@ -71,6 +97,8 @@ def _typical(results: Results, sensor: str) -> list[Index]:
         groups.setdefault(float(counts[index]), []).append(index)
     largest = sorted(groups.values(), key=len, reverse=True)
     found = [group[len(group) // 2] for group in largest[:MOST_CYCLES]]
+    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+    found = list(dict.fromkeys([*picked(results, gain, results.size)[-1:], *found]))[:MOST_CYCLES]
     rest = [index for index in picked(results, ratio, MOST_CYCLES) if index not in found]
     return sorted([*found, *rest[: MOST_CYCLES - len(found)]], key=lambda index: float(ratio[index]))
 
@@ -83,7 +111,11 @@ def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
     if results.carriage.motion.is_harmonic:
         caption += " The carriage is at the centre at phase 0 and 0.5, at its ends at the grey lines."
     height = 0.7 + 1.9 * len(sensors)
-    return draw("cycle", "Response over a cycle", caption, height, partial(_draw_cycle, results, sensors, shown))
+    counts = [float(results.of_sensor("peaks_per_cycle", sensors[0]).values[index]) for index in shown]
+    told = [f"{count:.0f}" for count in counts if np.isfinite(count)]
+    each = listed(told if len(set(told)) > 1 else told[:1]) or "no"
+    title = f"{sensors[0].replace('_', ' ')} has {each} peaks per cycle{', from slow to fast' * (len(set(told)) > 1)}"
+    return draw("cycle", title, caption, height, partial(_draw_cycle, results, sensors, shown))
 
 
 def _draw_cycle(results: Results, sensors: list[str], shown: list[Index], drawing: Drawing) -> None:
@@ -138,7 +170,7 @@ def _map(seen: View, sensor: str) -> Figure:
         if lines
         else "",
     )
-    return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 3.4, partial(_draw_map, seen, sensor, ways))
+    return draw(f"peaks-{sensor}", _peaks_title(seen, sensor), caption, 3.4, partial(_draw_map, seen, sensor, ways))
 
 
 def _draw_map(seen: View, sensor: str, ways: tuple[Any, Any], drawing: Drawing) -> None:
@@ -188,7 +220,7 @@ def _held_mass(seen: View, mass: float | None) -> float | None:
 
 def _count(seen: View, sensor: str) -> Figure:
     caption = seen.caption("Number of peaks in the last cycle; lines: n Ω = ωₑ.")
-    return draw(f"peaks-{sensor}", f"Peaks per cycle: {sensor}", caption, 2.4, partial(_draw_count, seen, sensor))
+    return draw(f"peaks-{sensor}", _peaks_title(seen, sensor), caption, 2.4, partial(_draw_count, seen, sensor))
 
 
 def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
@@ -206,8 +238,18 @@ def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
 def _gain(seen: View, sensors: list[str]) -> Figure:
     caption = seen.caption("Largest absolute value in the last cycle over the largest absolute static value.")
     height = 0.6 + 2.2 * len(sensors)
-    title = "Dynamic amplification"
+    title = f"Statics are exceeded {_top_words(seen, sensors, 'dynamic_amplification')}"
     return draw("amplification", title, caption, height, partial(_draw_rows, seen, sensors, "dynamic_amplification"))
+
+
+def _top_words(seen: View, sensors: list[str], variable: str, of: str = "") -> str:
+    """The largest value of a ratio in a view, and its sensor."""
+    tops = {
+        sensor: float(np.nanmax(seen.plane(seen.results.of_sensor(variable, sensor)), initial=0.0))
+        for sensor in sensors
+    }
+    best = max(tops, key=lambda sensor: tops[sensor])
+    return f"{number(tops[best])} times{of} at most, in {best.replace('_', ' ')}"
 
 
 def _halves(seen: View, sensors: list[str]) -> Figure:
@@ -215,7 +257,7 @@ def _halves(seen: View, sensors: list[str]) -> Figure:
         "Rms of the odd over rms of the even harmonics of the last cycle: 0 where its two halves are alike."
     )
     height = 0.6 + 2.2 * len(sensors)
-    title = "Odd and even harmonics"
+    title = f"Odd harmonics reach {_top_words(seen, sensors, 'odd_even_ratio', ' the even ones')}"
     return draw("odd-even", title, caption, height, partial(_draw_rows, seen, sensors, "odd_even_ratio"))
 
 
@@ -238,7 +280,8 @@ def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) 
 
 def _harmonics(results: Results, sensor: str, shown: list[Index]) -> Figure:
     caption = f"Amplitudes 2|c_k| of the last cycle of {sensor}, in the variants of the first figure."
-    title = f"Harmonics: {sensor}"
+    sizes = np.nan_to_num(results.of_sensor("harmonic", sensor).values[shown[-1]])[1:]
+    title = f"Harmonic {int(np.argmax(sizes)) + 1} of the cycle is the largest in {sensor.replace('_', ' ')}"
     return draw("harmonics", title, caption, 2.4, partial(_draw_harmonics, results, sensor, shown))
 
 
@@ -254,7 +297,7 @@ def _draw_harmonics(results: Results, sensor: str, shown: list[Index], drawing: 
         axes.bar(places, row * scale.factor, width, color=colour, label=results.at(index).replace(", ", "\n"))
     axes.set_xticks(order)
     axes.grid(visible=False, axis="x")
-    axes.set(xlabel="harmonic k", ylabel=f"amplitude ({scale.unit})" if scale.unit else "amplitude")
+    axes.set(xlabel="harmonic k", ylabel=results.label(sensor, scale.unit, "amplitude of"))
     if np.nanmax(rows) > 0.0:
         logarithmic(axes.yaxis)
         axes.set_ylim(bottom=1e-4 * float(np.nanmax(rows)) * scale.factor)

@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.arrays import Array
 from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors
 from studies.pictures import at_rest
-from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
+from studies.pictures.common.figures import ALIKE, HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
 from studies.results.formatting import number, quantity
 from studies.results.results import Results
@@ -44,8 +45,19 @@ def _over_position(results: Results) -> Figure:
     )
     if results.size > 1:
         caption += " Of the scene without its sweep."
-    title = "Natural frequencies over the position"
+    title = _changing(np.asarray(results.dataset["base_frequency"].values, dtype=np.float64))
     return draw("frequencies", title, caption, 4.2, partial(_draw_over_position, results))
+
+
+def _changing(frequencies: Array) -> str:
+    """Which of the frequencies (position, mode) changes most along the way."""
+    low, high = np.nanmin(frequencies, axis=0), np.nanmax(frequencies, axis=0)
+    change = (high - low) / np.where(high > 0.0, high, 1.0)
+    mode = int(np.nanargmax(change))
+    if change[mode] < ALIKE:
+        return "The natural frequencies are the same all along the way"
+    ends = f"{number(float(low[mode]), 4)} to {number(float(high[mode]), 4)} Hz"
+    return f"Frequency {mode + 1} changes most along the way, between {ends}".replace(" to ", " and ")
 
 
 def _draw_over_position(results: Results, drawing: Drawing) -> None:
@@ -74,7 +86,9 @@ def _over_sweep(seen: View) -> Figure:
     caption = " ".join(
         text for text in (f"One panel for each of the lowest {shown}.", at_rest.held_words(seen)) if text
     )
-    title = f"Frequencies over the position and {seen.x.noun}"
+    lowest = seen.results.dataset["frequency"].isel(mode=0).values
+    ends = [number(float(end), 4) for end in (np.nanmin(lowest), np.nanmax(lowest))]
+    title = f"The lowest frequency lies between {ends[0]} and {ends[1]} Hz over position and {seen.x.noun}"
     return draw("sweep", title, caption, 0.7 + 1.9 * shown, partial(_draw_over_sweep, seen, shown))
 
 
@@ -98,7 +112,11 @@ def _shapes(results: Results) -> Figure:
         + (" What rides is drawn above what it rides." if any(c.riding_body for c in carriages) else "")
     )
     height = 0.4 + 1.35 * count
-    return draw("shapes", "Shapes of the coupled system", caption, height, partial(_draw_shapes, results, count))
+    base = results.dataset["base_frequency"]
+    at = quantity(float(base["position"][0]), "m")
+    told = ", ".join(number(float(value), 4) for value in base.values[0, :count])
+    title = f"With {results.carriage_name} at {at} the system vibrates at {told} Hz"
+    return draw("shapes", title, caption, height, partial(_draw_shapes, results, count))
 
 
 def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:

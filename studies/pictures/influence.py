@@ -52,7 +52,11 @@ def _readings(results: Results, sensors: list[str]) -> Figure:
         texts.append(at_rest.held_words(seen))
     height = 0.7 + 1.7 * len(sensors)
     caption = " ".join(text for text in texts if text)
-    return draw("readings", "Static readings over the position", caption, height, partial(_draw, results, sensors))
+    first, values = sensors[0], results.dataset[sensors[0]].values
+    low, high = (quantity(float(end), results.sensors[first]) for end in (np.nanmin(values), np.nanmax(values)))
+    title = f"The static {results.noun(first)} {results.place(first)} "
+    title += f"is {low} all along the way" if low == high else f"goes from {low} to {high} along the way"
+    return draw("readings", title, caption, height, partial(_draw, results, sensors))
 
 
 def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
@@ -68,8 +72,8 @@ def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
             where, style = full["unreduced_position"], {"markersize": 4.5, "markerfacecolor": "none", "color": INK}
             axes.plot(where, full * scale.factor, "o", **style)
         widen(axes, [curve.y * scale.factor for curve in curves])
-        words = name.replace("_", " ")
-        axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
+        axes.set_ylabel(results.label(name, scale.unit))
+        axes.set_title(name.replace("_", " "))
         if results.sensors[name] == "m":
             axes.invert_yaxis()
     rows[-1].set_xlabel(at_rest.position_title(results))
@@ -81,7 +85,10 @@ def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
 def _contacts(results: Results) -> Figure:
     one = results.size > 1
     caption = "At rest; below zero a contact would lift off." + (" Of the middle of the sweep." if one else "")
-    return draw("contacts", "Contact forces over the position", caption, 2.8, partial(_draw_contacts, results))
+    forces = results.dataset["contact_force"].values
+    low, high = (quantity(float(end), "N") for end in (np.nanmin(forces), np.nanmax(forces)))
+    title = f"Contact forces lie between {low} and {high}"
+    return draw("contacts", title, caption, 2.8, partial(_draw_contacts, results))
 
 
 def _draw_contacts(results: Results, drawing: Drawing) -> None:
@@ -106,7 +113,9 @@ def _shapes(results: Results) -> Figure:
         + (" Of the scene without its sweep." if results.size > 1 else "")
     )
     height = 0.7 + 2.1 * len(bodies)
-    return draw("deflection", "Deflected shapes", caption, height, partial(_draw_shapes, results))
+    sag = float(np.nanmax(np.abs(results.dataset["deflection"].values)))
+    title = f"The bodies deflect by up to {quantity(sag, 'm')}"
+    return draw("deflection", title, caption, height, partial(_draw_shapes, results))
 
 
 def _draw_shapes(results: Results, drawing: Drawing) -> None:
@@ -123,7 +132,7 @@ def _draw_shapes(results: Results, drawing: Drawing) -> None:
             axes.plot(x, y, color=colour if len(chosen_places) > 1 else BLUE, label=label)
             if body.name == results.carriage.on:
                 at_rest.carriage_marks(axes, results, position, float(np.interp(position, x, y)))
-        axes.set_ylabel(f"{body.name}\n({scale.unit})")
+        axes.set_ylabel(f"deflection\nof {body.name} ({scale.unit})")
         axes.invert_yaxis()
     rows[-1].set_xlabel(at_rest.way_title(results))
     legend_of_all(drawing, rows[0])

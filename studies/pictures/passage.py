@@ -33,7 +33,7 @@ from studies.pictures.common.sweep_view import (
     ratio_above,
     view,
 )
-from studies.pictures.common.traces import nearest, over_way, picked
+from studies.pictures.common.traces import over_way, picked
 from studies.results.findings_common import in_words
 from studies.results.formatting import number, quantity, scale_for
 from studies.results.results import Index, Results, chosen, extreme
@@ -60,7 +60,7 @@ def pictures(results: Results) -> list[Figure]:
             found.append(_map(seen, sensors[0]))
         found += [_contact(seen, name) for name in results.study.carriage if _has_contact(seen, name)]
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
-    shown = nearest(results, top, picked(results, size, MOST_HISTORIES))[-MOST_HISTORIES:]
+    shown = picked(results, size, MOST_HISTORIES)
     return [*found, *([_response(results, sensors, shown, top)] if shown else [])]
 
 
@@ -209,7 +209,7 @@ def _response(results: Results, sensors: list[str], shown: list[Index], top: Ind
     value = quantity(float(way.values[at]), results.sensors[first])
     where = quantity(float(way.position[at]), "m")
     title = f"{first.replace('_', ' ')} reaches {value} when {results.carriage_name} has come to {where}"
-    whose = "the variant of the answer" if own == top else "the kept history nearest to the variant of the answer"
+    whose = "the variant of the answer" if own == top else "the kept history with the largest value"
     hang = f" {DOWN}" if "m" in map(results.sensors.get, sensors) else ""
     caption = (
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")

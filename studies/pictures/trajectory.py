@@ -7,8 +7,11 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.pictures.common.figures import Figure, draw, legend_of_all, shades
-from studies.results.formatting import scale_for
+from studies.findings.amplification import sizes
+from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades
+from studies.pictures.common.sweep_view import Curve, coincide
+from studies.pictures.common.traces import picked
+from studies.results.formatting import quantity, scale_for
 from studies.results.results import Index, Results, chosen
 
 MOST_ROWS = 4
@@ -18,17 +21,32 @@ MOST_ALIKE = 3.0  # longest over shortest history that can share an axis of seco
 
 def pictures(results: Results) -> list[Figure]:
     """The sensors, then the carriages' own motion, over time; none where no history was kept."""
-    shown = list(chosen(results.traced(), MOST_CURVES))
-    if not shown:
-        return []
     sensors = list(chosen(list(results.sensors), MOST_ROWS))
+    if not results.traced():
+        return []
+    own = picked(results, sizes(results, sensors[0]), results.size)[-1:]
+    shown = sorted({*own, *list(chosen(results.traced(), MOST_CURVES))[: MOST_CURVES - 1]})
     left_out = len(results.sensors) - len(sensors)
     more = f" {left_out} more sensors are in the archive." if left_out else ""
     many = f"{len(shown)} of {len(results.traced())} kept histories." if len(results.traced()) > len(shown) else ""
     units = {name: results.sensors[name] for name in sensors}
-    found = [_histories(results, "sensors", "Sensors over time", f"{many}{more}", units, shown)]
+    hang = " Displacements point down, as the body hangs." if "m" in units.values() else ""
+    title = _ranging(results, sensors[0], units[sensors[0]], results.noun(sensors[0]), shown)
+    found = [_histories(results, "sensors", title, f"{many}{more}{hang}", units, shown)]
     ways = _carriage_rows(results)
-    return [*found, *([_histories(results, "carriages", "Carriages over time", many, ways, shown)] if ways else [])]
+    if not ways:
+        return found
+    name = next(iter(ways))
+    title = _ranging(results, name, ways[name], name.replace("_", " "), shown)
+    return [*found, _histories(results, "carriages", title, many, ways, shown)]
+
+
+def _ranging(results: Results, name: str, unit: str, noun: str, shown: list[Index]) -> str:
+    """From where to where the histories of a result go."""
+    values = np.concatenate([results.trace(name, index).values for index in shown])
+    ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+    place = f" {results.place(name)}" if name in results.sensors else ""
+    return f"{noun.capitalize()}{place} goes from {ends[0]} to {ends[1]}"
 
 
 def _carriage_rows(results: Results) -> dict[str, str]:
@@ -52,12 +70,20 @@ def _draw(results: Results, units: dict[str, str], shown: list[Index], drawing: 
         traces = [results.trace(name, index) for index in shown]
         sizes = [float(np.abs(trace.values[np.isfinite(trace.values)]).max(initial=0.0)) for trace in traces]
         scale = scale_for(max(sizes), unit)
+        if len(traces) > 1 and coincide([Curve("", trace.times, trace.values) for trace in traces]):
+            axes.set_title("the same for all shown", loc="right", color=MUTED)
         for index, trace, colour in zip(shown, traces, shades(len(shown)), strict=True):
             times = trace.times / (trace.end if relative else 1.0)
             label = results.at(index).replace(", ", "\n")
             axes.plot(times, trace.values * scale.factor, color=colour, label=label, linewidth=1.3)
         words = name.replace("_", " ")
-        axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
+        if name not in results.sensors:
+            axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
+            continue
+        axes.set_ylabel(results.label(name, scale.unit))
+        axes.set_title(words)
+        if unit == "m":
+            axes.invert_yaxis()
     rows[-1].set_xlabel("time over the duration of the motion" if relative else "time (s)")
     drawing.align_ylabels()
     if len(shown) > 1:

@@ -234,7 +234,7 @@ def test_chosen_maps_alone_are_computed() -> None:
     assert "growth" not in dataset and "critical_step" not in dataset
     assert [figure.name for figure in KIND.figures(Results(dataset, asked))] == ["lagged-inertia", "overshoot"]
     facts = [row.name for row in report._facts(Results(dataset, asked), "point")]
-    assert facts == ["kind of study", "modes", "steps"]  # one point has no table of statuses
+    assert facts == ["kind of study"]  # one point has no table of statuses
     assert report._statuses(Results(dataset, asked), "point") == []
 
 

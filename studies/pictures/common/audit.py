@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, MUTED, VERMILION, Figure, draw, legend_beside, logarithmic, on_method
-from studies.results.formatting import counted
+from studies.results.formatting import counted, number
 from studies.results.results import PACES, Axis, Results
 from studies.runs.audit import relative_errors
 
@@ -26,11 +26,13 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
     axis = results.axis(*PACES) or next((axis for axis in results.axes if len(axis.values) > 1), None)
     if group is None or axis is None or not np.isfinite(relative_errors(group)).any():
         return []
+    worst = float(np.nanmax(relative_errors(group)))
+    title = f"The audit found errors of at most {number(worst, 2)} times the tolerance"
     caption = (
         f"{counted(group.sizes['sample'], 'variant')} computed again with all terms, more modes and more steps, and "
         "one level beyond. Of every variant the largest error over its tolerance, among the results that have one."
     )
-    return [on_method(draw("audit", "Errors that the audit observed", caption, HEIGHT, partial(_draw, group, axis)))]
+    return [on_method(draw("audit", title, caption, HEIGHT, partial(_draw, group, axis)))]
 
 
 def _draw(group: xr.Dataset, axis: Axis, drawing: Drawing) -> None:

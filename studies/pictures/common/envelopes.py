@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from studies.pictures.common.figures import HAIR, INK, Figure, draw, legend_of_all, shades, zero_line
+from studies.results.findings_common import told_envelopes
 from studies.results.formatting import counted, scale_for
 from studies.results.results import Index, Results, chosen, spread
 
@@ -23,9 +24,9 @@ def pictures(results: Results) -> list[Figure]:
         return []
     shown = list(chosen(names, MOST_ENVELOPES))
     height = 0.8 + 2.1 * len(shown)
-    return [
-        draw("envelopes", "Along the body", _caption(results, names, shown), height, partial(_draw, results, shown))
-    ]
+    title = told_envelopes(results)[list(results.envelopes).index(names[0])].partition(": ")[2].rstrip(".")
+    title = f"{title[0].upper()}{title[1:]}"
+    return [draw("envelopes", title, _caption(results, names, shown), height, partial(_draw, results, shown))]
 
 
 def _caption(results: Results, names: list[str], shown: list[str]) -> str:

@@ -28,16 +28,6 @@ def picked(results: Results, rank: Array | None, most: int) -> list[Index]:
     return [traced[round((i + 1) * (len(traced) - 1) / most)] for i in range(most)]
 
 
-def nearest(results: Results, place: Index, others: list[Index]) -> list[Index]:
-    """The kept history of a variant, or that of the nearest on the sweep's grid, after others without it."""
-    traced = results.traced()
-    if not traced:
-        return []
-    step = np.maximum(np.array(results.shape, dtype=np.float64) - 1.0, 1.0)
-    own = min(traced, key=lambda index: float(np.abs((np.subtract(index, place)) / step).sum()))
-    return [*(index for index in others if index != own), own]
-
-
 def over_way(results: Results, sensor: str, index: Index) -> Way:
     """The history of a sensor over the way of the first carriage, which goes on at the last speed when it has left."""
     trace = results.trace(sensor, index)

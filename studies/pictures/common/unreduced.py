@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, on_method, zero_line
-from studies.results.formatting import counted, scale_for
+from studies.results.formatting import counted, percent, scale_for
 from studies.results.results import Results
 from studies.runs.unreduced import compared_variants
 
@@ -30,7 +30,8 @@ def pictures(results: Results, group: xr.Dataset | None) -> list[Figure]:
     names = _shown(group)
     height = 0.8 + 1.8 * len(names)
     caption = _caption(results, group, sample, len(names))
-    title = "Against the unreduced finite-element model"
+    gap = percent(float(np.nanmax(np.asarray(group["difference"].values, dtype=np.float64))))
+    title = f"The march of modes follows the unreduced finite-element model within {gap} of the range"
     return [on_method(draw("unreduced", title, caption, height, partial(_draw, group, sample, names)))]
 
 
