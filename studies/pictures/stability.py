@@ -21,10 +21,13 @@ from studies.pictures.common.figures import (
     shades,
 )
 from studies.pictures.stability_details import OVERSHOOT, RIGID_TIE, SEPARATION, Drawn
-from studies.results.formatting import counted, number
+from studies.results.formatting import counted, number, percent
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+GROWS = 1.001  # per period: less is rounding
 
 
 def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:
@@ -32,7 +35,7 @@ def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:
     found = []
     for name in names:
         drawn = DRAWN[name]
-        found.append(draw(name, drawn.title, drawn.caption, drawn.height, partial(drawn.fill, dataset)))
+        found.append(draw(name, drawn.title(dataset), drawn.caption, drawn.height, partial(drawn.fill, dataset)))
     return found
 
 
@@ -105,7 +108,7 @@ def _alias(dataset: xr.Dataset, drawing: Drawing) -> None:
 def _shuttle(dataset: xr.Dataset, drawing: Drawing) -> None:
     """Multipliers over frequency and mass, without and with damping, and the tongue's line."""
     rows = drawing.subplots(1, 2, sharey=True)
-    edges = [1.001, 1.05, 1.2, 1.5, 2.0, 3.0]
+    edges = [GROWS, 1.05, 1.2, 1.5, 2.0, 3.0]
     mass = dataset["shuttle_mass_ratio"].values
     for axes, damping in zip(rows, dataset["shuttle_damping_ratio"].values, strict=True):
         grid = dataset["multiplier"].sel(shuttle_damping_ratio=damping).values
@@ -144,9 +147,41 @@ def _frozen(dataset: xr.Dataset, drawing: Drawing) -> None:
     legend_beside(np.atleast_1d(rows)[-1])
 
 
+def _schemes_title(dataset: xr.Dataset) -> str:
+    """How many schemes blow up, and from which step on."""
+    limits = dataset["critical_step"].values
+    known = limits[np.isfinite(limits)]
+    if not known.size:
+        return "No scheme blows up, however long the step"
+    return f"{known.size} of {limits.size} schemes blow up over long steps, first from ω h = {number(known.min())} on"
+
+
+def _lagged_title(dataset: xr.Dataset) -> str:
+    """From which mass on lagged inertia blows up."""
+    critical = dataset["critical_mass_ratio"].values
+    if not np.isfinite(critical).any():
+        return "Inertia that lags a step blows up at no mass"
+    least = number(float(np.nanmin(critical)), 2)
+    return f"Inertia that lags a step blows up from mass ratio {least} on, with most modes"
+
+
+def _alias_title(dataset: xr.Dataset) -> str:
+    """How fast vibrations grow below the rule's steps."""
+    few = dataset["growth"].where(dataset["step_multiple"] < 1.0)
+    return f"With fewer steps than the alias rule's, vibrations grow up to {number(float(few.max()))} times per passage"
+
+
+def _shuttle_title(dataset: xr.Dataset) -> str:
+    """The part of the map in which a swinging mass shakes its body."""
+    grown = dataset["multiplier"].isel(shuttle_damping_ratio=0).values > GROWS
+    damping = percent(float(dataset["shuttle_damping_ratio"][0]))
+    part = percent(float(grown.mean()))
+    return f"A swinging mass shakes its body ever more in {part} of the map at damping {damping}"
+
+
 DRAWN: Mapping[str, Drawn] = {
     "schemes": Drawn(
-        "Up to which step is a scheme stable?",
+        _schemes_title,
         "A vibration without damping, marched 50 steps by every scheme: above 1 it grows from step to step although "
         "nothing drives it. Dots are closed forms. The step counts in units of the fastest vibration that the model "
         "keeps, ω its frequency and h the step.",
@@ -154,14 +189,14 @@ DRAWN: Mapping[str, Drawn] = {
         _schemes,
     ),
     "lagged-inertia": Drawn(
-        "How heavy may a mass be whose inertia lags a step?",
+        _lagged_title,
         "Frozen: the mass is held at midspan and its inertia force is taken from the step before, as in a coupling of "
         "two programs. Left: from which mass on that grows. Right: how fast, at the middle one of the steps.",
         3.2,
         _lagged,
     ),
     "alias": Drawn(
-        "How many steps keep the march from resonating with itself?",
+        _alias_title,
         "Growth of the fastest-growing vibration from passage to passage, largest over mass ratios 0.25 to 1; one "
         "curve per number of modes and speed ratio. The truth is what curves come to at the right. The line is the "
         "rule that the program keeps to, with a margin of 1.5.",
@@ -169,14 +204,14 @@ DRAWN: Mapping[str, Drawn] = {
         _alias,
     ),
     "shuttle": Drawn(
-        "When does a swinging mass shake its body?",
+        _shuttle_title,
         "Largest growth per period of a mass that swings over the whole body, s = L/2 + L/2 sin(Ωt), 3 modes. Dark is "
         "stable.",
         3.2,
         _shuttle,
     ),
     "frozen": Drawn(
-        "A frozen station is not a passage",
+        lambda dataset: "A frozen station is not a passage",
         "Frozen (dashed): the mass is held at midspan, but the terms of its speed act. Where the stiffness that they "
         "leave is negative it diverges; on supports that are not alike it may also swing ever more (flutter), at any "
         "speed. Passage: the mass really crosses at that speed.",

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from studies.maps.rigid import INERTIAL, STEPS
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import legend_beside, logarithmic, printed, shades, zero_line
+from studies.results.formatting import number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,9 +20,9 @@ NOTABLE = 1.1  # overshoot from which on a scheme gets a colour
 
 
 class Drawn(NamedTuple):
-    """How a map is drawn: title, caption, height in inches, and what fills it."""
+    """How a map is drawn: title from its results, caption, height in inches, and what fills it."""
 
-    title: str
+    title: Callable[[Any], str]
     caption: str
     height: float
     fill: Callable[[Any, Drawing], None]
@@ -103,15 +104,31 @@ def _calmest(dataset: xr.Dataset) -> str:
     return str(ties[int(np.argmin(departure))])
 
 
+def _separation_title(dataset: xr.Dataset) -> str:
+    """From which speed on the mass lifts off first."""
+    onset = dataset["separation_onset"].values
+    if not np.isfinite(onset).any():
+        return "The mass keeps its contact at all speeds"
+    return f"The mass would lift off from {number(float(np.nanmin(onset)), 2)} of the critical speed on"
+
+
+def _rigid_title(dataset: xr.Dataset) -> str:
+    """How strongly a mass rings that is tied by its place."""
+    ringing = dataset["contact_ringing"].values[dataset["tie"].values != INERTIAL]
+    if not np.isfinite(ringing).all():
+        return "A mass that is tied by its place makes some schemes blow up"
+    return f"A mass that is tied by its place rings by up to {number(float(ringing.max()), 2)} times its weight"
+
+
 SEPARATION = Drawn(
-    "From which speed on would the mass lift off?",
+    _separation_title,
     "Smallest contact force on the first 98 % of the way over the weight; below zero the track would have to pull. "
     "From there on (thin) the equations are no longer true and the program marks the variant as separated.",
     3.0,
     _separation,
 )
 OVERSHOOT = Drawn(
-    "Stable schemes may still overshoot",
+    lambda dataset: "Stable schemes may still overshoot",
     "An oscillator without damping is deflected and let go. With steps much longer than its period (ω h large) the "
     "first 20 steps of some stable schemes throw it far beyond 1. Left: displacement. Right: velocity over ω times the "
     "first deflection.",
@@ -119,7 +136,7 @@ OVERSHOOT = Drawn(
     _overshoot,
 )
 RIGID_TIE = Drawn(
-    "Does a mass ring that is tied by its place?",
+    _rigid_title,
     f"The contact force of one passage of {STEPS} steps: the mass as inertia, as the program marches it, and tied by "
     "its place, by average acceleration and by the scheme that follows best. Right: how strongly the force jumps up "
     "and down from step to step.",

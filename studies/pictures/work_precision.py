@@ -14,13 +14,16 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, shades
+from studies.precision import findings as advice
 from studies.precision.findings import QUANTITY_WORDS, scheme_words, short_time
 from studies.precision.pareto import automatic_choices, choices
+from studies.results.formatting import number
 
 if TYPE_CHECKING:
     import xarray as xr
 
 COLUMNS = 2
+WANTED = 1e-3  # the error that the first figure's title speaks of
 LARGEST_SHOWN = 1.0
 TIME = "time per variant"
 DIAMOND: dict[str, Any] = {
@@ -57,18 +60,46 @@ def pictures(dataset: xr.Dataset) -> list[Figure]:
             "asked: where the bar is at the line, the choice costs as little as can be."
         )
     found = [
-        _panels(dataset, ("trade", "Accuracy of histories against time, steps and modes"), both, height, _draw_trade),
-        _panels(dataset, ("cost", "Error of histories against time, equal modes"), cost, height, _draw_cost),
+        _panels(dataset, ("trade", _first_clause(advice.lead(dataset, WANTED))), both, height, _draw_trade),
+        _panels(dataset, ("cost", _cost_title(dataset)), cost, height, _draw_cost),
     ]
     if np.isfinite(dataset["fitted_order"].sel(quantity="history")).any():
         low = 0.9 + 0.24 * dataset.sizes["scheme"]
-        found.append(draw("orders", "Measured orders", ORDERS, low, partial(_orders, dataset)))
+        found.append(draw("orders", _orders_title(dataset), ORDERS, low, partial(_orders, dataset)))
     for quantity in map(str, dataset["quantity"].values):
-        title = f"Error of {QUANTITY_WORDS[quantity]} against steps"
+        title = _steps_title(dataset, quantity)
         drawn = partial(_draw_steps, quantity=quantity)
         extra = EXTRA.get(quantity, "")
         found.append(_panels(dataset, (f"steps-{quantity}", title), f"{orders}{extra}", height, drawn))
     return found
+
+
+def _first_clause(text: str) -> str:
+    """A sentence up to its first colon, without its full stop."""
+    return text.partition(": ")[0].rstrip(".")
+
+
+def _cost_title(dataset: xr.Dataset) -> str:
+    """The longest and shortest time of a variant."""
+    times = dataset["seconds_per_variant"].values
+    ends = [short_time(float(end)) for end in (np.nanmin(times), np.nanmax(times))]
+    return f"With equal modes a variant takes {ends[0]} to {ends[1]}, and more steps err less"
+
+
+def _orders_title(dataset: xr.Dataset) -> str:
+    """The range of the fitted orders of histories."""
+    orders = dataset["fitted_order"].sel(quantity="history").values
+    low, high = (number(float(end), 2) for end in (np.nanmin(orders), np.nanmax(orders)))
+    return f"Errors of whole histories fall with order {low}{'' if low == high else f' to {high}'} of the steps"
+
+
+def _steps_title(dataset: xr.Dataset, quantity: str) -> str:
+    """The smallest error that steps alone come to."""
+    errors = dataset["error"].sel(quantity=quantity).values
+    known = errors[np.isfinite(errors) & (errors > 0.0)]
+    words = QUANTITY_WORDS[quantity]
+    least = f" to {number(float(known.min()), 2)} at best" if known.size else ""
+    return f"The error of {words} falls with the steps{least}"
 
 
 ORDERS = (
@@ -101,8 +132,8 @@ def _fill(dataset: xr.Dataset, fill: Any, drawing: Drawing) -> None:
     is_time = places[0].get_xlabel() == TIME
     for axes in grid[:, 0]:
         axes.set_ylabel("error")
-    for number, axes in enumerate(places[: len(scenes)]):
-        if number + columns >= len(scenes):
+    for place, axes in enumerate(places[: len(scenes)]):
+        if place + columns >= len(scenes):
             axes.set_xlabel(axes.get_xlabel() or "")
             axes.xaxis.set_tick_params(labelbottom=True)
         else:

@@ -70,7 +70,7 @@ def findings(dataset: xr.Dataset, wanted: Sequence[float]) -> list[str]:
     told = [advice(dataset, scene, quantity, wanted) for quantity in quantities for scene in scenes]
     told += [steps_alone(dataset, scene, "history", wanted) for scene in scenes]
     rest = [_orders(dataset), _gain(dataset), _failed(dataset), *_solvers(dataset), _jax(dataset), _references(dataset)]
-    return [_lead(dataset, max(wanted)), READING, *automatic(dataset), *told, *(text for text in rest if text)]
+    return [lead(dataset, max(wanted)), READING, *automatic(dataset), *told, *(text for text in rest if text)]
 
 
 def advice(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[float]) -> str:
@@ -175,7 +175,7 @@ def _with_modes(choice: Choice) -> str:
     return f"{_taken(choice)} and {counted(choice.modes, 'mode')} {with_it} static correction"
 
 
-def _lead(dataset: xr.Dataset, tolerance: float) -> str:
+def lead(dataset: xr.Dataset, tolerance: float) -> str:
     """The cheapest way to an accuracy over all scenes, and in how many there is none."""
     taken, missed, unknown = _judged(dataset, tolerance)
     total = len(taken) + missed + len(unknown)
