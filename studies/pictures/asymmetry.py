@@ -24,6 +24,7 @@ from studies.pictures.common.sweep_view import (
     along_axis,
     draw_curves,
     draw_map,
+    one_legend,
     view,
 )
 from studies.pictures.common.traces import odd_part, over_position, picked, there_and_back
@@ -217,14 +218,13 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
         for axes, name, title in zip(row, ("odd_rms", "even_excess"), ("odd part", "even excess"), strict=True):
             curves = seen.curves(seen.results.of_sensor(name, sensor))
             draw_curves(axes, seen, [curve._replace(y=100.0 * curve.y) for curve in curves])
-            if (axes is row[0] or row is not grid[0]) and axes.get_legend() is not None:
-                axes.get_legend().remove()
             if any((curve.y > 0.0).any() for curve in curves):
                 logarithmic(axes.yaxis)
             for threshold in THRESHOLDS:
                 axes.axhline(100.0 * threshold, color=look.MUTED, linestyle=":", linewidth=0.9)
             axes.set_title(f"{title}, {sensor}")
         row[0].set_ylabel("% of the static range")
+    one_legend([axes for row in grid for axes in row[::-1]])
     for axes in grid[-1]:
         along_axis(axes, seen)
 

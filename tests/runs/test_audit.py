@@ -169,7 +169,7 @@ def test_the_command_says_it_and_ends_with_3(
     assert audit["largest_observed_error"] > audit["tolerance"] == 1e-7
     assert main(["report", "small.nc"]) == 0
     page = (tmp_path / "small-report" / "report.html").read_text(encoding="utf-8")
-    assert "Asked 1e-7, audit of 5 variants found at most" in page and "Errors that the audit observed" in page
+    assert "Asked 1e-7, audit of 5 variants found at most" in page and "The audit found errors of at most" in page
     assert list((tmp_path / "small-report").glob("*-audit.svg"))
 
 
