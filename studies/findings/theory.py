@@ -75,7 +75,7 @@ def lag_factor(results: Results, sensor: str) -> int:
 def lag_formula(results: Results, sensor: str) -> str:
     """The formula in words."""
     twice = "2 × " if lag_factor(results, sensor) == 2 else ""
-    return f"{twice}damping ratio × speed / first circular frequency"
+    return f"what damping alone gives ({twice}damping ratio × speed / first circular frequency)"
 
 
 def frequency_ratio(results: Results) -> Any:

@@ -245,9 +245,8 @@ def _lag(results: Results, sensor: str) -> str:
         return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in every variant."
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
     return (
-        f"{sensor}: up to {axis.in_words(limit)} every variant lags within {percent(CLOSE)} of {formula}, as "
-        f"damping alone would have it: {calm}. Beyond, vibration left over from the turns (or the start) takes over, "
-        f"and the lag ranges from {span}."
+        f"{sensor}: up to {axis.in_words(limit)} every variant lags within {percent(CLOSE)} of {formula}: {calm}. "
+        f"Beyond, vibration left over from the turns (or the start) takes over, and the lag ranges from {span}."
     )
 
 
