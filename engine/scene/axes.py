@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fnmatch
+import json
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,6 +107,8 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             known = list(study.numbers())
             longer = [key for key in known if key.endswith(f".{path}")]
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
+            if several := fnmatch.filter(known, path) if "*" in path else []:
+                remedy = f"name each of them: of = {json.dumps(several[:3])}{' and so on' * (len(several) > 3)}"
             raise BadInput(
                 "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy
             )

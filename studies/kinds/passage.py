@@ -12,7 +12,7 @@ from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, number, quantity
-from studies.results.results import VARIANT, Axis, Index, Results, chosen, extreme
+from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,12 +65,26 @@ def _largest(results: Results, sensor: str) -> str:
         return f"{sensor}: no variant has values."
     shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""
     said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
+    where = f"{in_words(results, top)}{_at_the_end(results, top)}"
     if best is None:
-        return f"{said}{in_words(results, top)}."
-    amplified = f"{number(float(gain[best]))} times the static one"
+        return f"{said}{where}."
+    static = sizes(results, sensor)[best] / gain[best]
+    amplified = f"{number(float(gain[best]))} times the static {quantity(float(static), results.sensors[sensor])}"
     if best == top:
-        return f"{said}, {amplified},{in_words(results, top)}."
-    return f"{said}{in_words(results, top)}; relative to statics it is largest{in_words(results, best)}: {amplified}."
+        return f"{said}, {amplified},{where}."
+    return (
+        f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "
+        f"{amplified}."
+    )
+
+
+def _at_the_end(results: Results, place: Index) -> str:
+    """That a variant lies at an end of the swept pace, beyond which there may be more; "" where it does not."""
+    axis = results.axis(*PACES)
+    if axis is None or axis.dim == VARIANT:
+        return ""
+    value = axis.values[place[results.dims.index(axis.dim)]]
+    return f", an end of the swept {axis.noun}" if value in (axis.values.min(), axis.values.max()) else ""
 
 
 def _value(results: Results, sensor: str, place: Index) -> str:

@@ -15,7 +15,7 @@ from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
-from studies.results.formatting import counted, scientific
+from studies.results.formatting import counted, listed, percent, scientific
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 GROUP = "/audit"
+LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
 NONE_AUDITED = (
     "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
 )
@@ -157,7 +158,28 @@ class Verdict:
 
 
 def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
-    """In one sentence what was asked, estimated and observed; "" of results without estimates."""
+    """What was asked, estimated and observed, and what is far from exact as nothing holds it; "" where no estimates
+    are."""
+    return " ".join(text for text in (_held_accuracy(group, results), _not_held(results)) if text)
+
+
+def _not_held(results: Results) -> str:
+    """The extremes without a tolerance whose estimated errors are large, with the largest."""
+    if "estimated_error" not in results.dataset:
+        return ""
+    fine = results.dataset["status"] == int(Status.OK)
+    largest = results.dataset["estimated_error"].where(fine).max(results.dims)
+    loose = largest.where(np.isnan(results.dataset["tolerance"]) & (largest > LARGE))
+    told = [
+        f"{name} up to {percent(float(error))}"
+        for name, error in zip(results.dataset["result"].values, loose.values, strict=True)
+        if np.isfinite(error) and str(name).removesuffix("_max").removesuffix("_min") in results.sensors
+    ]
+    return f"Estimated, but held to no tolerance: {listed(told)}." if told else ""
+
+
+def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
+    """In one sentence what was asked, estimated and observed of all that is held."""
     if not is_marched(results.dataset) or "tolerance" not in results.dataset:
         return ""
     fine = results.dataset["status"].values == int(Status.OK)

@@ -111,6 +111,21 @@ def test_the_schema_knows_every_key_of_every_built_in_study(capsys: Captured) ->
         jsonschema.validate({"kind": "pasage"}, schema)
 
 
+def test_answers_say_what_is_not_held_and_where_a_sweep_ends(here: Path, capsys: Captured) -> None:
+    force = SMALL.replace('kind = "mass"\nmass = 1.0', 'kind = "force"\nforce = 10.0')
+    force = force.replace('mass = { of = "carriage.trolley.mass", values = [0.1, 1.0] }\n', "")
+    text = force.replace("[sweep]", '[sensor.shake]\nbody = "beam"\nat = 0.5\nquantity = "acceleration"\n\n[sweep]')
+    write(here, text)
+    shown = " ".join(output(capsys, "run", "small.toml").split())
+    assert "an end of the swept speed" in shown and "contact_force" not in shown
+    errors = open_archive("small.nc").root.estimated_error.sel(result="shake_max")
+    assert ("held to no tolerance: shake_max up to" in shown) == bool(errors.max() > 0.02)
+    wild = text.replace('of = "carriage.trolley.motion.speed"', 'of = "carriage.*.motion.speed"')
+    write(here, wild, "wild.toml")
+    assert main(["check", "wild.toml"]) == 2
+    assert 'of = ["carriage.trolley.motion.speed"]' in capsys.readouterr().err
+
+
 def test_percentiles_are_told(here: Path, capsys: Captured) -> None:
     write(here, f"{SMALL}\n[output]\npercentiles = [5, 50]\n")
     capsys.readouterr()
