@@ -134,7 +134,7 @@ def converge(
     share: Share = in_turn,
 ) -> Converged:
     """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and ``beyond``
-    levels more that are not dear; ``share`` does the marches of a level. Raises Halted."""
+    levels more; ``share`` does the marches of a level. Raises Halted."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, grid, levels, halted=halted, share=share)
@@ -160,11 +160,10 @@ def converge(
         found = _updated(found, active, now, spent, left_over)
         change[:, active] = apart
         off = worst_held(left_over, decisive, own.tighter)
-        dear = _is_dear(grid, own, levels, level + 1)
-        settled = (off <= part) | ((off <= DOUBTED) & dear)
+        settled = (off <= part) | ((off <= DOUBTED) & _is_dear(grid, own, levels, level + 1))
         found.settled[active] = settled
         found.spent[active] += spent["work"]
-        done = settled & ((left[active] == 0) | dear)
+        done = settled & (left[active] == 0)
         left[active] -= settled
         active = active[~done]
     return found
@@ -245,14 +244,9 @@ def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: in
 
 
 def usual_work(grid: SceneGrid) -> Array:
-    """(V,) about what an audit's last level takes of modes x steps: one beyond that of most references, where that is
-    not dear."""
+    """(V,) about what an audit's last level takes of modes x steps: one beyond that of most references."""
     levels = in_full(grid)
-    usual = min(USUAL_LEVEL, len(levels.numerics) - 1)
-    more = min(usual + 1, len(levels.numerics) - 1)
-    level = np.where(_is_dear(grid, grid.values, levels, more), usual, more)
-    work = [level_work(grid, grid.values, levels, number) for number in (usual, more)]
-    return _units(grid) * np.where(level == usual, *work)
+    return _units(grid) * level_work(grid, grid.values, levels, min(USUAL_LEVEL + 1, len(levels.numerics) - 1))
 
 
 def _units(grid: SceneGrid) -> float:

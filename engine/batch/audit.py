@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.groups import PACE, Group
+from engine.accuracy.groups import PACE, USED, Group
 from engine.accuracy.ladder import REFERENCE_PART
 from engine.accuracy.reference import (
     Converged,
@@ -108,6 +108,8 @@ def _compared(plan: Plan, group: Group, variants: Counts, truth: Converged, halt
     values = plan.values(group, own)
     archived = group.found(values, own, plan.choice, halted, "histories")
     known = (true.status < Status.NOT_CONVERGED) & (archived.outcome.status < Status.NOT_CONVERGED)
+    same = [truth.used[name][lanes] == archived.used[name] for name in USED]
+    known &= ~np.all(same, axis=0)  # a march is no second source of itself
     observed = differences(plan.asked, group.scene, values, archived.outcome, true)
     told = told_errors(archived, results_of(plan.asked))
     return Audit(own[known], observed[:, known], told[:, known], truth.error[:, lanes[known]], 0)

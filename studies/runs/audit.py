@@ -214,7 +214,7 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
         also = "further " if verdict.count else ""
         told.append(f"audit of {counted(verdict.marked, f'{also}variant')} that the archive marks itself{found}")
     if verdict.left_out:
-        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit had no values")
+        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit could not be compared")
     return told
 
 

@@ -70,6 +70,18 @@ def test_few_variants_are_audited_too() -> None:
     assert np.all(found.observed[:3] <= np.maximum(found.told[:3], 1e-4)) and np.all(found.doubt[:3] < 1e-3)
 
 
+def test_marches_that_are_dear_are_compared_with_others_too() -> None:
+    """The next level takes more than a reference of pilots is worth; without it a march would be its own judge."""
+    stiff = beam(length=2.5, area=0.03, second_moment=1e-4, youngs_modulus=110e9, density=7200.0, damping_ratio=0.04)
+    stiff |= {"supports": [{"at": at, "stiffness": 2e7} for at in (0.2, 1.25, 2.3)]}
+    motion = {"kind": "out-and-back", "start": 0.2, "end": 2.3, "speed": 3.0, "turn": 0.1, "cycles": 16}
+    sweep = {"weight": {"of": WEIGHT, "values": [240.0, 250.0]}}
+    plan = make_plan(study(stiff, mass(250.0, motion), sweep=sweep, sensor={"middle": {"body": "beam", "at": 1.25}}))
+    found = on(plan, [1])
+    names = [result.name for result in results_of(plan.asked)]
+    assert 0.0 < found.observed[names.index("middle_max"), 0] < 1e-3
+
+
 def test_variants_without_a_truth_are_left_out() -> None:
     """Parametric resonance without damping grows until nothing is left."""
     sweep = {"weight": {"of": WEIGHT, "values": [0.001, 1.0, 0.002]}}

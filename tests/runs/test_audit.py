@@ -128,7 +128,7 @@ def test_variants_without_values_are_left_out_and_counted() -> None:
     assert int(less["left_out"]) == 1
     xr.testing.assert_identical(less["observed_error"], whole["observed_error"].isel(sample=[0, 2, 3]))
     told = told_audit(less, Results.of(dataset))
-    assert told[-1] == "1 further variant picked for the audit had no values"
+    assert told[-1] == "1 further variant picked for the audit could not be compared"
     assert audit_group(plan, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
     assert told_audit(None, Results.of(dataset)) == []
 
