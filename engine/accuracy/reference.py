@@ -64,6 +64,16 @@ class Converged:
     spent: Array
 
 
+class Beyond(NamedTuple):
+    """So many levels more than are needed, unless they take more than so many modes x steps."""
+
+    levels: int
+    dear: float
+
+
+NO_FURTHER = Beyond(0, DEAR)
+
+
 def in_turn(jobs: Sequence[Callable[[], object]]) -> None:
     """Jobs one after the other."""
     for job in jobs:
@@ -129,12 +139,12 @@ def converge(
     values: VariantValues,
     levels: Levels,
     part: float,
-    beyond: int = 0,
+    beyond: Beyond = NO_FURTHER,
     halted: Halted = lambda: False,
     share: Share = in_turn,
 ) -> Converged:
-    """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and ``beyond``
-    levels more; ``share`` does the marches of a level. Raises Halted."""
+    """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and
+    levels ``beyond``; ``share`` does the marches of a level. Raises Halted."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, grid, levels, halted=halted, share=share)
@@ -146,7 +156,7 @@ def converge(
         np.zeros(values.size, dtype=np.bool_),
         spent["work"].copy(),
     )
-    change, left = np.full((len(results), values.size), np.nan), np.full(values.size, beyond, dtype=np.int64)
+    change, left = np.full((len(results), values.size), np.nan), np.full(values.size, beyond.levels, dtype=np.int64)
     active = np.arange(values.size)
     for level in range(1, len(levels.numerics)):
         active = active[_may_march(grid, values.part(active), levels, level)]
@@ -160,20 +170,21 @@ def converge(
         found = _updated(found, active, now, spent, left_over)
         change[:, active] = apart
         off = worst_held(left_over, decisive, own.tighter)
-        settled = (off <= part) | ((off <= DOUBTED) & _is_dear(grid, own, levels, level + 1))
+        too_dear = _is_dear(grid, own, levels, level + 1, beyond.dear)
+        settled = (off <= part) | ((off <= DOUBTED) & too_dear)
         found.settled[active] = settled
         found.spent[active] += spent["work"]
-        done = settled & (left[active] == 0)
+        done = settled & ((left[active] == 0) | too_dear)
         left[active] -= settled
         active = active[~done]
     return found
 
 
-def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> NDArray[np.bool_]:
+def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int, dear: float) -> NDArray[np.bool_]:
     """(V,) whether a level takes more work, over the whole time, than a closer reference is worth."""
     if level == len(levels.numerics):
         return np.zeros(values.size, dtype=np.bool_)
-    return _units(grid) * level_work(grid, values, levels, level) > DEAR
+    return _units(grid) * level_work(grid, values, levels, level) > dear
 
 
 def _left_over(change: Array, before: Array) -> Array:
@@ -243,10 +254,15 @@ def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: in
     return level_work(grid, values, levels, level) <= MOST_WORK
 
 
-def usual_work(grid: SceneGrid) -> Array:
-    """(V,) about what an audit's last level takes of modes x steps: one beyond that of most references."""
+def usual_work(grid: SceneGrid, dear: float) -> Array:
+    """(V,) about what an audit's last level takes of modes x steps: one beyond that of most references, where that is
+    not dear."""
     levels = in_full(grid)
-    return _units(grid) * level_work(grid, grid.values, levels, min(USUAL_LEVEL + 1, len(levels.numerics) - 1))
+    usual = min(USUAL_LEVEL, len(levels.numerics) - 1)
+    more = min(usual + 1, len(levels.numerics) - 1)
+    level = np.where(_is_dear(grid, grid.values, levels, more, dear), usual, more)
+    work = [level_work(grid, grid.values, levels, number) for number in (usual, more)]
+    return _units(grid) * np.where(level == usual, *work)
 
 
 def _units(grid: SceneGrid) -> float:

@@ -4,6 +4,7 @@ references of pilots have.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, USED, Group
 from engine.accuracy.ladder import REFERENCE_PART
 from engine.accuracy.reference import (
+    DEAR,
+    Beyond,
     Converged,
     Halted,
     Share,
@@ -70,11 +73,19 @@ def audit_size(plan: Plan) -> int:
     return count
 
 
+def _dear(plan: Plan) -> float:
+    """Modes x steps from which on a reference needs no further level. Variants that converge may have
+    come as far, and only a further level is a second source."""
+    return math.inf if plan.converges else DEAR
+
+
 def _seconds(plan: Plan, count: int) -> float:
     """Expected time of an audit on one thread."""
     share, found = min(1.0, count / plan.size), 0.0
     for grid in plan.grids:
-        work, number = np.unique(usual_work(grid), return_counts=True)  # each march has its tables, and whole blocks
+        work, number = np.unique(
+            usual_work(grid, _dear(plan)), return_counts=True
+        )  # each march has its tables, and whole blocks
         own = share * number
         lanes = np.maximum(own, LANES * np.minimum(1.0, own)) + TABLES * np.minimum(1.0, own)
         found += float(work @ lanes) * grid.scene.ties**1.2 / PACE
@@ -90,7 +101,9 @@ def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) 
 
     def of_scene(grid: SceneGrid, own: Counts) -> None:
         values = VariantValues(grid.scene.study, plan.cases.columns_of(own), own.size)
-        truth = converge(grid, values, in_full(grid), REFERENCE_PART, beyond=1, halted=halted, share=within)
+        truth = converge(
+            grid, values, in_full(grid), REFERENCE_PART, beyond=Beyond(1, _dear(plan)), halted=halted, share=within
+        )
         groups = [g for g in plan.groups if g.grid is grid and np.isin(own, g.variants).any()]
         within([partial(compare, group, own, truth) for group in groups])
 

@@ -76,7 +76,7 @@ def test_marches_that_are_dear_are_compared_with_others_too() -> None:
     stiff |= {"supports": [{"at": at, "stiffness": 2e7} for at in (0.2, 1.25, 2.3)]}
     motion = {"kind": "out-and-back", "start": 0.2, "end": 2.3, "speed": 3.0, "turn": 0.1, "cycles": 16}
     sweep = {"weight": {"of": WEIGHT, "values": [240.0, 250.0]}}
-    plan = make_plan(study(stiff, mass(250.0, motion), sweep=sweep, sensor={"middle": {"body": "beam", "at": 1.25}}))
+    plan = make_plan(study(stiff, mass(250.0, motion), sweep=sweep, sensor={"middle": {"body": "bed", "at": 1.25}}))
     found = on(plan, [1])
     names = [result.name for result in results_of(plan.asked)]
     assert 0.0 < found.observed[names.index("middle_max"), 0] < 1e-3
