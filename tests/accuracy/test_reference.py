@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.reference import DEAR, Beyond, Converged, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of
 from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import outcome
@@ -23,7 +23,7 @@ PART = 0.1  # of the tolerance by which an answer may still change
 
 
 def levels(grid: SceneGrid, part: float = PART, beyond: int = 0) -> Converged:
-    return converge(grid, grid.values, as_fixed(grid), part, beyond)
+    return converge(grid, grid.values, as_fixed(grid), part, Beyond(beyond, DEAR))
 
 
 def told(grid: SceneGrid, found: Converged, name: str) -> np.ndarray:
@@ -82,7 +82,7 @@ def test_what_is_told_is_no_less_than_the_truth(name: str) -> None:
     """Of the held results, against a level beyond those that changed by a hundredth."""
     grid = only_grid(SCENES[name])
     found = converge(grid, grid.values, in_full(grid), 0.5)
-    truth = converge(grid, grid.values, in_full(grid), 0.01, beyond=1)
+    truth = converge(grid, grid.values, in_full(grid), 0.01, beyond=Beyond(1, DEAR))
     off = differences(grid.asked, grid.scene, grid.values, found.outcome, truth.outcome)
     held = np.isfinite([result.tolerance for result in results_of(grid.asked)])
     over = off[held] / (found.error[held] + truth.error[held])
