@@ -337,8 +337,8 @@ def test_fault_43_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.Mo
     with monkeypatch.context() as patch:
         after_parts(patch, 1, signal.SIGINT)
         assert main(["run", "small.toml"]) == 130
-    key = Path("small.nc.parts/key").read_text(encoding="utf-8").strip()
-    assert key == run_key(engine.load("small.toml"))
+    key, name = Path("small.nc.parts/key").read_text(encoding="utf-8").splitlines()
+    assert name == "small.toml" and key == run_key(engine.load("small.toml"))
     for path in Path("small.nc.parts").glob("*.nc"):
         with xr.open_dataset(path) as part:
             assert part.attrs["run_key"] == key
