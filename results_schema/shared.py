@@ -338,8 +338,8 @@ declare(
         "left_out",
         (),
         "int64",
-        long_name="variants that were picked for the audit and have no values, or whose reference has none",
-        meaning="not among the samples",
+        long_name="variants that were picked for the audit and could not be compared",
+        meaning="not among the samples: no values, no reference, or none but the very march of the archive",
         lead="none",
     ),
 )

@@ -74,8 +74,8 @@ def audit_size(plan: Plan) -> int:
 
 
 def _dear(plan: Plan) -> float:
-    """Modes x steps from which on a reference needs no further level. Variants that converge may have
-    come as far, and only a further level is a second source."""
+    """Modes x steps from which on a reference needs no further level. Variants that converge may have come as far, so
+    that only a further level is a second source of them."""
     return math.inf if plan.converges else DEAR
 
 
@@ -83,9 +83,8 @@ def _seconds(plan: Plan, count: int) -> float:
     """Expected time of an audit on one thread."""
     share, found = min(1.0, count / plan.size), 0.0
     for grid in plan.grids:
-        work, number = np.unique(
-            usual_work(grid, _dear(plan)), return_counts=True
-        )  # each march has its tables, and whole blocks
+        # each march has its tables, and whole blocks
+        work, number = np.unique(usual_work(grid, _dear(plan)), return_counts=True)
         own = share * number
         lanes = np.maximum(own, LANES * np.minimum(1.0, own)) + TABLES * np.minimum(1.0, own)
         found += float(work @ lanes) * grid.scene.ties**1.2 / PACE

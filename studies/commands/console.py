@@ -276,7 +276,7 @@ def show_comparison(found: Comparison) -> None:
         (
             one.name,
             quantity(one.largest, one.units),
-            "no estimate" if one.beyond is None else f"{one.beyond:,}",
+            f"{one.beyond:,}",
             one.where,
         )
         for one in found.differences
@@ -285,6 +285,8 @@ def show_comparison(found: Comparison) -> None:
     if rows:
         _output().line()
         table("", ("result", "largest difference", "beyond both errors", "at"), rows)
+    if found.only_in_one:
+        paragraphs(f"Only in one of them, or in another shape: {', '.join(found.only_in_one)}.")
     same = [one.name for one in found.differences if not one.largest]
     if same:
         paragraphs(f"Equal in every variant: {', '.join(same)}.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -236,9 +237,11 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     """
     from studies.protocol.parts import Memory, Work
 
+    started = time.perf_counter()
     parts, store = kind_of(study).parts(study), Memory()
     parts.compute(store, Work(**options))
-    return compared(parts.gather(store), study)
+    found = compared(parts.gather(store), study)
+    return found.assign_attrs(run_seconds=round(time.perf_counter() - started, 3))
 
 
 def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:

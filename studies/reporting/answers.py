@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from studies.pictures.common.figures import Figure
 
 
-MOST_SAID = 4
+MOST_SAID = 4  # of the sentences at the end of a run, which are to stay on the screen; the report has all
 
 
 def answer(dataset: xr.Dataset) -> list[str]:

@@ -13,8 +13,8 @@ import numpy as np
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status, label
-from studies.reporting.summary import asked
-from studies.results.results import Results, extreme
+from studies.reporting.summary import Range, asked
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,20 +29,21 @@ class Change(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A result in both archives: the largest difference (second less first), where, and in how many variants it is
-    larger than both estimated errors together; None where no estimate exists."""
+    """A result in both archives: the largest difference (second less first; NaN where one has no number), where, and in
+    how many variants it is not known to lie within both estimated errors together."""
 
     name: str
     units: str
     largest: float
     where: str
-    beyond: int | None
+    beyond: int
 
 
 @dataclass(frozen=True)
 class Comparison:
     """What differs between two archives. variants: in both; only_first, only_second: in one of them. statuses: how many
-    went from which status to which."""
+    went from which status to which. only_in_one: results that the other has not, or not in the same shape.
+    """
 
     changes: list[Change]
     variants: int
@@ -50,13 +51,12 @@ class Comparison:
     only_second: int
     statuses: Mapping[tuple[str, str], int]
     differences: list[Difference]
+    only_in_one: list[str]
 
     @property
     def agree(self) -> bool:
         """Whether the variants of both have the same statuses, and results that their errors explain."""
-        return not self.statuses and not any(
-            found.beyond or (found.beyond is None and found.largest) for found in self.differences
-        )
+        return not (self.statuses or self.only_in_one) and not any(found.beyond for found in self.differences)
 
 
 def compare(first: Results, second: Results) -> Comparison:
@@ -70,14 +70,16 @@ def compare(first: Results, second: Results) -> Comparison:
             expected=", ".join(first.dims) or "no axes",
         )
     mine, other = xr.align(first.dataset, second.dataset, join="inner", exclude=_not_swept(first, second))
-    both, own = Results(mine, first.study), Results(other, second.study)
+    both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
+    found, missing = _shared(both, own)
     return Comparison(
         changes=list(_changes(*(dict(_leaves(tomllib.loads(one.study.source.text))) for one in (first, second)))),
         variants=both.size,
         only_first=first.size - both.size,
         only_second=second.size - both.size,
         statuses=_statuses(both, own) if both.size else {},
-        differences=list(_differences(both, own)) if both.size else [],
+        differences=list(_differences(both, own, found)) if both.size else [],
+        only_in_one=missing,
     )
 
 
@@ -101,44 +103,48 @@ def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Ch
             yield Change(key, first.get(key), second.get(key))
 
 
+def _shared(first: Results, second: Results) -> tuple[list[tuple[Range, str]], list[str]]:
+    """The results of the first that the second has in the same shape, with full names; the names of others."""
+    mine, other = ({f"{one.name} {one.sensor}".strip(): one for one in asked(results)} for results in (first, second))
+    shared = {
+        name: found
+        for name, found in mine.items()
+        if name in other and _of(first, found).shape == _of(second, other[name]).shape
+    }
+    return [(found, name) for name, found in shared.items()], sorted((set(mine) | set(other)) - set(shared))
+
+
 def _statuses(first: Results, second: Results) -> dict[tuple[str, str], int]:
     pairs = zip(first.dataset["status"].values.ravel(), second.dataset["status"].values.ravel(), strict=True)
     counts = Counter((label(Status(int(old))), label(Status(int(new)))) for old, new in pairs if old != new)
     return dict(counts)
 
 
-def _differences(first: Results, second: Results) -> Iterator[Difference]:
-    for found in asked(first):
-        if found.name not in second.dataset:
-            continue
-        old, new = (_of(results, found.name, found.sensor) for results in (first, second))
-        if old.dims != new.dims or old.shape != new.shape:
-            continue
-        apart = np.asarray(new.values - old.values, dtype=np.float64)
-        place = extreme(np.abs(apart))
-        if place is None:
-            continue
+def _differences(first: Results, second: Results, names: list[tuple[Range, str]]) -> Iterator[Difference]:
+    for found, name in names:
+        old, new = (_of(results, found).values.astype(np.float64) for results in (first, second))
+        apart = np.where((old == new) | (np.isnan(old) & np.isnan(new)), 0.0, np.abs(new - old))
+        # np.argmax takes a NaN, a number in one of them alone, for the largest
+        place = tuple(map(int, np.unravel_index(int(np.argmax(apart)), apart.shape))) if apart.ndim else ()
+        beyond = int(np.count_nonzero((apart != 0.0) & ~(apart <= _allowed(first, second, name, found.name, apart))))
         where = first.at(place[: len(first.dims)])
-        beyond = _beyond(first, second, f"{found.name} {found.sensor}".strip(), found.name, np.abs(apart))
-        yield Difference(f"{found.name} {found.sensor}".strip(), found.units, float(apart[place]), where, beyond)
+        yield Difference(name, found.units, float(new[place] - old[place]) if apart[place] else 0.0, where, beyond)
 
 
-def _of(results: Results, name: str, sensor: str) -> xr.DataArray:
-    array = results.of_sensor(name, sensor) if sensor else results.dataset[name]
+def _of(results: Results, found: Range) -> xr.DataArray:
+    array = results.of_sensor(found.name, found.sensor) if found.sensor else results.dataset[found.name]
     return array.transpose(*results.dims, ...)
 
 
-def _beyond(first: Results, second: Results, result: str, name: str, apart: Array) -> int | None:
-    """In how many variants two results differ by more than both estimated errors, relative to their size."""
+def _allowed(first: Results, second: Results, result: str, name: str, apart: Array) -> Array:
+    """Both estimated errors of a result together, in its unit; NaN where no estimate exists."""
     errors = []
     for results in (first, second):
-        if "estimated_error" not in results.dataset or result not in results.dataset["result"].values:
-            return None
+        known = results.dataset["result"].values if "estimated_error" in results.dataset else ()
+        if result not in known or apart.shape != results.shape:
+            return np.full(apart.shape, np.nan)
         errors.append(results.dataset["estimated_error"].sel(result=result).transpose(*results.dims).values)
-    allowed = (errors[0] + errors[1]) * _size(first, name, apart.shape)
-    if apart.shape != allowed.shape or not np.isfinite(allowed).any():
-        return None
-    return int(np.count_nonzero(apart > allowed))
+    return np.asarray((errors[0] + errors[1]) * _size(first, name, apart.shape), dtype=np.float64)
 
 
 def _size(results: Results, name: str, shape: tuple[int, ...]) -> Array:

@@ -187,7 +187,7 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     if not estimates.size or not tolerances.size:
         return ""
     span = " to ".join(scientific(float(end)) for end in sorted({tolerances.min(), tolerances.max()}))
-    said = f"estimated errors at most {scientific(float(estimates.max()))} of the static size where {span} was asked"
+    said = f"estimated errors at most {scientific(float(estimates.max()))} where {span} was asked"
     if group is None or not (verdict := Verdict.of(group)).count:
         return f"{said}; no variant was audited."
     audit = f"{counted(verdict.count, 'variant')} computed again with more of everything"

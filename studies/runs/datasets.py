@@ -30,7 +30,7 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
 
     results = Results.of(dataset) if study is None else Results(dataset, study)
     key = run_key(results.study, kind_of(results.study).parts(results.study).names)
-    root = dataset.assign_attrs(attributes(results.study, key, float(dataset.attrs.get("run_seconds", 0.0))))
+    root = dataset.assign_attrs(attributes(results.study, key, float(dataset.attrs["run_seconds"])))
     models = model_groups(base_scene(results.study))
     return Archive(Path(path), root, with_first_frequency(models, results) if results.study.carriage else models)
 
