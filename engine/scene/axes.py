@@ -112,6 +112,14 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             raise BadInput(
                 "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy
             )
+        if not study.targets(path):
+            raise BadInput(
+                "this number of a train cannot be swept",
+                where=where,
+                expected="spacing (one for all), spacing_scale, load_scale, a load or a number of the motion",
+                received=shortened(path),
+                remedy="a study file for each",
+            )
 
 
 def _ends(study: Study, name: str, axis: SweepAxis) -> Range:
@@ -138,10 +146,10 @@ def _read_at(study: Study, path: str, amount: Any, entry: str) -> Number:
 def _table_around(study: Study, path: str) -> dict[str, Any]:
     """The least data that make a scene in which the key can be set."""
     top, *rest = path.split(".")
-    data = study.data
+    data = study.tables
     if top not in data:
         return {"kind": study.kind}
-    named = isinstance(data[top], dict) and top in ("body", "carriage", "sensor")
+    named = isinstance(data[top], dict) and top in ("body", "carriage", "sensor", "train")
     return {"kind": study.kind, top: {rest[0]: data[top][rest[0]]} if named else data[top]}
 
 

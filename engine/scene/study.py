@@ -18,6 +18,7 @@ from engine.bodies.modal.section_doubts import Doubt
 from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
+from engine.scene.trains import Trains, axle_name, with_axles
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
 from engine.study_file.spec import Keys, Noun, Spec, field_at, nearest, one_of, refuse
@@ -52,7 +53,7 @@ def _kind_name(kind: str) -> str:
 Statuses = Annotated[tuple[Annotated[str, AfterValidator(one_of(*EXPECTABLE))], ...], Strict(False)]
 
 
-class Scene(Spec):
+class Scene(Trains):
     """Every table of a study file, each valid by itself; `Study` adds what must hold between them."""
 
     schema_version: Annotated[int, AfterValidator(_known_version)] = SCHEMA_VERSION
@@ -83,14 +84,16 @@ class Study(Scene):
 
     _source: Source = PrivateAttr()
     _data: dict[str, Any] = PrivateAttr()
+    _tables: dict[str, Any] = PrivateAttr()
 
     def __init__(self, document: Document | None = None, /, **keywords: Any) -> None:
         given = document if document is not None else document_of({"schema_version": SCHEMA_VERSION, **keywords})
+        whole = with_axles(given)
         try:
-            super().__init__(**given.data)
+            super().__init__(**whole.data)
         except ValidationError as error:
-            refuse(error, Scene, given.data, given.source)
-        self._source, self._data = given.source, given.data
+            refuse(error, Scene, whole.data, whole.source)
+        self._source, self._data, self._tables = whole.source, given.data, whole.data
         _check_swept_words(self)
         _check_names(self)
         _check_references(self)
@@ -105,6 +108,11 @@ class Study(Scene):
     def data(self) -> dict[str, Any]:
         """The tables as they were written, without defaults; not to be changed."""
         return self._data
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The same with a carriage for every axle of a train."""
+        return self._tables
 
     def _repr_html_(self) -> str:
         """How notebooks show it: title, kind, what is swept, and the file."""
@@ -156,8 +164,17 @@ class Study(Scene):
 
     def unit(self, path: str) -> Unit | None:
         """Dimension of the number at a dotted key; None for integers such as a number of modes."""
-        place = field_at(Scene, self._data, path.split("."))
+        place = field_at(Scene, self._tables, path.split("."))
         return place.unit if place else None
+
+    def targets(self, path: str) -> dict[str, float]:
+        """The numbers that a swept key sets, by dotted key, each with the factor of the swept value: itself, or those
+        of a train's axles; none where they do not grow in proportion."""
+        table, name, key = (*path.split(".", 2), "", "")[:3]
+        if table != "train" or name not in self.train:
+            return {path: 1}
+        follow = self.train[name].follow(key)
+        return {f"carriage.{axle_name(name, axle)}.{own}": factor for axle, own, factor in follow}
 
     def with_values(self, values: Mapping[str, Any]) -> Study:
         """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML."""
@@ -248,7 +265,7 @@ def verify(study: Study) -> None:
     for check in checks(study):
         values = {key: study.value(key) for key in check.needs}
         if not check.met(values).all():
-            where, received = study.source.where(check.where), check.received(values)
+            where, received = study.source.where(check.where), check.received(values, study.source)
             raise BadInput(check.what, where=where, expected=check.expected, received=received)
 
 
@@ -303,7 +320,7 @@ def _check_swept_words(study: Study) -> None:
     """Axes hold numbers; before their names are looked at, since another name would not help."""
     for name, axis in study.sweep.axes.items():
         for path in axis.of:
-            place = field_at(Scene, study.data, path.split("."))
+            place = field_at(Scene, study.tables, path.split("."))
             if place is not None and place.holds_words_only:
                 raise BadInput(
                     "a word cannot be swept",
@@ -319,6 +336,7 @@ def _check_names(study: Study) -> None:
     tables: dict[str, Iterable[str]]
     tables = {
         "body": study.body,
+        "train": study.train,
         "carriage": study.carriage,
         "sensor": study.sensor,
         "envelope": study.envelope,

@@ -28,15 +28,26 @@ Indices = NDArray[np.int64]
 class Axis:
     """One named axis: its values (int64 or float64, SI) along one dimension, and the keys that it sets.
 
-    units: UDUNITS text, "" without dimension. noun: the dimension in words, "" for counts.
+    of: the keys as they were written. targets: the numbers of the scene that it sets, each with the factor of
+    the value. units: UDUNITS text, "" without dimension. noun: the dimension in words, "" for counts.
     """
 
     name: str
     dim: str
-    paths: tuple[str, ...]
+    of: tuple[str, ...]
+    targets: Mapping[str, float]
     values: Values
     units: str
     noun: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted keys of the numbers that it sets."""
+        return tuple(self.targets)
+
+    def columns(self, entries: Any) -> dict[str, Any]:
+        """What it sets at some entries of its values, by dotted key."""
+        return {path: self.values[entries] * factor for path, factor in self.targets.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +80,9 @@ class Cases:
         """Swept numbers (V,) of variants given by their flat numbers (V,), by dotted key."""
         positions = self.positions(indices)
         return {
-            path: np.asarray(axis.values[positions[axis.dim]], dtype=np.float64)
+            path: np.asarray(column, dtype=np.float64)
             for axis in self.axes
-            for path in axis.paths
+            for path, column in axis.columns(positions[axis.dim]).items()
         }
 
     def column(self, path: str) -> NDArray[np.float64]:
@@ -81,12 +92,15 @@ class Cases:
             raise KeyError(path)
         place = self.dims.index(axis.dim)
         shape = [1] * place + [-1] + [1] * (len(self.dims) - place - 1)
-        return np.broadcast_to(axis.values.astype(np.float64).reshape(shape), self.shape).reshape(-1)
+        values = axis.columns(slice(None))[path].astype(np.float64)
+        return np.broadcast_to(values.reshape(shape), self.shape).reshape(-1)
 
     def values_of(self, index: int) -> dict[str, int | float]:
         """Swept numbers of one variant by dotted key; integers stay integers."""
         positions = self.positions([index])
-        return {path: axis.values[positions[axis.dim][0]].item() for axis in self.axes for path in axis.paths}
+        return {
+            path: value.item() for axis in self.axes for path, value in axis.columns(positions[axis.dim][0]).items()
+        }
 
     def study_of(self, study: Study, index: int) -> Study:
         """One variant as a study of its own, without a sweep."""
@@ -105,7 +119,9 @@ def expand(study: Study) -> Cases:
         dim = VARIANT if study.sweep.zip or axis.sobol is not None else name
         values = sampled_values[name] if name in sampled_values else _listed_or_ranged(study, name, axis)
         unit = study.unit(axis.of[0])
-        found.append(Axis(name, dim, axis.of, values, unit.symbol if unit else "", unit.noun if unit else ""))
+        targets = {target: factor for path in axis.of for target, factor in study.targets(path).items()}
+        symbol, noun = (unit.symbol, unit.noun) if unit else ("", "")
+        found.append(Axis(name, dim, axis.of, targets, values, symbol, noun))
         dims.setdefault(dim, len(values))
     cases = Cases(tuple(dims), tuple(dims.values()), tuple(found))
     _check_repeats(study, cases)
@@ -155,12 +171,13 @@ def _check_paths(study: Study) -> None:
     owners: dict[str, str] = {}
     for name, axis in study.sweep.axes.items():
         check_targets(study, name, axis)
-        for path in axis.of:
-            clash = next((other for other in owners if f"{path}.".startswith(f"{other}.")), None)
+        own = [(path, target) for path in axis.of for target in study.targets(path)]
+        for path, target in own:
+            clash = next((other for other in owners if f"{target}.".startswith(f"{other}.")), None)
             if clash is not None:
                 where = study.source.where(f"sweep.{name}.of")
                 raise BadInput("this number is set twice", where=where, received=f"{path}, also by {owners[clash]}")
-            owners[path] = name
+            owners[target] = name
 
 
 def _check_repeats(study: Study, cases: Cases) -> None:
@@ -193,7 +210,7 @@ def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any],
     for start in range(0, total, CHECKED_AT_ONCE):
         flat = np.arange(start, min(start + CHECKED_AT_ONCE, total))
         positions = dict(zip(sizes, np.unravel_index(flat, tuple(sizes.values())), strict=True)) if sizes else {}
-        columns = {path: axis.values[positions[axis.dim]] for axis in touched for path in axis.paths}
+        columns = {path: column for axis in touched for path, column in axis.columns(positions[axis.dim]).items()}
         met = np.broadcast_to(check.met(base | columns), flat.shape)
         if not met.all():
             worst = int(np.flatnonzero(~met)[0])
@@ -204,5 +221,5 @@ def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any],
 
 def _refuse(study: Study, check: Check, values: Mapping[str, Any], entries: Mapping[str, int]) -> NoReturn:
     places = ", ".join(f"sweep.{name} entry {entry}" for name, entry in entries.items())
-    where, received = study.source.where(check.where), f"{check.received(values)} ({places})"
+    where, received = study.source.where(check.where), f"{check.received(values, study.source)} ({places})"
     raise BadInput(check.what, where=where, expected=check.expected, received=received)

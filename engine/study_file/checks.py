@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from engine.study_file.document import Source
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,9 @@ class Check:
         """Verdict for values by dotted key, of their broadcast shape."""
         return np.asarray(self.holds(*(values[key] for key in self.needs)), dtype=bool)
 
-    def received(self, values: Mapping[str, Any]) -> str:
+    def received(self, values: Mapping[str, Any], source: Source) -> str:
         """The deciding numbers in words, for an error."""
-        return ", ".join(f"{key} = {values[key]:.10g}" for key in self.needs[:6])
+        return ", ".join(f"{source.written(key)} = {values[key]:.10g}" for key in self.needs[:6])
 
 
 def on_body(where: str, needs: tuple[str, str], what: str) -> Check:

@@ -9,7 +9,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from stat import S_ISREG
 from typing import Any, NoReturn
@@ -35,11 +35,15 @@ _PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 
 @dataclass(frozen=True)
 class Source:
-    """Where the data came from: the file's name as the user gave it ("" for keywords), its text and SHA-256."""
+    """Where the data came from: the file's name as the user gave it ("" for keywords), its text and SHA-256.
+
+    written_as: the tables that were written for others that were made of them, by their dotted keys.
+    """
 
     name: str
     text: str
     sha256: str
+    written_as: Mapping[str, str] = field(default_factory=dict)
 
     def where(self, key: str = "", line: int | None = None) -> str:
         """The place of a fault in words.
@@ -48,7 +52,12 @@ class Source:
         'bed.toml, line 7: body.bed.length'
         """
         place = ", ".join(part for part in (self.name, f"line {line}" if line else "") if part)
-        return printable(": ".join(part for part in (place, key) if part), 400)
+        return printable(": ".join(part for part in (place, self.written(key)) if part), 400)
+
+    def written(self, key: str) -> str:
+        """A dotted key as it was written: of a table that was made of another one, the key of that."""
+        table = ".".join(key.split(".")[:2])
+        return self.written_as.get(table, table) + key[len(table) :]
 
 
 @dataclass(frozen=True)

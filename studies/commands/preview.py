@@ -172,7 +172,7 @@ def _sweep(study: Study, cases: Cases) -> Table:
             axis.name,
             str(len(axis.values)),
             _range(study, axis),
-            ", ".join(axis.paths),
+            ", ".join(axis.of),
         )
         for axis in cases.axes
     ]

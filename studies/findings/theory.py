@@ -40,7 +40,8 @@ def first_omega(results: Results) -> xr.DataArray | float:
     omega = np.empty(sizes)
     for place in np.ndindex(*sizes):
         index = dict(zip(dims, place, strict=True))
-        omega[place] = _model(results, {path: a.values[index[a.dim]] for a in axes for path in a.paths}).first_omega
+        changed = {path: value for a in axes for path, value in a.columns(index[a.dim]).items()}
+        omega[place] = _model(results, changed).first_omega
     return xr.DataArray(omega, dims=dims)
 
 
@@ -215,4 +216,4 @@ def _changes_modes(results: Results, path: str) -> bool:
 def _model(results: Results, values: dict[str, float]) -> SceneModel:
     from engine.model.scene_model import build_model
 
-    return build_model(results.study.without_sweep().with_values({k: float(v) for k, v in values.items()}), {}, {})
+    return build_model(results.study.without_sweep().with_values(values), {}, {})

@@ -17,7 +17,7 @@ REMEDIES = {
     "scheme": "name schemes in question.schemes; each has the parameters that docs/study-file.md gives",
     "steps": "give numbers of steps in question.step_counts",
 }
-NAMED = ("body", "carriage", "sensor")
+NAMED = ("body", "train", "carriage", "sensor")
 
 
 def slug_of(name: str) -> str:
@@ -81,7 +81,7 @@ def check_overrides(study: Study, name: str, overrides: Mapping[str, Any]) -> No
             remedy = REMEDIES.get(rest, REMEDIES["scheme"])
             raise BadInput("a study of work and precision varies this itself", where=where, remedy=remedy)
         own, dot, _ = rest.partition(".")
-        if table in NAMED and dot and own not in (known := list(study.data.get(table, {}))):
+        if table in NAMED and dot and own not in (known := list(study.tables.get(table, {}))):
             expected = f"one of {', '.join(known)}" if known else "none"
             remedy = nearest(own, known)
             raise BadInput(f"no such {table}", where=where, expected=expected, received=repr(own), remedy=remedy)

@@ -244,12 +244,12 @@ def _statuses(results: Results, noun: str) -> list[Row]:
 
 def _scene(results: Results) -> dict[str, list[Row]]:
     """The tables of the study file as they were written, by heading; the sweep has its own table."""
-    swept = {path: axis.name for axis in results.axes for path in axis.paths}
+    swept = {path: name for name, axis in results.study.sweep.axes.items() for path in axis.of}
     found: dict[str, list[Row]] = {}
     for name, value in results.study.data.items():
         if name in ("sweep", "schema_version", "title", "kind"):
             continue
-        if name in ("body", "carriage", "sensor", "envelope"):
+        if name in ("body", "train", "carriage", "sensor", "envelope"):
             for own, table in value.items():
                 found[f"{name} {own}"] = _rows(results, f"{name}.{own}", table, swept)
         elif isinstance(value, dict):
@@ -298,7 +298,8 @@ def _plain(value: Any) -> str:
 
 def _sweep_row(results: Results, place: int) -> Row:
     axis = results.axes[place]
-    return Row(axis.noun, f"{axis.span}, {counted(len(axis.values), 'value')}", ", ".join(axis.paths))
+    written = results.study.sweep.axes[axis.name].of
+    return Row(axis.noun, f"{axis.span}, {counted(len(axis.values), 'value')}", ", ".join(written))
 
 
 def _results(results: Results) -> list[tuple[str, ...]]:

@@ -29,17 +29,27 @@ Index = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One swept number: its dimension in the dataset, the keys that it sets, and its values (n,) along it, in SI units.
+    """One swept number: its dimension in the dataset, and its values (n,) along it, in SI units.
 
+    targets: the numbers of the scene that it sets, by dotted key, each with the factor of the value.
     typed: the unit in which the study file has it, in which people read it again; None where it was typed without one.
     """
 
     name: str
     dim: str
-    paths: tuple[str, ...]
+    targets: Mapping[str, float]
     values: Array
     units: str
     typed: Scale | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted keys of the numbers that it sets."""
+        return tuple(self.targets)
+
+    def columns(self, entry: int) -> dict[str, float]:
+        """What it sets at an entry of its values, by dotted key."""
+        return {path: self.values[entry].item() * factor for path, factor in self.targets.items()}
 
     @property
     def noun(self) -> str:
@@ -145,7 +155,8 @@ class Results:
             values = np.asarray(coordinate.values, dtype=np.float64)
             units = str(coordinate.attrs.get("units", "1"))
             unit = "" if units == "1" else units
-            found.append(Axis(name, str(coordinate.dims[0]), axis.of, values, unit, typed_unit(self.study, name)))
+            targets = {target: factor for path in axis.of for target, factor in self.study.targets(path).items()}
+            found.append(Axis(name, str(coordinate.dims[0]), targets, values, unit, typed_unit(self.study, name)))
         return tuple(found)
 
     def axis(self, *endings: str) -> Axis | None:
@@ -229,7 +240,9 @@ class Results:
     def parameter(self, path: str) -> xr.DataArray | float:
         """A number of the scene by its dotted key: over the sweep where an axis sets it, else as in the file."""
         axis = next((axis for axis in self.axes if path in axis.paths), None)
-        return self.dataset[axis.name].astype(np.float64) if axis else float(self.study.value(path))
+        if axis is None:
+            return float(self.study.value(path))
+        return self.dataset[axis.name].astype(np.float64) * axis.targets[path]
 
     def everywhere(self, values: Any) -> Array:
         """Values that depend on some of the sweep's axes, or on none, for every variant, in the sweep's shape."""
@@ -272,7 +285,7 @@ class Results:
     def values_at(self, index: Index) -> dict[str, float]:
         """Swept numbers of one variant by dotted key."""
         place = dict(zip(self.dims, index, strict=True))
-        return {path: axis.values[place[axis.dim]].item() for axis in self.axes for path in axis.paths}
+        return {path: value for axis in self.axes for path, value in axis.columns(place[axis.dim]).items()}
 
     def carriage_at(self, index: Index) -> Carriage:
         """The first carriage of one variant."""

@@ -30,7 +30,7 @@ def group() -> xr.Dataset:
 
 
 def drawn(given: xr.Dataset) -> list[Any]:
-    speed = Axis("speed", "speed", ("carriage.car.motion.speed",), np.array([1.0, 2.0, 3.0]), "m s-1")
+    speed = Axis("speed", "speed", {"carriage.car.motion.speed": 1}, np.array([1.0, 2.0, 3.0]), "m s-1")
     return audit.pictures(cast(Results, SimpleNamespace(axis=lambda *_: speed, axes=(speed,))), given)
 
 

@@ -1,0 +1,192 @@
+"""A train: axles one behind another, written as one table and read as one carriage for each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import accumulate
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
+
+from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
+
+from engine.scene.motion_base import Motion
+from engine.scene.motions import AnyMotion
+from engine.study_file.document import Document
+from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form, refuse
+from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, fault
+from results_schema.errors import BadInput
+
+MAX_AXLES = 200
+
+T = TypeVar("T")
+OneOrEach = Annotated[
+    Annotated[T, Tag(NUMBER)] | Annotated[tuple[T, ...], Strict(False), Field(min_length=1), Tag(LIST)], by_amount_form
+]
+
+
+def _cruising(motion: Motion) -> Motion:
+    if not (motion.passes and motion.pace == "speed"):
+        raise fault("the axles of a train keep their distances", expected='kind = "cruise"', received=motion.kind)
+    return motion
+
+
+class Train(Spec):
+    """Base of all trains. Its axles are the carriages NAME_1 (in front), NAME_2 and so on.
+
+    axles: how many, which a list of distances tells too. spacing: m from every axle to the next, or one for each,
+    from the front. spacing_scale, load_scale: factors of all distances, and of all forces and masses.
+    loads, springs: keys of numbers that are the same for all axles, or listed for each from the front; the former are
+    those that `load_scale` multiplies.
+    """
+
+    loads: ClassVar[tuple[str, ...]] = ()
+    springs: ClassVar[tuple[str, ...]] = ()
+
+    kind: str
+    on: Annotated[str, Noun("the name of a body")]
+    motion: Annotated[AnyMotion, AfterValidator(_cruising)]
+    axles: int | None = Field(default=None, ge=1, le=MAX_AXLES)
+    spacing: OneOrEach[Annotated[Length, Field(gt=0)]]
+    spacing_scale: Dimensionless = Field(default=1.0, gt=0)
+    load_scale: Dimensionless = Field(default=1.0, gt=0)
+
+    @property
+    def count(self) -> int:
+        """Number of axles."""
+        return self.axles if not isinstance(self.spacing, tuple) else len(self.spacing) + 1  # type: ignore[return-value]
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """m by which its axles trail the first, before `spacing_scale`."""
+        if isinstance(self.spacing, tuple):
+            return tuple(accumulate(self.spacing, initial=0.0))
+        return tuple(self.spacing * axle for axle in range(self.count))
+
+    @property
+    def each(self) -> tuple[str, ...]:
+        """Keys of all that an axle has of its own besides its place."""
+        return (*self.loads, *self.springs)
+
+    def own(self, key: str) -> tuple[float, ...]:
+        """A number of every axle, before the scales."""
+        value = getattr(self, key)
+        return value if isinstance(value, tuple) else (value,) * self.count
+
+    def scale(self, key: str) -> float:
+        """The factor of a number of the axles."""
+        return self.load_scale if key in self.loads else 1.0
+
+    def numbers(self, axle: int) -> dict[str, float]:
+        """What an axle has of its own, counted from 0, by the keys of carriages."""
+        found = {key: self.own(key)[axle] * self.scale(key) for key in self.each}
+        return found | ({"headway": self.distances[axle] * self.spacing_scale} if axle else {})
+
+    def follow(self, key: str) -> Iterator[tuple[int, str, float]]:
+        """What follows a number of the train in proportion: axle from 0, its key and the factor."""
+        first, _, rest = key.partition(".")
+        trailing, axles = range(1, self.count), range(self.count)
+        if key == "spacing" and not isinstance(self.spacing, tuple):
+            yield from ((axle, "headway", axle * self.spacing_scale) for axle in trailing)
+        elif key == "spacing_scale":
+            yield from ((axle, "headway", self.distances[axle]) for axle in trailing)
+        elif key == "load_scale":
+            each = ((axle, load, self.own(load)[axle]) for load in self.loads for axle in axles)
+            yield from (number for number in each if number[-1])
+        elif first == "motion":
+            yield from ((axle, key, 1) for axle in axles)
+        elif first in self.each:
+            yield from ((axle, first, self.scale(first)) for axle in ([int(rest)] if rest else axles))
+
+    @model_validator(mode="after")
+    def _axles_agree(self) -> Train:
+        listed = isinstance(self.spacing, tuple)
+        if self.axles is None and not listed:
+            raise fault("the number of axles is missing", expected="axles = 2 or more, or a list of spacings")
+        if listed and self.axles not in (None, self.count):
+            expected = f"axles = {self.count}, or without this key"
+            raise fault("spacings lie between axles", expected=expected, received=f"axles = {self.axles}")
+        for key in self.each:
+            if len(self.own(key)) != self.count:
+                what, received = f"{key} is one number, or one for each axle", f"{len(self.own(key))} numbers"
+                raise fault(what, expected=f"{self.count} numbers, or one", received=received)
+        return self
+
+
+class ForceTrain(Train):
+    """Constant forces in N along gravity."""
+
+    loads = ("force",)
+    kind: Literal["force"]
+    force: OneOrEach[Force]
+
+
+class MassTrain(Train):
+    """Rigid masses in kg that stay in contact; their weights act."""
+
+    loads = ("mass",)
+    kind: Literal["mass"]
+    mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
+    inertia_along: bool = False
+
+
+class OscillatorTrain(Train):
+    """Sprung masses, each on a wheel of its own."""
+
+    loads = ("mass", "wheel_mass")
+    springs = ("stiffness", "damping")
+    kind: Literal["oscillator"]
+    mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
+    wheel_mass: OneOrEach[Annotated[Mass, Field(ge=0)]] = 0.0
+    stiffness: OneOrEach[Annotated[Stiffness, Field(gt=0)]]
+    damping: OneOrEach[Annotated[Damping, Field(ge=0)]] = 0.0
+    inertia_along: bool = False
+
+
+TRAINS: Mapping[str, type[Train]] = {"force": ForceTrain, "mass": MassTrain, "oscillator": OscillatorTrain}
+AnyTrain = Annotated[Train, KindOf("train", TRAINS)]
+
+
+class Trains(Spec):
+    """All trains of a study file."""
+
+    train: dict[str, AnyTrain] = Field(default_factory=dict)
+
+
+def axle_name(train: str, axle: int) -> str:
+    """Name of the carriage of an axle, counted from 0."""
+    return f"{train}_{axle + 1}"
+
+
+def with_axles(document: Document) -> Document:
+    """The document with a carriage for every axle, behind those that were written. Raises BadInput.
+
+    Errors in such a carriage name the train. What is written of one, as where one axle is swept, stands above what the
+    train says.
+    """
+    data, source = document.data, document.source
+    written = data.get("carriage", {})
+    if "train" not in data or not isinstance(written, dict):
+        return document
+    try:
+        trains = Trains(train=data["train"]).train
+    except ValidationError as error:
+        refuse(error, Trains, {"train": data["train"]}, source)
+    axles, trained_by = {}, {}
+    for name, train in trains.items():
+        shared = {key: value for key, value in data["train"][name].items() if key not in Train.model_fields}
+        shared |= {key: data["train"][name][key] for key in ("kind", "on", "motion")}
+        for axle in range(train.count):
+            own = axle_name(name, axle)
+            axles[own] = shared | train.numbers(axle)
+            trained_by[f"carriage.{own}"] = f"train.{name}"
+    for name in axles:
+        if "kind" in written.get(name, {}):
+            here, received = source.where(f"carriage.{name}"), f"an axle of {trained_by[f'carriage.{name}']}"
+            raise BadInput("two carriages have this name", where=here, received=received, remedy="another name")
+    return Document(data | {"carriage": _overlaid(written, axles)}, replace(source, written_as=trained_by))
+
+
+def _overlaid(above: Mapping[str, Any], below: Mapping[str, Any]) -> dict[str, Any]:
+    """One table of both; what stands in `above` comes first and counts."""
+    both = {key: _overlaid(above[key], below[key]) for key in above if isinstance(below.get(key), dict)}
+    return {**above, **{key: value for key, value in below.items() if key not in above}, **both}

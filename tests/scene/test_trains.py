@@ -1,0 +1,173 @@
+"""Trains: every axle is the carriage that could have been written by itself, and one key sweeps all of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import engine
+from engine.scene.study import Study, load
+from engine.scene.sweep import expand
+from results_schema.errors import BadInput
+from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
+
+WAY = cruise(0.0, 1.0, 0.8)
+TEXT = """\
+schema_version = 1
+kind = "passage"
+
+[body.bed]
+kind = "beam"
+length = 15.0
+area = 0.01
+second_moment = 8.33e-6
+youngs_modulus = "210 GPa"
+density = 7850
+supports = "pinned-pinned"
+
+[train.tram]
+on = "bed"
+kind = "force"
+force = "10 kN"
+axles = 3
+spacing = 2.0
+
+[train.tram.motion]
+kind = "cruise"
+start = 0
+end = 15
+speed = 10
+
+[sensor.midspan]
+body = "bed"
+at = 7.5
+
+[sweep]
+speed = { of = "train.tram.motion.speed", values = [5, 10] }
+"""
+
+
+def train(table: dict[str, Any], **changes: Any) -> Study:
+    return study(beam(), {}, train={"tram": table}, **changes)
+
+
+def axles(tables: list[dict[str, Any]], distances: list[float], **changes: Any) -> Study:
+    """The same carriages as separate tables."""
+    trailing = ({} if axle == 0 else {"headway": distance} for axle, distance in enumerate(distances))
+    riding = {f"tram_{n + 1}": table | own for n, (table, own) in enumerate(zip(tables, trailing, strict=True))}
+    return study(beam(), riding, **changes)
+
+
+def swept(**axes: dict[str, Any]) -> dict[str, Any]:
+    return {"sweep": axes, "solver": {"audit": 0}, "sensor": {"under": under("tram_2")}}
+
+
+def same(one: Study, other: Study) -> None:
+    """Bit for bit, whatever the sweep's keys are."""
+    first, second = engine.run(one), engine.run(other)
+    assert first.drop_attrs().identical(second.drop_attrs())
+
+
+SPEED = [0.4, 0.8]
+REGULAR = {"axles": 3, "spacing": 0.3}
+
+
+def test_forces_with_speed_and_force_swept() -> None:
+    keys = [f"carriage.tram_{n}" for n in (1, 2, 3)]
+    written = swept(
+        speed={"of": [f"{key}.motion.speed" for key in keys], "values": SPEED},
+        force={"of": [f"{key}.force" for key in keys], "values": [1.0, 3.0]},
+    )
+    short = swept(
+        speed={"of": "train.tram.motion.speed", "values": SPEED}, force={"of": "train.tram.force", "values": [1.0, 3.0]}
+    )
+    same(train(force(2.0, WAY) | REGULAR, **short), axles([force(2.0, WAY)] * 3, [0.0, 0.3, 0.6], **written))
+
+
+@pytest.mark.parametrize("spacing", [0.1, 0.3, 0.7])
+def test_swept_spacings_are_those_of_carriages(spacing: float) -> None:
+    """Of masses, one value after another, as separate carriages have no key for it."""
+    short = swept(spacing={"of": "train.tram.spacing", "values": [0.1, 0.3, 0.7]})
+    found = engine.run(train(mass(0.2, WAY) | REGULAR, **short, output={"histories": "none"}))
+    alone = engine.run(
+        axles([mass(0.2, WAY)] * 3, [0.0, spacing, 2 * spacing], sensor={"under": under("tram_2")}, solver={"audit": 0})
+    )
+    exact = {"under_max", "under_min", "tram_3_contact_force_max"}
+    assert all(float(found[name].sel(spacing=spacing)) == float(alone[name]) for name in exact)
+
+
+def test_lists_of_sprung_masses_and_their_scales() -> None:
+    lists = {"mass": [0.2, 0.1], "wheel_mass": 0.05, "spacing": [0.25], "load_scale": 2.0, "spacing_scale": 2.0}
+    table = {key: value for key, value in oscillator(1.0, 40.0, WAY).items() if key != "mass"} | lists
+    written = [oscillator(kilograms, 40.0, WAY, wheel_mass=0.1) for kilograms in (0.4, 0.2)]
+    sensors = {"sensor": {"body": aboard("tram_2")}, "solver": {"audit": 0}}
+    same(train(table, **sensors), axles(written, [0.0, 0.5], **sensors))
+
+
+@pytest.mark.parametrize(
+    ("key", "targets"),
+    [
+        ("spacing_scale", {"tram_2.headway": 0.25, "tram_3.headway": 0.75}),
+        ("load_scale", {"tram_1.mass": 3.0, "tram_2.mass": 2.0, "tram_3.mass": 1.0}),
+        ("mass.1", {"tram_2.mass": 5.0}),
+        ("stiffness", {f"tram_{n}.stiffness": 1.0 for n in (1, 2, 3)}),
+        ("motion.start", {f"tram_{n}.motion.start": 1 for n in (1, 2, 3)}),
+        ("axles", {}),
+        ("spacing.0", {}),
+    ],
+)
+def test_what_a_key_sets(key: str, targets: dict[str, float]) -> None:
+    """A wheel without mass stays one: it would count as inertia."""
+    table = oscillator(1.0, 40.0, WAY) | {"mass": [3.0, 2.0, 1.0], "spacing": [0.25, 0.5], "load_scale": 5.0}
+    expected = {f"carriage.{path}": factor for path, factor in targets.items()}
+    assert train(table).targets(f"train.tram.{key}") == expected
+
+
+def test_one_variant_as_a_study_of_its_own() -> None:
+    text = TEXT.replace("speed = {", 'spacing = { of = "train.tram.spacing", values = [1.5] }\nspeed = {')
+    whole = load(text)
+    one = expand(whole).study_of(whole, 1)
+    assert one.value("carriage.tram_3.headway") == 3.0 and one.value("carriage.tram_2.motion.speed") == 10.0
+    assert load(one.source.text).carriage == one.carriage
+    assert list(whole.data) == ["schema_version", "kind", "body", "train", "sensor", "sweep"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("axles = 3", "axle = 3", ["train.tram.axle:", "unknown key", '"axles"']),
+        ("axles = 3\n", "", ["train.tram:", "number of axles"]),
+        ("axles = 3", "axles = 201", ["train.tram.axles", "<= 200"]),
+        ("spacing = 2.0", "spacing = [2.0]", ["train.tram", "axles = 2", "axles = 3"]),
+        ("spacing = 2.0", "spacing = [2.0, -1.0]", ["train.tram.spacing.1", "> 0"]),
+        ("spacing = 2.0", 'spacing = "2 kg"', ["train.tram.spacing", "a length (m)"]),
+        ('force = "10 kN"', 'force = ["10 kN", 5]', ["train.tram", "force", "3 numbers", "2 numbers"]),
+        ('on = "bed"', 'on = "bad"', ["train.tram.on", '"bed"']),
+        ('"force"', '"body"', ["train.tram.kind", "force, mass, oscillator"]),
+        ("end = 15\n", "end = 0\n", ["train.tram.motion.end", "train.tram.motion.start = 0"]),
+        (
+            'kind = "cruise"\nstart = 0\nend = 15\nspeed = 10',
+            'kind = "sinusoidal"\ncentre = 7\namplitude = 1\nfrequency = 1\ncycles = 1',
+            ["train.tram.motion", "distances", "cruise"],
+        ),
+        ("train.tram.motion.speed", "train.tram.axles", ["sweep.speed.of", "cannot be swept", "spacing_scale"]),
+        ("train.tram.motion.speed", "train.tram.spacin", ["sweep.speed.of", '"train.tram.spacing"']),
+        (
+            "[sensor.midspan]",
+            '[carriage.tram_2]\non = "bed"\nkind = "mass"\n[sensor.midspan]',
+            ["carriage.tram_2", "two carriages", "train.tram"],
+        ),
+        ("[sweep]", '[sweep]\nall = { of = "carriage.tram_2.motion.speed", values = [1] }', ["sweep.speed", "twice"]),
+        (
+            "[sweep]",
+            '[sweep]\nend = { of = "train.tram.motion.end", values = [0] }',
+            ["train.tram.motion.end", "end entry"],
+        ),
+    ],
+)
+def test_words(old: str, new: str, words: list[str]) -> None:
+    assert old in TEXT
+    with pytest.raises(BadInput) as error:
+        expand(load(TEXT.replace(old, new, 1)))
+    assert all(word in str(error.value) for word in words), str(error.value)
