@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.groups import Found, Group, marches_again
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.groups import USED, Found, Group, marches_again
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import Plan
+from engine.linear_algebra import one_thread
 from engine.march.outcome import Flat, histories
 from engine.march.tables import SceneTables
+from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
@@ -71,17 +74,35 @@ def _all_is_fixed(group: Group) -> bool:
     return group.grid.fixed and not group.grid.chooses
 
 
-def _histories(plan: Plan, group: Group, variants: Counts, used: Flat, halted: Callable[[], bool]) -> Rows | None:
-    """Histories of the kept ones among some variants, marched again with samples."""
-    lanes = np.flatnonzero(np.isin(variants, plan.shown))
-    if not lanes.size:
-        return None
-    values, spent = plan.values(group, variants[lanes]), {name: column[lanes] for name, column in used.items()}
-    rows = [
-        Rows(variants[lanes[own]], histories(tables, values.part(own), _counts(plan, tables), halted))
-        for tables, own in marches_again(group.grid, spent)
-    ]
+@one_thread()
+def histories_of(plan: Plan, variants: Counts, used: Flat) -> Rows | None:
+    """Histories of some variants of any scenes, from what these (by the names of the archive) were computed with."""
+    rows: list[Rows] = []
+    for grid, members in zip(plan.grids, plan.members, strict=True):
+        lanes = np.flatnonzero(np.isin(variants, members))
+        rows += _marched_again(plan, grid, variants[lanes], _of(used, lanes), lambda: False)
     return joined(rows)
+
+
+def _histories(plan: Plan, group: Group, variants: Counts, used: Flat, halted: Callable[[], bool]) -> Rows | None:
+    """Histories of the kept ones among some variants."""
+    lanes = np.flatnonzero(np.isin(variants, plan.shown))
+    return joined(list(_marched_again(plan, group.grid, variants[lanes], _of(used, lanes), halted)))
+
+
+def _of(used: Flat, lanes: Counts) -> Flat:
+    return {name: used[name][lanes] for name in USED}
+
+
+def _marched_again(
+    plan: Plan, grid: SceneGrid, variants: Counts, used: Flat, halted: Callable[[], bool]
+) -> Iterator[Rows]:
+    """Histories of some variants of a scene, marched again with samples. Raises Halted."""
+    if not variants.size:
+        return
+    values = VariantValues(grid.scene.study, plan.cases.columns_of(variants), variants.size)
+    for tables, own in marches_again(grid, used):
+        yield Rows(variants[own], histories(tables, values.part(own), _counts(plan, tables), halted))
 
 
 def _counts(plan: Plan, tables: SceneTables) -> Counts:

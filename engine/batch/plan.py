@@ -47,6 +47,7 @@ MOST_MEMORY = 16 * 2**30
 CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
 EVERY_MARCH = "march"  # the kind of results that every march has
 SHOWN = 64  # variants whose histories are kept by default
+NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
 #: about as much as the convergence of two hundred variants of one scene.
 FEW, FEW_IN_SCENE = 256, 16
@@ -158,7 +159,7 @@ class Plan:
     @property
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
-        shown = int(self.shown.size) * self.stations_shown * (len(self.study.sensor) + 2)
+        shown = (int(self.shown.size) + NAMED) * self.stations_shown * (len(self.study.sensor) + 2)
         return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
 
     @property

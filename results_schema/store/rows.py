@@ -75,7 +75,11 @@ class Collector:
                 self.arrays[name] = np.zeros((self.finished.size, *array.shape[1:]), array.dtype)
             self.arrays[name][rows.variants] = array
         self.finished[rows.variants] = True
-        self._selected += [] if selected is None else [selected]
+        self.select(selected)
+
+    def select(self, rows: Rows | None) -> None:
+        """Take rows of a few variants more."""
+        self._selected += [] if rows is None else [rows]
 
     @property
     def selected(self) -> Rows | None:

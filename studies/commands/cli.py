@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,10 +68,14 @@ def check(study: str) -> None:
     import engine
     from studies.commands import catalogue, console
     from studies.commands.preview import preview
+    from studies.protocol.compiling import told_of_compiling
     from studies.protocol.study import kind_of
 
-    loaded = engine.load(catalogue.find_study(study))
-    console.show_preview(preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0))))
+    path = catalogue.find_study(study)
+    loaded = engine.load(path)
+    with told_of_compiling(partial(console.say_stage, path.stem)):
+        seen = preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0)))
+    console.show_preview(seen)
 
 
 @commands.command()

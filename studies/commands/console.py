@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -123,11 +124,14 @@ def progress_bar(label: str) -> Iterator[Bar]:
         def show(finished: int, total: int) -> None:
             bar.update(task, completed=finished, total=total)
 
-        def say_stage(words: str) -> None:
-            if console.is_terminal:
-                bar.console.print(Text(f"{label}: {printable(words, LONGEST_CELL)}", "dim"))
+        yield Bar(show, partial(say_stage, label, console=bar.console))
 
-        yield Bar(show, say_stage)
+
+def say_stage(label: str, words: str, console: Console | None = None) -> None:
+    """Tell on standard error what is being done, if that is a terminal."""
+    console = console or Console(stderr=True)
+    if console.is_terminal:
+        console.print(Text(f"{label}: {printable(words, LONGEST_CELL)}", "dim"))
 
 
 def show_preview(shown: Preview) -> None:

@@ -14,10 +14,11 @@ from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
 from studies.findings import indices, theory
+from studies.findings.settled import LEFT_OVER, odd_parts
 from studies.protocol.study import Kind
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, listed, percent, quantity
-from studies.results.results import VARIANT, Results, extreme
+from studies.results.results import VARIANT, Index, Results, extreme
 
 if TYPE_CHECKING:
     from engine.observation.cycle_reduction import Compared, Cycle
@@ -29,7 +30,6 @@ LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
 THRESHOLDS = (0.01, 0.05)
 CLOSE = 0.05
-LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
 MOST_SENSORS = 3
 REMAINDER = "by the damping of the first mode"
 
@@ -136,11 +136,16 @@ class Asymmetry(Kind):
     def findings(self, results: Results) -> list[str]:
         left = theory.remainder_of_start(results)
         settled = ~(left > LEFT_OVER)
-        answer, start = _answer(results, settled), _start(results, left)
+        answer, start = _answer(results), _start(results, left)
         said = [answer, start] if settled.any() else [start, answer]
         for sensor in list(results.sensors)[:MOST_SENSORS]:
             said += [_lag(results, sensor), _first_beyond(results, sensor, settled)]
         return [*said, *_mass(results), *told_statuses(results)]
+
+    def named(self, results: Results) -> list[Index]:
+        """For every sensor the variant with the largest odd part."""
+        places = map(extreme, np.moveaxis(odd_parts(results), -1, 0))
+        return [place for place in places if place is not None]
 
     def figures(self, results: Results) -> list[Figure]:
         from studies.pictures import asymmetry
@@ -200,12 +205,11 @@ def _where_late(results: Results, late: Mask) -> str:
     return said
 
 
-def _answer(results: Results, settled: Mask) -> str:
+def _answer(results: Results) -> str:
     """Yes or no, by the largest odd part of all sensors in the variants that have settled, or in all if none has."""
-    odd = np.asarray(results.dataset["odd_rms"].transpose(*results.dims, "sensor").values, dtype=np.float64)
-    if extreme(odd) is None:
+    if extreme(results.dataset["odd_rms"]) is None:
         return "No variant has values, so the question stays open."
-    odd = np.where(settled[..., None], odd, np.nan) if settled.any() else odd
+    odd = odd_parts(results)
     place = extreme(odd)
     if place is None:
         return "No variant that has settled has values, so the question stays open."

@@ -15,6 +15,7 @@ from results_schema.variables import AXES, MARCH, Variable, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.findings.peaks import PEAKS, peaks
+from studies.findings.two_peaks import EXPECTED, counts_of, first_break, slowest
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import MINUS, counted, listed, number, percent
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from studies.pictures.common.figures import Figure
 
 
-EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 MOST_SENSORS = 3
 STATIONS = 8192  # of a cycle: all steps of nearly every march, so that whatever rings in it is seen as it was marched
 SAME_PEAK = 0.05  # of a cycle: maxima further apart are two peaks
@@ -174,6 +174,13 @@ class DoublePeak(Kind):
             said += [*_halves(results, sensor), *_end_springs(results, sensor)]
         return [*said, *told_statuses(results)]
 
+    def named(self, results: Results) -> list[Index]:
+        """For every sensor of the answer the variant where two peaks end and that with the largest amplification."""
+        sensors = list(results.sensors)[:MOST_SENSORS]
+        places = [first_break(results, sensor) for sensor in sensors]
+        places += [extreme(results.of_sensor("dynamic_amplification", sensor)) for sensor in sensors]
+        return [place for place in places if place is not None]
+
     def figures(self, results: Results) -> list[Figure]:
         from studies.pictures import double_peak
 
@@ -220,13 +227,9 @@ def _axis(name: str) -> dict[str, object]:
     return axes()[name].attributes()
 
 
-def _counts(results: Results, sensor: str) -> Array:
-    return np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
-
-
 def _answer(results: Results, sensor: str) -> str:
     """How often the response peaks, up to where, and how many variants have how many peaks."""
-    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    counts, ratio = counts_of(results, sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     if not known.any():
         return f"{sensor}: no variant has values, so the question stays open."
@@ -236,15 +239,13 @@ def _answer(results: Results, sensor: str) -> str:
         return f"{sensor}: {counted(int(values[0]), 'peak')} per cycle{every}."
     ranked = sorted(zip(variants, values, strict=True), reverse=True)
     share = listed([f"{counted(int(value), 'peak')} in {percent(count / known.sum())}" for count, value in ranked])
-    other = known & (counts != EXPECTED)
-    first = float(ratio[other].min())
-    if (_slowest(results, ratio) & other).any() or not (known & (ratio < first)).any():
+    place = first_break(results, sensor)
+    if place is None:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
-    place = tuple(int(i) for i in np.argwhere(other & (ratio == first))[0])
     return (
-        f"{sensor}: two peaks per cycle below {_pace(results, first)}, whatever else is varied; there the pattern "
-        f"breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: {share} of the "
-        "variants."
+        f"{sensor}: two peaks per cycle below {_pace(results, float(ratio[place]))}, whatever else is varied; there "
+        f"the pattern breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: "
+        f"{share} of the variants."
     )
 
 
@@ -258,16 +259,9 @@ def _pace(results: Results, ratio: float) -> str:
     return f"{axis.in_words(float(values[0]))} ({part})" if values.size == 1 else part
 
 
-def _slowest(results: Results, ratio: Array) -> Mask:
-    """Variants at the lowest frequency of the motion."""
-    axis = results.axis(*PACES)
-    along = ratio if axis is None else results.everywhere(results.dataset[axis.name])
-    return np.asarray(along == along.min())
-
-
 def _breaks(results: Results, sensor: str) -> list[str]:
     """Up to which frequency ratio there are exactly two peaks, for each mass, and which harmonic breaks the pattern."""
-    counts, ratio = _counts(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    counts, ratio = counts_of(results, sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
         return []
@@ -315,8 +309,8 @@ def _end_springs(results: Results, sensor: str) -> list[str]:
     softness = theory.end_spring_difference(results, sensor)
     if softness is None:
         return []
-    counts = _counts(results, sensor)
-    slow = _slowest(results, results.everywhere(theory.frequency_ratio(results)))
+    counts = counts_of(results, sensor)
+    slow = slowest(results, results.everywhere(theory.frequency_ratio(results)))
     one, two = (softness[slow & (counts == count)] for count in (1, EXPECTED))
     if not (one.size and two.size and two.max() < one.min()):
         return []

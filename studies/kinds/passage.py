@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.arrays import Mask
+from results_schema.arrays import Array, Mask
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind
@@ -44,9 +44,14 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        said = [_largest(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        said = [_largest(results, sensor) for sensor in _told(results)]
         said += [text for carriage in results.study.carriage for text in _contact(results, carriage)]
         return [*said, *told_statuses(results)]
+
+    def named(self, results: Results) -> list[Index]:
+        """For every sensor of the answer the variants with the largest value and the largest amplification."""
+        places = (place for sensor in _told(results) for place in _extremes(results, sensor))
+        return [place for place in places if place is not None]
 
     def figures(self, results: Results) -> list[Figure]:
         from studies.pictures import passage
@@ -57,10 +62,23 @@ class Passage(Kind):
 KIND = Passage()
 
 
+def _told(results: Results) -> list[str]:
+    """The sensors that the answer is about."""
+    return list(results.sensors)[:MOST_SENSORS]
+
+
+def _gain(results: Results, sensor: str) -> Array:
+    return np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+
+
+def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
+    """The variants with the largest value and with the largest amplification of one sensor."""
+    return largest(results, sizes(results, sensor)), largest(results, _gain(results, sensor))
+
+
 def _largest(results: Results, sensor: str) -> str:
     """The largest value and the largest amplification of one sensor, and where they are, while the contact holds."""
-    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-    top, best = (largest(results, values) for values in (sizes(results, sensor), gain))
+    gain, (top, best) = _gain(results, sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
     shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from results_schema.arrays import Array
 from studies.findings import theory
+from studies.findings.settled import odd_parts
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, banded, colour_bar, draw, logarithmic, zero_line
 from studies.pictures.common.sweep_view import (
@@ -62,7 +63,7 @@ def _odd(seen: View, sensor: str) -> Array:
 
 
 def _response(results: Results, sensor: str) -> list[Figure]:
-    odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    odd = odd_parts(results)[..., list(results.sensors).index(sensor)]
     ranked = picked(results, odd, results.size)
     if not ranked:
         return []
@@ -71,7 +72,7 @@ def _response(results: Results, sensor: str) -> list[Figure]:
     shown = list(dict.fromkeys([modest, largest]))
     which = (
         f"Of the kept histories, the one whose odd part is closest to {percent(VISIBLE)} of the static range (left) "
-        "and the one with the largest (right)."
+        "and the one with the largest of all variants (right)."
         if len(shown) == 2
         else ""
     )

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
 from studies.findings import theory
+from studies.findings.two_peaks import counts_of, first_break
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, logarithmic, shades
 from studies.pictures.common.sweep_view import (
@@ -87,10 +88,10 @@ def _has_values(seen: View, variable: str, sensor: str) -> bool:
 
 
 def _typical(results: Results, sensor: str) -> list[Index]:
-    """At most three variants with a history: the one with the largest amplification, one of each number of
-    peaks, and others; from slow to fast."""
+    """At most three variants with a history: where two peaks end, the one with the largest amplification, one of each
+    number of peaks, and others; from slow to fast."""
     ratio = results.everywhere(theory.frequency_ratio(results))
-    counts = np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
+    counts = counts_of(results, sensor)
     traced = sorted(results.traced(), key=lambda index: float(ratio[index]))
     groups: dict[float, list[Index]] = {}
     for index in traced:
@@ -98,7 +99,9 @@ def _typical(results: Results, sensor: str) -> list[Index]:
     largest = sorted(groups.values(), key=len, reverse=True)
     found = [group[len(group) // 2] for group in largest[:MOST_CYCLES]]
     gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-    found = list(dict.fromkeys([*picked(results, gain, results.size)[-1:], *found]))[:MOST_CYCLES]
+    broken = first_break(results, sensor)
+    named = [index for index in traced if index == broken]
+    found = list(dict.fromkeys([*named, *picked(results, gain, results.size)[-1:], *found]))[:MOST_CYCLES]
     rest = [index for index in picked(results, ratio, MOST_CYCLES) if index not in found]
     return sorted([*found, *rest[: MOST_CYCLES - len(found)]], key=lambda index: float(ratio[index]))
 

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput, Interrupted, OutputFailed
-from results_schema.store.rows import Chunk, Collector, joined
+from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
 from studies.protocol.stopping import Stop
@@ -152,14 +153,40 @@ class Variants:
 
     def gather(self, store: Store) -> xr.Dataset:
         """The march's dataset with the study's own results."""
+        found = Collector(self.plan.size)
+        for name in store.finished():
+            found.add(Chunk.of(store.read(name)))
+        assert found.finished.all(), "variants are missing"
+        dataset = self._summarised(found)
+        named = self._named(dataset)
+        if not named.size:
+            return dataset
+        found.select(self._histories(named, found))
+        return self._summarised(found)
+
+    def _named(self, dataset: xr.Dataset) -> Counts:
+        """The variants that the answer names, of which no history is kept yet although those of others are."""
+        from engine.batch.plan import NAMED
+        from studies.results.results import Results
+
+        if self.plan.study.output.histories != "auto":
+            return np.empty(0, np.int64)
+        indices = self.kind.named(Results(dataset, self.plan.study))[:NAMED]
+        named = [int(np.ravel_multi_index(index, self.plan.cases.shape)) if index else 0 for index in indices]
+        return np.setdiff1d(np.array(named, dtype=np.int64), self.plan.shown)
+
+    def _histories(self, variants: Counts, found: Collector) -> Rows | None:
+        from engine.batch.chunk import histories_of
+
+        used = {name: column[variants] for name, column in found.arrays.items() if name.endswith("_used")}
+        return histories_of(self.plan, variants, used)
+
+    def _summarised(self, found: Collector) -> xr.Dataset:
         from engine.batch.dataset import build
         from results_schema.variables import expand
         from studies.results.results import envelope_units, sensor_units
 
-        study, found = self.plan.study, Collector(self.plan.size)
-        for name in store.finished():
-            found.add(Chunk.of(store.read(name)))
-        assert found.finished.all(), "variants are missing"
+        study = self.plan.study
         dataset = self.kind.summarise(build(self.plan, found.arrays, found.selected), study)
         declared = expand(self.kind.name, sensor_units(study), tuple(study.carriage), envelope_units(study))
         # The engine offers static values to every summary; they are results only where the kind says so.

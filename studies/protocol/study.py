@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from engine.study_file.spec import Spec
     from studies.pictures.common.figures import Figure
     from studies.protocol.parts import Parts, Piece
-    from studies.results.results import Results
+    from studies.results.results import Index, Results
 
     AnySpec = TypeVar("AnySpec", bound=Spec)
 else:
@@ -87,6 +87,10 @@ class Kind:
 
     def findings(self, results: Results) -> list[str]:
         """The answer in sentences, the most important first; every number comes from the data."""
+        return []
+
+    def named(self, results: Results) -> Sequence[Index]:
+        """The variants that the answer names: their histories are kept whichever others are."""
         return []
 
     def figures(self, results: Results) -> list[Figure]:

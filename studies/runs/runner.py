@@ -19,6 +19,7 @@ from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import files
 from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
 from results_schema.store.parts import PartStore
+from studies.protocol.compiling import told_of_compiling
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop
@@ -81,10 +82,11 @@ def run_to_archive(
             store.remove()
             return _found_finished(run)
         work = Work(options.threads, stop, progress, stage=stage)
-        resumed = parts.compute(store, work)
-        work.check()
-        root = _as_declared(parts.gather(store), study)
-        groups = groups_beside(parts, root, work)
+        with told_of_compiling(work.stage):
+            resumed = parts.compute(store, work)
+            work.check()
+            root = _as_declared(parts.gather(store), study)
+            groups = groups_beside(parts, root, work)
         seconds = _write(run, root, store, groups)
     return Outcome(archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP))
 

@@ -1,0 +1,23 @@
+"""Which variants of an asymmetry have settled, and how far forward and backward differ in these."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from results_schema.arrays import Array, Mask
+from studies.findings import theory
+from studies.results.results import Results
+
+LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
+
+
+def settled(results: Results) -> Mask:
+    """The variants, in the sweep's shape, whose start has died out by the last cycle, or of which that is not known."""
+    return np.asarray(~(theory.remainder_of_start(results) > LEFT_OVER))
+
+
+def odd_parts(results: Results) -> Array:
+    """(..., sensor) the odd part where a variant has settled, or everywhere if none has; NaN elsewhere."""
+    odd = np.asarray(results.dataset["odd_rms"].transpose(*results.dims, "sensor").values, dtype=np.float64)
+    fine = settled(results)
+    return np.where(fine[..., None], odd, np.nan) if fine.any() else odd

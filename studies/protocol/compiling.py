@@ -1,0 +1,30 @@
+"""Telling people that kernels are compiled, which else would be half a minute of silence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+WORDS = "compiling kernels for this machine, once: about half a minute"
+
+
+@contextmanager
+def told_of_compiling(tell: Callable[[str], object]) -> Iterator[None]:
+    """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it."""
+    from numba.core import event
+
+    class First(event.Listener):
+        """Tells of the first one."""
+
+        told = False
+
+        def on_start(self, _: object) -> None:
+            if not self.told:
+                self.told = True
+                tell(WORDS)
+
+        def on_end(self, _: object) -> None:
+            """Nothing to say."""
+
+    with event.install_listener("numba:compile", First()):
+        yield
