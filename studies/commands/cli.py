@@ -66,9 +66,9 @@ def init(kind: str, file: Path | None) -> None:
 def check(study: str) -> None:
     """Validate STUDY and explain what a run would do."""
     import engine
+    from engine.kernels.compiling import told_of_compiling
     from studies.commands import catalogue, console
     from studies.commands.preview import preview
-    from studies.protocol.compiling import told_of_compiling
     from studies.protocol.study import kind_of
 
     path = catalogue.find_study(study)

@@ -1,10 +1,9 @@
-"""What a run will take, from about a second of it: pilots of a large sweep, or some variants of a small one."""
+"""What a run will take, from about three seconds of it: pilots of a large sweep, or some variants of a small one."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -13,16 +12,19 @@ from engine.accuracy.choice import MOST_SCENES, PILOTS, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.batch.execution import run_jobs, warm_up
 from engine.batch.plan import Plan
-from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
 from studies.commands import planned_numerics as chosen
 from studies.results.formatting import counted
 from studies.results.results import spread
 
-SECONDS = 1.0  # that measuring may take
+SECONDS = 3.0  # that measuring may take
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
-CLIMB = 5.0  # times the convergence of a few variants that as many pilots take on the ladder
+# What is said of the next three was measured with the built-in studies on two threads; the spread is over these.
+CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 5 to 23
+AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
+UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
+AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
 CONVERGED, SCENES = 8, 3  # variants that converge, and scenes that they are of
 TIMED = 1024  # variants by which the pace of the march is measured
@@ -40,7 +42,7 @@ class Forecast(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """What some variants converged with, and the seconds that 16 of a scene take."""
+    """What some variants converged with, and the seconds that those of a scene take, in the mean of some scenes."""
 
     parts: list[chosen.Part]
     seconds: float
@@ -48,15 +50,28 @@ class Looked(NamedTuple):
 
 @one_thread()
 def forecast(plan: Plan, threads: int, seconds: float = SECONDS, rounds: Sequence[int] = ROUNDS) -> Forecast:
-    """What is measured within about a second: how some variants converge, then as many pilots as there is time for."""
+    """What is measured within about three seconds: how some variants converge, then as many pilots as there is time
+    for."""
+    around = AROUND * time.process_time()
     warm_up(plan)
     end = time.perf_counter() + seconds
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     looked = _converge(plan, groups, partial(_past, end))
     if plan.converges:
-        return _of_convergence(plan, looked, threads)
-    found = _choose(plan, threads, looked, end, rounds)
-    return _without_pilots(plan, looked) if found is None else found
+        found: Forecast | None = _of_convergence(plan, looked, threads)
+    else:
+        found = _choose(plan, threads, looked, end, rounds)
+    found = found or _without_pilots(plan, looked)
+    return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
+
+
+def _audit(plan: Plan, looked: Looked, threads: int) -> float:
+    """Seconds of the audit, whose scenes are shared out."""
+    from engine.batch.audit import audit_size
+
+    wanted = plan.study.solver.audit
+    scenes = min(len(plan.grids), audit_size(plan) if wanted == "auto" else int(wanted))
+    return AUDIT * looked.seconds * scenes / min(threads, max(scenes, 1))
 
 
 def _past(end: float) -> bool:
@@ -66,39 +81,43 @@ def _past(end: float) -> bool:
 def _converge(plan: Plan, groups: Sequence[Group], halted: Callable[[], bool]) -> Looked:
     """Some variants of a few scenes, as they converge."""
     parts: list[chosen.Part] = []
-    seconds, some = 0.0, [groups[place] for place in spread(len(groups), SCENES)]
-    with suppress(Halted):
-        for group in some:
-            variants, started = group.variants[spread(group.variants.size, CONVERGED // len(some))], time.perf_counter()
+    took, some = [], [groups[place] for place in spread(len(groups), SCENES)]
+    for group in some:
+        variants, started = group.variants[spread(group.variants.size, CONVERGED // len(some))], time.perf_counter()
+        try:
             parts += chosen.converged(plan, group.found(plan.values(group, variants), variants, None, halted))
-            seconds = max(seconds, time.perf_counter() - started)
-    return Looked(parts, seconds)
+        except Halted:
+            took.append(UNFINISHED * (time.perf_counter() - started))
+            break
+        took.append(time.perf_counter() - started)
+    return Looked(parts, sum(took) / len(took))
 
 
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves."""
-    blocks = sum(-(-members.size // LANES) for members in plan.members)  # one takes as long as a few variants
+    chunks = sum(1 for _ in plan.chunks(None, None))  # each has tables of its own, which take longer than its marches
+    seconds = (looked.seconds * chunks + plan.seconds) / min(threads, chunks)
     if not looked.parts:
-        less = "a second was not enough for a variant to converge: this may take longer"
-        return Forecast(plan, "", (), max(plan.seconds, SECONDS * blocks) / min(threads, blocks), less)
+        less = "three seconds were not enough for a variant to converge: this may take longer"
+        return Forecast(plan, "", (), seconds, less)
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
-    return Forecast(plan, title, chosen.rows(looked.parts), looked.seconds * blocks / min(threads, blocks))
+    return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 
 
 def _without_pilots(plan: Plan, looked: Looked) -> Forecast:
     """A study whose pilots take longer than there is time."""
     pilots = usual_pilots(plan.size)
-    less = f"a second was not enough for pilots: a run measures {pilots}, and takes what they show to be enough"
-    climbs = CLIMB * max(min(len(plan.grids), MOST_SCENES), pilots // 64)
+    less = f"three seconds were not enough for pilots: a run measures {pilots}, and takes what they show to be enough"
+    climbs = CLIMB * min(len(plan.grids), MOST_SCENES)
     if not looked.parts:
-        return Forecast(plan, "", (), climbs * SECONDS, f"{less}; this may take longer")
+        return Forecast(plan, "", (), climbs * looked.seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
     return Forecast(plan, title, chosen.rows(looked.parts), climbs * looked.seconds, less)
 
 
 def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast | None:
     """More and more pilots, as many as there is time for; None where there is none."""
-    found, took = None, CLIMB * looked.seconds / LONGER
+    found, took = None, 0.5 * CLIMB * looked.seconds / LONGER
     for pilots in rounds:
         trial, started = replace(plan), time.perf_counter()
         if not looked.parts or started + LONGER * took > end:

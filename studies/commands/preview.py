@@ -1,4 +1,4 @@
-"""What a run would do, from its plan and about a second of measuring: the scene, the work and its time, as tables."""
+"""What a run would do, from its plan and a few seconds of measuring: the scene, the work and its time, as tables."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def preview(parts: Any, threads: int) -> Preview:
 
 @preview.register
 def _of_variants(parts: Variants, threads: int) -> Preview:
-    """That of a plan, from about a second of measuring."""
+    """That of a plan, from a few seconds of measuring."""
     plan = parts.plan
     seen = forecast(plan, threads)
     tables = (

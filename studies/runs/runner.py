@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from engine.kernels.compiling import told_of_compiling
 from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import files
 from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
 from results_schema.store.parts import PartStore
-from studies.protocol.compiling import told_of_compiling
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop

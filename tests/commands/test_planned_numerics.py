@@ -1,4 +1,4 @@
-"""The table of `check` that tells what variants are computed with, and what a second of measuring forecasts."""
+"""The table of `check` that tells what variants are computed with, and what three seconds of measuring forecast."""
 
 from __future__ import annotations
 
@@ -69,6 +69,6 @@ def test_pilots_are_measured_where_there_is_time() -> None:
 
 
 @pytest.mark.parametrize("sweep", [{"speed": SPEEDS}, {"speed": SPEEDS, "mass": MASSES}])
-def test_what_a_second_was_not_enough_for_is_said(sweep: dict[str, Any]) -> None:
+def test_what_three_seconds_were_not_enough_for_is_said(sweep: dict[str, Any]) -> None:
     seen = forecast(planned(beam(modes="auto"), sweep), 1, -1.0)
-    assert not seen.rows and "a second was not enough" in seen.remark
+    assert not seen.rows and "three seconds were not enough" in seen.remark

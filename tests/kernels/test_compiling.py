@@ -2,7 +2,7 @@
 
 import numba
 
-from studies.protocol.compiling import WORDS, told_of_compiling
+from engine.kernels.compiling import WORDS, told_of_compiling
 
 
 def test_it_is_told_once_and_only_when_something_is_compiled() -> None:
