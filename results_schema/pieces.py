@@ -63,20 +63,14 @@ class Pieces(Mapping[str, T], Generic[T]):
         try:
             piece = point.load()
         except Exception as error:
-            raise BadInput(
-                f"the {self.noun} {point.name} of another package cannot be imported",
-                where=where,
-                received=f"{type(error).__name__}: {error}"[:200],
-                remedy="mend or remove that package",
-            ) from None
+            what = f"the {self.noun} {point.name} of another package cannot be imported"
+            received = f"{type(error).__name__}: {error}"[:200]
+            raise BadInput(what, where=where, received=received, remedy="mend or remove that package") from None
         missing = self.missing(piece)
         if missing or self.name(piece) != point.name:
-            raise BadInput(
-                f"{point.value} is no {self.noun}",
-                where=where,
-                expected=f'{self.wanted}, whose name is "{point.name}"',
-                received=f"without {', '.join(missing)}" if missing else f'the name "{self.name(piece)}"',
-            )
+            expected = f'{self.wanted}, whose name is "{point.name}"'
+            received = f"without {', '.join(missing)}" if missing else f'the name "{self.name(piece)}"'
+            raise BadInput(f"{point.value} is no {self.noun}", where=where, expected=expected, received=received)
         return piece
 
 

@@ -78,11 +78,8 @@ def expand(
     for variable in declarations(kind):
         for one in _instances(variable, sensors, carriages, envelopes):
             if one.name in found or (one.name != variable.name and one.name in RESERVED):
-                raise BadInput(
-                    "two results would get this name",
-                    where=one.name,
-                    remedy="rename the sensor, carriage or envelope",
-                )
+                what = "two results would get this name"
+                raise BadInput(what, where=one.name, remedy="rename the sensor, carriage or envelope")
             found[one.name] = one
     return found
 

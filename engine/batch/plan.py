@@ -260,18 +260,13 @@ def check_readings(scene: SceneModel, window: Window) -> None:
     tables = SceneTables(scene, 1, window)
     for sensor in tables.sensors:
         if scene.fidelity is Fidelity.STATIC and sensor.offset_order:
-            raise BadInput(
-                f'fidelity = "static" has no {sensor.quantity}',
-                where=scene.study.source.where(f"sensor.{sensor.name}.quantity"),
-                expected="a quantity that statics tell, such as displacement",
-            )
+            what = f'fidelity = "static" has no {sensor.quantity}'
+            expected = "a quantity that statics tell, such as displacement"
+            raise scene.study.source.fault(f"sensor.{sensor.name}.quantity", what, expected=expected)
         seen = [s for s in tables.timeline.segments if s.recorded and (sensor.under is None or s.active[sensor.under])]
         if not seen:
-            raise BadInput(
-                "the carriage is off its body for all of the recorded part, so the sensor reads nothing",
-                where=scene.study.source.where(f"sensor.{sensor.name}.under"),
-                expected="a carriage on its body",
-            )
+            what = "the carriage is off its body for all of the recorded part, so the sensor reads nothing"
+            raise scene.study.source.fault(f"sensor.{sensor.name}.under", what, expected="a carriage on its body")
 
 
 def reads_accelerations(results: str) -> bool:
@@ -299,9 +294,9 @@ def check_memory(study: Study, size: int, result_bytes: int) -> None:
     """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
     needed = needed_memory(result_bytes)
     if needed > MOST_MEMORY:
-        raise BadInput(
+        raise study.source.fault(
+            "sweep",
             "the study does not fit into memory",
-            where=study.source.where("sweep"),
             expected=f"at most {MOST_MEMORY / 2**30:.0f} GiB",
             received=f"{needed / 2**30:.1f} GiB for {size} variants",
             remedy="fewer variants or sensors, or fewer histories",

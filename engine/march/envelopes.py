@@ -18,7 +18,6 @@ from engine.model.timeline import coarsened
 from engine.observation.readings import Sensor
 from engine.scene.sensors import MOST_PLACES
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.march.tables import Missed, SegmentTable
@@ -155,9 +154,9 @@ def check_places(study: Study, scenes: Iterable[SceneModel]) -> None:
         for name, places in envelope_places(scene).items():
             first = known.setdefault(name, places)
             if np.abs(places - first).max() > SAME_PLACE * first[-1]:
-                raise BadInput(
+                raise study.source.fault(
+                    f"envelope.{name}",
                     "the places of an envelope must be the same in all variants",
-                    where=study.source.where(f"envelope.{name}"),
                     expected="from and to, where a sweep changes the length of the body",
                     received=f"a last place of {first[-1]:.6g} m and of {places[-1]:.6g} m",
                 )

@@ -19,7 +19,6 @@ import numpy as np
 
 from engine.kernels.schemes import is_damped
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.kernels.schemes import Scheme
@@ -116,9 +115,9 @@ def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
     highest = float(model.omega.max())
     found = highest * float(np.max(time_scale / steps))
     if found > limit:
-        raise BadInput(
+        raise model.study.source.fault(
+            "solver.steps",
             "the step is beyond the scheme's stability limit",
-            where=model.study.source.where("solver.steps"),
             expected=f"omega h <= {limit:.4g} with the highest mode kept ({highest:.4g} rad/s)",
             received=f"omega h = {found:.4g}",
             remedy=f'{_enough(model, time_scale)}, steps = "auto", or scheme = "average-acceleration"',
@@ -129,9 +128,9 @@ def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
     least = LEAST_MARGIN * alias_steps(model, time_scale)
     worst = int(np.argmax(least / steps))
     if least[worst] > steps[worst]:
-        raise BadInput(
+        raise model.study.source.fault(
+            "solver.steps",
             "too few steps for the highest mode under a moving mass: the march could resonate with itself and grow",
-            where=model.study.source.where("solver.steps"),
             expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle (the alias rule)",
             received=str(int(steps[worst])),
             remedy=f'{_enough(model, time_scale)}, steps = "auto", fewer modes, or scheme = "hht-alpha" with '
@@ -151,9 +150,9 @@ def check_even_steps(model: SceneModel, steps: Counts) -> None:
     """Refuse a number of steps that a Richardson pair cannot halve. Raises BadInput."""
     odd = steps[steps % model.scheme.stride != 0]
     if odd.size:
-        raise BadInput(
+        raise model.study.source.fault(
+            "solver.steps",
             "a Richardson pair halves the number of steps",
-            where=model.study.source.where("solver.steps"),
             expected="an even number",
             received=str(int(odd[0])),
             remedy=f"steps = {int(odd[0]) + 1}",
@@ -174,17 +173,17 @@ def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
     for doubt in model.study.doubts():
         values = {key: model.study.value(key) for key in doubt.needs}
         if not doubt.met(values):
-            raise BadInput(
+            raise model.study.source.fault(
+                doubt.where,
                 f"{doubt.what}, and its march would take {float(np.max(steps)):.2g} steps",
-                where=model.study.source.where(doubt.where),
                 expected=doubt.expected,
                 received=doubt.amount(values),
                 remedy=doubt.meant(values),
             )
     frequency = model.first_omega / (2.0 * math.pi)
-    raise BadInput(
+    raise model.study.source.fault(
+        "solver.steps",
         "too many steps over one passage or cycle",
-        where=model.study.source.where("solver.steps"),
         expected=f"at most {MOST_STEPS}",
         received=f"{float(np.max(steps)):.3g}, with a first natural frequency of {frequency:.3g} Hz",
         remedy="look at the units of the body and of the motion; or a larger tolerance, a faster motion, larger steps",
@@ -232,12 +231,9 @@ def check_free_vibration(model: SceneModel) -> None:
     alone, whatever the springs of a variant. Raises BadInput."""
     for carriage in model.carriages:
         if math.isfinite(model.scheme.stability_limit) and vibrates_freely(carriage):
-            raise BadInput(
-                "free vibration with springs needs a scheme that is stable with any step",
-                where=model.study.source.where(f"carriage.{carriage.name}.motion.after"),
-                expected="0",
-                remedy='scheme = "average-acceleration"',
-            )
+            what = "free vibration with springs needs a scheme that is stable with any step"
+            remedy = 'scheme = "average-acceleration"'
+            raise model.study.source.fault(f"carriage.{carriage.name}.motion.after", what, expected="0", remedy=remedy)
 
 
 def limit_with_springs(model: SceneModel, values: VariantValues) -> Array:
@@ -251,9 +247,9 @@ def _refuse(model: SceneModel, least: Array, steps: Counts, what: str) -> None:
     if least[worst] > steps[worst]:
         stride = model.scheme.stride
         enough = stride * math.ceil(LIMIT_MARGIN * float(least.max()) / stride)
-        raise BadInput(
+        raise model.study.source.fault(
+            "solver.steps",
             what,
-            where=model.study.source.where("solver.steps"),
             expected=f"at least {math.ceil(float(least[worst]))} steps over a passage or cycle",
             received=str(int(steps[worst])),
             remedy=f'steps = {enough} or more, or steps = "auto"',

@@ -246,19 +246,17 @@ def _moving_track(model: SceneModel, segment: Segment, offsets: tuple[float, ...
 def check_comparison(scheme: ComparisonScheme, model: SceneModel) -> None:
     """Refuse a scene that a comparison scheme cannot march. Raises BadInput."""
     if model.ties != 1:
-        raise BadInput(
+        raise model.study.source.fault(
+            "carriage",
             f"{scheme.name} is for comparison only",
-            where=model.study.source.where("carriage"),
             expected="one carriage, no dampers and no springs",
             received=f"{len(model.carriages)} carriages, {len(model.dampers)} dampers, {len(model.springs)} springs",
         )
     carriage = model.carriages[0]
     if isinstance(scheme.rule, RigidTie) and (carriage.inertia != "mass" or model.bodies[carriage.body].own_weight):
-        raise BadInput(
-            f"{scheme.name} is for comparison only",
-            where=model.study.source.where(f"carriage.{carriage.name}.kind"),
-            expected="a mass in full on a body whose own weight does not act",
-        )
+        what = f"{scheme.name} is for comparison only"
+        expected = "a mass in full on a body whose own weight does not act"
+        raise model.study.source.fault(f"carriage.{carriage.name}.kind", what, expected=expected)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.timeline import Segment, build_timeline
 from engine.model.variant_values import VariantValues, lane_table, moving_mass, weight
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput, Interrupted
+from results_schema.errors import Interrupted
 
 DEGREE = 7  # of the polynomials between which the track's rows are looked up
 CELL_PHASE = 0.25  # rad of the highest mode's wave that a polynomial covers: the rows are exact within 1e-13
@@ -193,5 +193,4 @@ def check_smooth(model: SceneModel, static: Sequence[str]) -> None:
 
 
 def _refuse(model: SceneModel, key: str, expected: str) -> None:
-    where = model.study.source.where(key)
-    raise BadInput("errors are measured on simpler scenes than this", where=where, expected=expected)
+    raise model.study.source.fault(key, "errors are measured on simpler scenes than this", expected=expected)

@@ -251,8 +251,7 @@ def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
 def check_moves(study: Study) -> None:
     """Refuse a study without a carriage. Raises BadInput."""
     if not study.carriage:
-        where = study.source.where("carriage")
-        raise BadInput("nothing moves", where=where, expected="at least one table [carriage.name]")
+        raise study.source.fault("carriage", "nothing moves", expected="at least one table [carriage.name]")
 
 
 def _in_use(study: Study, body: str) -> bool:
@@ -297,9 +296,9 @@ def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie]) -> I
     for number, tie in enumerate(carriages):
         if study.carriage[tie.name].pushes_along and numerics.fidelity not in ("force", "static"):
             if tie.rider.is_jolted(alone=len(carriages) == 1):
-                raise BadInput(
+                raise study.source.fault(
+                    f"carriage.{tie.name}.motion",
                     "this carriage changes its speed at an instant, and so would push along its track without bound",
-                    where=study.source.where(f"carriage.{tie.name}.motion"),
                     expected="a motion without jumps of speed",
                     remedy="turn > 0 of an out-and-back, or inertia_along = false",
                 )
@@ -327,9 +326,12 @@ def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
     try:
         modal = build_body(body, study.spots(name))
     except BadInput as error:
-        where = study.source.where(f"body.{name}.{error.where}")
-        raise BadInput(
-            error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
+        raise study.source.fault(
+            f"body.{name}.{error.where}",
+            error.what,
+            expected=error.expected,
+            received=error.received,
+            remedy=error.remedy,
         ) from None
     return BodyPart(name, modal, slice(first, first + modal.omega.size), body.own_weight)
 
@@ -349,15 +351,9 @@ def _check_rigid_modes(model: SceneModel) -> None:
         if number in riding:
             continue
         if part.modal.rigid_modes == len(part.modal.omega):
-            raise BadInput(
-                "only rigid-body modes are kept",
-                where=model.study.source.where(f"body.{part.name}.modes"),
-                expected=f"more than {part.modal.rigid_modes} modes",
-            )
+            what, expected = "only rigid-body modes are kept", f"more than {part.modal.rigid_modes} modes"
+            raise model.study.source.fault(f"body.{part.name}.modes", what, expected=expected)
         if part.modal.rigid_modes and model.study.start == "equilibrium":
-            raise BadInput(
-                "nothing holds this body, so it has no static equilibrium to start from",
-                where=where,
-                expected="supports that hold it in every direction",
-                remedy='hold it, a frame that may slide by supports.NODE = ["x"], or set initial = "rest"',
-            )
+            what = "nothing holds this body, so it has no static equilibrium to start from"
+            remedy = 'hold it, a frame that may slide by supports.NODE = ["x"], or set initial = "rest"'
+            raise BadInput(what, where=where, expected="supports that hold it in every direction", remedy=remedy)

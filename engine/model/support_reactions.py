@@ -98,9 +98,9 @@ def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tu
     rigid = modal.omega == 0.0
     pull = modal.participation / modal.mass
     if not float(np.sum(pull[rigid] ** 2) * modal.mass) > 1.0 - HELD:
-        raise BadInput(
+        raise study.source.fault(
+            f"carriage.{name}.body",
             "something holds this body: it cannot ride",
-            where=study.source.where(f"carriage.{name}.body"),
             expected="a body that is free to move along gravity",
             remedy="no supports, or only such as leave it free along gravity, and rigid-body modes kept",
         )
@@ -133,9 +133,9 @@ def _check_stands(study: Study, name: str, balance: tuple[Array, Array], shares:
     free, pull = balance
     tips = np.abs(free.T @ shares - pull).max() > 1e-9 * np.abs(pull).max()
     if tips or shares.min() < -LIFTS:
-        raise BadInput(
+        raise study.source.fault(
+            f"carriage.{name}.contacts",
             "this body would tip over: its contacts cannot carry its weight at rest",
-            where=study.source.where(f"carriage.{name}.contacts"),
             expected="contacts on both sides of its centre of mass",
             received=_places_in_words(study, name),
             remedy="a contact further out on the side to which it tips, or another one",
@@ -152,20 +152,17 @@ def _places_in_words(study: Study, name: str) -> str:
 
 def _check_fidelity(study: Study, name: str) -> None:
     if study.solver.fidelity in ("mass", "mass-without-convective"):
-        raise BadInput(
-            f'carriage {name} is a body on contacts, for which fidelity = "{study.solver.fidelity}" has no meaning',
-            where=study.source.where("solver.fidelity"),
-            expected='"auto", or "force" for its weight alone',
-        )
+        what = f'carriage {name} is a body on contacts, for which fidelity = "{study.solver.fidelity}" has no meaning'
+        raise study.source.fault("solver.fidelity", what, expected='"auto", or "force" for its weight alone')
 
 
 def _check_directions(study: Study, name: str, place: Place) -> None:
     """The weight acts in one direction on all that carries it."""
     along = [place.bodies[body].gravity_share for body in (place.tie.body, *place.below)]
     if max(along) - min(along) > 1e-9:
-        raise BadInput(
+        raise study.source.fault(
+            f"carriage.{name}.contacts",
             "the bodies under these contacts deflect in different directions",
-            where=study.source.where(f"carriage.{name}.contacts"),
             expected="tracks whose loads act equally along gravity",
             received=", ".join(f"{share:.3g} of gravity" for share in along[1:]),
         )
@@ -177,9 +174,9 @@ def _check_points(study: Study, name: str, carriage: Carriage, modal: ModalBody)
     )
     for word, contact in carriage.riding_contacts.items():
         if contact.point is not None and contact.point not in known:
-            raise BadInput(
+            raise study.source.fault(
+                f"carriage.{name}.contacts.{word}.point",
                 f"body {carriage.riding_body} has no such point",
-                where=study.source.where(f"carriage.{name}.contacts.{word}.point"),
                 expected=f"one of {', '.join(known)}" if known else "at = metres along its track: it has no points",
                 received=contact.point,
             )
@@ -190,22 +187,15 @@ def _check_ways(study: Study, name: str, carriage: Carriage, riders: tuple[Rider
     for rider, (word, contact) in zip(riders, carriage.riding_contacts.items(), strict=True):
         where = study.source.where(f"carriage.{name}.contacts.{word}")
         if rider.stays and rider.leaves:
-            raise BadInput(
-                "this contact leaves the body that it rides",
-                where=where,
-                expected=f"a way within 0 to {rider.length:.6g} m",
-                received="{:.6g} to {:.6g} m".format(*rider.range),
-            )
+            what, expected = "this contact leaves the body that it rides", f"a way within 0 to {rider.length:.6g} m"
+            raise BadInput(what, where=where, expected=expected, received="{:.6g} to {:.6g} m".format(*rider.range))
         shocks = (
             rider.is_jolted(alone=len(study.carriage) == 1) or rider.delay > 0.0 or rider.motion.free_vibration > 0.0
         )
         if contact.is_rigid and (rider.leaves or shocks):
-            raise BadInput(
-                "a rigid contact would meet a shock",
-                where=f"{where}.stiffness",
-                expected="a way that stays on the body, without jumps of speed, delay or free vibration afterwards",
-                remedy="a stiffness in N/m",
-            )
+            what = "a rigid contact would meet a shock"
+            expected = "a way that stays on the body, without jumps of speed, delay or free vibration afterwards"
+            raise BadInput(what, where=f"{where}.stiffness", expected=expected, remedy="a stiffness in N/m")
 
 
 def _joints(carriage: Carriage, riders: tuple[Rider, ...], place: Place) -> Array:
@@ -225,9 +215,9 @@ def _check_joints(study: Study, name: str, rows: Array) -> None:
     """Refuse more rigid contacts than the kept modes of all bodies can meet."""
     met = int(np.linalg.matrix_rank(rows, tol=CLASH * len(rows))) if rows.size else 0
     if met < len(rows):
-        raise BadInput(
+        raise study.source.fault(
+            f"carriage.{name}.contacts",
             "the kept modes of these bodies cannot meet so many rigid contacts",
-            where=study.source.where(f"carriage.{name}.contacts"),
             expected=f"at most {met} of them rigid, at different places",
             received=str(len(rows)),
             remedy="more modes, or a stiffness in N/m",

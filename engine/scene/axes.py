@@ -95,9 +95,9 @@ def read(study: Study, name: str, axis: SweepAxis, amount: Any, entry: str) -> N
 def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
     """Every key of the axis is a number of the study, or an optional one. Raises BadInput with the nearest key."""
     for path in axis.of:
-        where = study.source.where(f"sweep.{name}.of")
+        here = f"sweep.{name}.of"
         if any(path == fixed or path.startswith(f"{fixed}.") for fixed in FIXED):
-            raise BadInput("this number is not part of the model", where=where, received=shortened(path))
+            raise study.source.fault(here, "this number is not part of the model", received=shortened(path))
         try:
             current = study.value(path)
         except KeyError:
@@ -109,13 +109,14 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             if several := fnmatch.filter(known, path) if "*" in path else []:
                 remedy = f"name each of them: of = {json.dumps(several[:3])}{' and so on' * (len(several) > 3)}"
-            raise BadInput(
-                "no such number", where=where, expected="the key of a number", received=shortened(path), remedy=remedy
+            what = "no such number"
+            raise study.source.fault(
+                here, what, expected="the key of a number", received=shortened(path), remedy=remedy
             )
         if not study.targets(path):
-            raise BadInput(
+            raise study.source.fault(
+                here,
                 "this number of a train cannot be swept",
-                where=where,
                 expected="spacing (one for all), spacing_scale, load_scale, a load or a number of the motion",
                 received=shortened(path),
                 remedy="a study file for each",
@@ -138,8 +139,8 @@ def _read_at(study: Study, path: str, amount: Any, entry: str) -> Number:
     except ValidationError as error:
         problem = bad_input(error.errors(include_url=False)[0], Scene, data, study.source)
         what, received = f"{path}: {problem.what}", problem.received or shortened(amount)
-        where = study.source.where(entry)
-        raise BadInput(what, where=where, expected=problem.expected, received=received, remedy=problem.remedy) from None
+        expected = problem.expected
+        raise study.source.fault(entry, what, expected=expected, received=received, remedy=problem.remedy) from None
     return number
 
 
@@ -164,4 +165,4 @@ def check_distinct(study: Study, name: str, values: Values) -> None:
 
 
 def _bad(study: Study, key: str, what: str, expected: str, received: str) -> BadInput:
-    return BadInput(what, where=study.source.where(f"sweep.{key}"), expected=expected, received=received)
+    return study.source.fault(f"sweep.{key}", what, expected=expected, received=received)

@@ -252,10 +252,8 @@ class BodyCarriage(Carriage):
     @model_validator(mode="after")
     def _one_way(self) -> BodyCarriage:
         if self.on not in self.ridden:
-            raise fault(
-                f"no contact stands on {self.on}, along which the carriage moves",
-                expected=f'on = "{self.on}" of a contact',
-            )
+            what = f"no contact stands on {self.on}, along which the carriage moves"
+            raise fault(what, expected=f'on = "{self.on}" of a contact')
         if len({contact.offset is None for contact in self.contacts.values() if contact.at is not None}) > 1:
             expected = "an offset for all of them, or for none"
             raise fault("the track of the body that rides lies along the way or across it", expected=expected)

@@ -183,7 +183,7 @@ class Study(Scene):
             try:
                 data = with_value(data, path, value)
             except KeyError:
-                raise BadInput("no such key", where=self._source.where(path)) from None
+                raise self._source.fault(path, "no such key") from None
         return Study(document_of(data, self._source.name))
 
     def without_sweep(self) -> Study:
@@ -265,8 +265,8 @@ def verify(study: Study) -> None:
     for check in checks(study):
         values = {key: study.value(key) for key in check.needs}
         if not check.met(values).all():
-            where, received = study.source.where(check.where), check.received(values, study.source)
-            raise BadInput(check.what, where=where, expected=check.expected, received=received)
+            received = check.received(values, study.source)
+            raise study.source.fault(check.where, check.what, expected=check.expected, received=received)
 
 
 def checks(study: Study) -> Iterator[Check]:
@@ -322,9 +322,9 @@ def _check_swept_words(study: Study) -> None:
         for path in axis.of:
             place = field_at(Scene, study.tables, path.split("."))
             if place is not None and place.holds_words_only:
-                raise BadInput(
+                raise study.source.fault(
+                    f"sweep.{name}.of",
                     "a word cannot be swept",
-                    where=study.source.where(f"sweep.{name}.of"),
                     expected="the key of a number",
                     received=shortened(path),
                     remedy="a study file for each word, or a loop in Python: study.with_values({key: word})",
@@ -354,12 +354,11 @@ def _check_names(study: Study) -> None:
     try:
         results = expand("march", sensors, list(study.carriage), envelopes)
     except BadInput as error:
-        where = study.source.where(error.where)
-        raise BadInput(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
+        raise study.source.fault(error.where, error.what, expected=error.expected, remedy=error.remedy) from None
     for name in study.sweep.axes:
         if name in results:
-            where = study.source.where(f"sweep.{name}")
-            raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
+            what = "a result has this name"
+            raise study.source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
 
 
 def _check_references(study: Study) -> None:
@@ -394,8 +393,9 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         _must_exist(study, f"{here}.body", sensor.body, "body")
     body = study.body_of(name)
     if sensor.body not in (None, body):
-        where, received = study.source.where(f"{here}.body"), f'"{sensor.body}"'
-        raise BadInput("the carriage rides on another body", where=where, expected=f'"{body}"', received=received)
+        received = f'"{sensor.body}"'
+        what = "the carriage rides on another body"
+        raise study.source.fault(f"{here}.body", what, expected=f'"{body}"', received=received)
     _check_quantity(study, here, body, sensor.quantity)
     if sensor.spot is not None:
         with _within(study, here):
@@ -407,14 +407,10 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
     body = study.body[name]
     if quantity in body.untold:
         expected = f"one of {', '.join(told for told in quantities_of_a_body() if told not in body.untold)}"
-        raise BadInput(
-            f"{quantity} is not available on body {name}",
-            where=study.source.where(f"{here}.quantity"),
-            expected=expected,
-        )
+        raise study.source.fault(f"{here}.quantity", f"{quantity} is not available on body {name}", expected=expected)
     if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
-        where = study.source.where(f"body.{name}.{missing}")
-        raise BadInput(f"a {quantity} sensor needs this key", where=where, expected="a length (m), > 0")
+        what = f"a {quantity} sensor needs this key"
+        raise study.source.fault(f"body.{name}.{missing}", what, expected="a length (m), > 0")
 
 
 @contextmanager
@@ -423,9 +419,8 @@ def _within(study: Study, here: str) -> Iterator[None]:
     try:
         yield
     except BadInput as error:
-        where = study.source.where(f"{here}.{error.where}")
-        raise BadInput(
-            error.what, where=where, expected=error.expected, received=error.received, remedy=error.remedy
+        raise study.source.fault(
+            f"{here}.{error.where}", error.what, expected=error.expected, received=error.received, remedy=error.remedy
         ) from None
 
 
@@ -433,9 +428,8 @@ def _check_along(study: Study, carriage: Carriage) -> None:
     """The inertia of a carriage can act along its track."""
     if any(other.riding_body == carriage.on for other in study.carriage.values()):
         what = "the body below rides too: its own motion holds it along"
-        raise BadInput(
-            what, where="inertia_along", expected="a body that does not ride", remedy="inertia_along = false"
-        )
+        where = "inertia_along"
+        raise BadInput(what, where=where, expected="a body that does not ride", remedy="inertia_along = false")
     study.body[carriage.on].check_along()
 
 
@@ -449,8 +443,9 @@ def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
             missing = "none: leave this key out" if not contacts else expected
             raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
     elif carriage.suspension is None:
-        where, remedy = study.source.where(f"{here}.carriage"), carriage.instead_of_own_motion(str(sensor.carriage))
-        raise BadInput("this carriage has no sprung mass", where=where, expected="an oscillator", remedy=remedy)
+        remedy = carriage.instead_of_own_motion(str(sensor.carriage))
+        what = "this carriage has no sprung mass"
+        raise study.source.fault(f"{here}.carriage", what, expected="an oscillator", remedy=remedy)
 
 
 def _check_rider(study: Study, name: str, body: str) -> None:
@@ -466,12 +461,12 @@ def _check_rider(study: Study, name: str, body: str) -> None:
     alone = [rider for rider, _ in riding].count(body) == 1
     if body in below or not alone:
         what = "a body cannot ride on itself" if alone else "this body rides twice"
-        raise BadInput(what, where=study.source.where(here), received=shortened(body), remedy="another body")
+        raise study.source.fault(here, what, received=shortened(body), remedy="another body")
 
 
 def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carriage"]) -> None:
     names: list[str] = list(getattr(study, table))
     if name not in names:
         expected = f"one of {', '.join(names)}" if names else f"a table such as [{table}.name]; there is none"
-        where, received, remedy = study.source.where(key), shortened(name), nearest(name, names)
-        raise BadInput(f"no such {table}", where=where, expected=expected, received=received, remedy=remedy)
+        received, remedy = shortened(name), nearest(name, names)
+        raise study.source.fault(key, f"no such {table}", expected=expected, received=received, remedy=remedy)

@@ -175,8 +175,8 @@ def _check_paths(study: Study) -> None:
         for path, target in own:
             clash = next((other for other in owners if f"{target}.".startswith(f"{other}.")), None)
             if clash is not None:
-                where = study.source.where(f"sweep.{name}.of")
-                raise BadInput("this number is set twice", where=where, received=f"{path}, also by {owners[clash]}")
+                what = "this number is set twice"
+                raise study.source.fault(f"sweep.{name}.of", what, received=f"{path}, also by {owners[clash]}")
             owners[target] = name
 
 
@@ -188,8 +188,8 @@ def _check_repeats(study: Study, cases: Cases) -> None:
     rows = np.array([axis.values for axis in cases.axes]) if study.sweep.zip and cases.axes else np.zeros((1, 0))
     counts = np.unique(rows, axis=1, return_counts=True)[1]
     if (counts > 1).any():
-        where = study.source.where("sweep")
-        raise BadInput("zipped axes repeat a variant", where=where, received=f"{int((counts > 1).sum())} repeated")
+        what = "zipped axes repeat a variant"
+        raise study.source.fault("sweep", what, received=f"{int((counts > 1).sum())} repeated")
 
 
 def _verify(study: Study, cases: Cases, check: Check) -> None:
@@ -221,5 +221,5 @@ def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any],
 
 def _refuse(study: Study, check: Check, values: Mapping[str, Any], entries: Mapping[str, int]) -> NoReturn:
     places = ", ".join(f"sweep.{name} entry {entry}" for name, entry in entries.items())
-    where, received = study.source.where(check.where), f"{check.received(values, study.source)} ({places})"
-    raise BadInput(check.what, where=where, expected=check.expected, received=received)
+    received = f"{check.received(values, study.source)} ({places})"
+    raise study.source.fault(check.where, check.what, expected=check.expected, received=received)

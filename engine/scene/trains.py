@@ -14,7 +14,6 @@ from engine.scene.motions import AnyMotion
 from engine.study_file.document import Document
 from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form, refuse
 from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, fault
-from results_schema.errors import BadInput
 
 MAX_AXLES = 200
 
@@ -181,8 +180,8 @@ def with_axles(document: Document) -> Document:
             trained_by[f"carriage.{own}"] = f"train.{name}"
     for name in axles:
         if "kind" in written.get(name, {}):
-            here, received = source.where(f"carriage.{name}"), f"an axle of {trained_by[f'carriage.{name}']}"
-            raise BadInput("two carriages have this name", where=here, received=received, remedy="another name")
+            here, what = f"carriage.{name}", "two carriages have this name"
+            raise source.fault(here, what, received=f"an axle of {trained_by[here]}", remedy="another name")
     return Document(data | {"carriage": _overlaid(written, axles)}, replace(source, written_as=trained_by))
 
 

@@ -59,6 +59,10 @@ class Source:
         table = ".".join(key.split(".")[:2])
         return self.written_as.get(table, table) + key[len(table) :]
 
+    def fault(self, key: str, what: str, *, expected: str = "", received: str = "", remedy: str = "") -> BadInput:
+        """A refusal that names the file and the dotted key."""
+        return BadInput(what, where=self.where(key), expected=expected, received=received, remedy=remedy)
+
 
 @dataclass(frozen=True)
 class Document:
@@ -160,12 +164,8 @@ def _parsed(source: Source) -> dict[str, Any]:
         place, complaint = _PLACE.search(str(error)), _PLACE.sub("", str(error))
         line = int(place[1]) if place and place[1] else source.text.count("\n") + 1
         written = source.text.split("\n")[line - 1].strip()
-        raise BadInput(
-            f"not valid TOML: {complaint}",
-            where=source.where(line=line),
-            received=shortened(written),
-            remedy=what_to_write(written, complaint),
-        ) from None
+        what, remedy = f"not valid TOML: {complaint}", what_to_write(written, complaint)
+        raise BadInput(what, where=source.where(line=line), received=shortened(written), remedy=remedy) from None
 
 
 def _refuse_nesting(source: Source, line: int | None) -> NoReturn:

@@ -116,12 +116,9 @@ def full_body(study: Study, name: str) -> FullBody:
     whole = study.body[name].whole
     if whole is not None:
         return _FULL[whole.kind](study, name, whole)
-    raise BadInput(
-        "this body has no whole finite-element model to compare with",
-        where=study.source.where(f"body.{name}.kind"),
-        expected='"frame", "beam" or "rigid"',
-        received=f'"{study.value(f"body.{name}.kind")}"',
-    )
+    what = "this body has no whole finite-element model to compare with"
+    received = f'"{study.value(f"body.{name}.kind")}"'
+    raise study.source.fault(f"body.{name}.kind", what, expected='"frame", "beam" or "rigid"', received=received)
 
 
 def _whole_beam(study: Study, name: str, beam: Beam) -> FullBody:
@@ -137,13 +134,8 @@ def _whole_frame(study: Study, name: str, frame: Frame) -> FullBody:
 def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEMENTS) -> Frame:
     """A uniform beam as a plane frame with nodes at its supports and about so many elements."""
     if len(beam.springs) > MOST_SUPPORTS:
-        where = study.source.where(f"body.{name}.supports")
-        raise BadInput(
-            "too many supports for the unreduced model",
-            where=where,
-            expected=f"at most {MOST_SUPPORTS}",
-            received=str(len(beam.springs)),
-        )
+        what, expected = "too many supports for the unreduced model", f"at most {MOST_SUPPORTS}"
+        raise study.source.fault(f"body.{name}.supports", what, expected=expected, received=str(len(beam.springs)))
     places = sorted({0.0, beam.length, *(spring.at for spring in beam.springs)})
     number = {place: f"n{index}" for index, place in enumerate(places)}
     members = {

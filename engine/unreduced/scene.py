@@ -20,7 +20,6 @@ from engine.model.timeline import Rider
 from engine.scene.carriages import Carriage, Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
-from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -154,8 +153,9 @@ def unreduced_model(
     model, and for a fidelity other than "auto".
     """
     if study.solver.fidelity not in ("auto", "full"):
-        where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'
-        raise BadInput("the unreduced model is a full one", where=where, expected='"auto"', received=received)
+        received = f'"{study.solver.fidelity}"'
+        what = "the unreduced model is a full one"
+        raise study.source.fault("solver.fidelity", what, expected='"auto"', received=received)
     used = {study.body_of(sensor) for sensor in study.sensor}
     for carriage in study.carriage.values():
         used |= set(carriage.bodies)
@@ -183,9 +183,9 @@ def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
     for name, carriage in study.carriage.items():
         share = min(bodies[body].gravity_share for body in carriage.ridden)
         if carriage.inertial and abs(share - 1.0) > 1e-9 and study.gravity != 0.0:
-            raise BadInput(
+            raise study.source.fault(
+                f"carriage.{name}.on",
                 "the weight of this carriage does not act in the direction of its track",
-                where=study.source.where(f"carriage.{name}.on"),
                 expected="a track whose loads act along gravity",
                 received=f"{share:.3g} of gravity along it",
             )
@@ -195,9 +195,9 @@ def _check_quantities(study: Study) -> None:
     """What sensors read is a motion, its rates, or what sections carry."""
     for name, sensor in study.sensor.items():
         if sensor.reads.derivative and not sensor.reads.of_section:
-            raise BadInput(
+            raise study.source.fault(
+                f"sensor.{name}.quantity",
                 "the unreduced model does not have this quantity",
-                where=study.source.where(f"sensor.{name}.quantity"),
                 expected="displacement, velocity, acceleration, a section force, stress, strain or contact_force",
                 received=f'"{sensor.quantity}"',
             )
@@ -292,9 +292,9 @@ class _Scene:
         found = body.points.get(str(contact.place))
         if found is None:
             names = [point.removeprefix("point.") for point in body.points if point.startswith("point.")]
-            raise BadInput(
+            raise self.study.source.fault(
+                f"carriage.{name}.contacts.{word}.point",
                 "no such point of the body that rides",
-                where=self.study.source.where(f"carriage.{name}.contacts.{word}.point"),
                 expected=f"one of {', '.join(names)}" if names else "a contact with `at`",
                 received=f'"{contact.point}"',
             )

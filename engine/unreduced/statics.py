@@ -17,7 +17,6 @@ from engine.bodies.modal.flexibility import of_unit_mass
 from engine.unreduced.rows import Along, at_positions, nowhere, readings, softness, tie_rows
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.track import Rows
-from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -98,8 +97,8 @@ def _check_held(model: Unreduced) -> None:
     """Refuse a body that does not ride and is free to move."""
     for name, body in model.bodies.items():
         if body.rigid.shape[1] and name not in model.loose:
-            where = model.study.source.where(f"body.{name}.supports")
-            raise BadInput("nothing holds this body, so it has no static equilibrium", where=where)
+            what = "nothing holds this body, so it has no static equilibrium"
+            raise model.study.source.fault(f"body.{name}.supports", what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +166,9 @@ class StaticSolver:
         """Refuse loads that nothing carries."""
         size = np.abs(loads @ self.model.rigid).max(initial=0.0)
         if np.abs(balance @ free).max(initial=0.0) > BALANCED * size:
-            raise BadInput(
-                "the contacts of this scene cannot carry what rides on them",
-                where=self.model.study.source.where("carriage"),
-                expected="contacts about the centre of mass, at least two under a body that can pitch",
-            )
+            what = "the contacts of this scene cannot carry what rides on them"
+            expected = "contacts about the centre of mass, at least two under a body that can pitch"
+            raise self.model.study.source.fault("carriage", what, expected=expected)
 
 
 def _coupled(

@@ -63,12 +63,8 @@ def write_whole(path: Path | str, write: Callable[[Path], None], look: Callable[
 def output_failed(path: Path, error: BaseException) -> OutputFailed:
     """The error for a failed operation on `path`, with the bytes that are free there."""
     reason = getattr(error, "strerror", None) or str(error)
-    return OutputFailed(
-        f"cannot write ({reason})",
-        path=path,
-        free_bytes=_free_bytes(path.parent),
-        remedy="free some space or choose another place, then run again: finished work is kept",
-    )
+    remedy = "free some space or choose another place, then run again: finished work is kept"
+    return OutputFailed(f"cannot write ({reason})", path=path, free_bytes=_free_bytes(path.parent), remedy=remedy)
 
 
 def _free_bytes(folder: Path) -> int | None:
@@ -198,12 +194,8 @@ def check_replaceable(path: Path | str) -> None:
     """Refuse to put an archive in the place of anything that none has ever been. Raises BadInput."""
     path = Path(path)
     if path.exists() and not is_hdf5(path):
-        raise BadInput(
-            "what is there is no archive, and is never replaced",
-            where=str(path),
-            expected="no file, or a netCDF-4 file",
-            remedy="choose another place, or move it away",
-        )
+        what, expected = "what is there is no archive, and is never replaced", "no file, or a netCDF-4 file"
+        raise BadInput(what, where=str(path), expected=expected, remedy="choose another place, or move it away")
 
 
 def is_hdf5(path: Path) -> bool:

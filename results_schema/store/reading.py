@@ -80,9 +80,8 @@ def _as_archive_error(path: Path) -> Iterator[None]:
     except WanderlastError:
         raise
     except (OSError, RuntimeError, ValueError, LookupError, AttributeError, TypeError, MemoryError) as error:
-        raise ArchiveError(
-            f"damaged or truncated ({error})", where=str(path), remedy="run the study again with --overwrite"
-        ) from error
+        what = f"damaged or truncated ({error})"
+        raise ArchiveError(what, where=str(path), remedy="run the study again with --overwrite") from error
 
 
 def _check_signature(path: Path) -> None:
@@ -102,20 +101,11 @@ def _check_signature(path: Path) -> None:
 def _check_schema(path: Path, dataset: Any) -> None:
     version = getattr(dataset, "schema_version", None)
     if not isinstance(version, int | np.integer) or not isinstance(getattr(dataset, "study_kind", None), str):
-        raise ArchiveError(
-            "a netCDF file of another program",
-            where=str(path),
-            expected="attributes schema_version and study_kind",
-            received=", ".join(dataset.ncattrs()) or "no attributes",
-        )
+        expected, received = "attributes schema_version and study_kind", ", ".join(dataset.ncattrs()) or "no attributes"
+        raise ArchiveError("a netCDF file of another program", where=str(path), expected=expected, received=received)
     if version > SCHEMA_VERSION:
-        raise ArchiveError(
-            "written by a newer version",
-            where=str(path),
-            expected=f"schema_version up to {SCHEMA_VERSION}",
-            received=str(version),
-            remedy="update wanderlast",
-        )
+        what, expected = "written by a newer version", f"schema_version up to {SCHEMA_VERSION}"
+        raise ArchiveError(what, where=str(path), expected=expected, received=str(version), remedy="update wanderlast")
     if version < SCHEMA_VERSION:
         raise ArchiveError(
             "written before archives held estimated_error of every reported number",
@@ -141,12 +131,8 @@ def check_sizes(path: Path, dataset: Any) -> None:
             claimed += count * (_TEXT_BYTES if variable.dtype is str else variable.dtype.itemsize)
     present = path.stat().st_size
     if claimed > _LARGEST_COMPRESSION * present:
-        raise ArchiveError(
-            "claims more data than it can hold",
-            where=str(path),
-            expected=f"at most {_LARGEST_COMPRESSION} times its {present} bytes",
-            received=f"{claimed} bytes",
-        )
+        expected, received = f"at most {_LARGEST_COMPRESSION} times its {present} bytes", f"{claimed} bytes"
+        raise ArchiveError("claims more data than it can hold", where=str(path), expected=expected, received=received)
 
 
 def _check_contents(path: Path, dataset: Any) -> None:
@@ -156,21 +142,15 @@ def _check_contents(path: Path, dataset: Any) -> None:
     if stated != found or "status" not in dataset.variables:
         missing = sorted(stated - found) or sorted(found - stated) or ["status"]
         word = "missing" if stated - found or stated == found else "not listed in its contents"
-        raise ArchiveError(
-            f"variables are {word}",
-            where=str(path),
-            expected=f"{len(stated)} variables, as its attribute {CONTENTS!r} says",
-            received=f"without {'; '.join(missing)}" if word == "missing" else "; ".join(missing),
-        )
+        expected = f"{len(stated)} variables, as its attribute {CONTENTS!r} says"
+        received = f"without {'; '.join(missing)}" if word == "missing" else "; ".join(missing)
+        raise ArchiveError(f"variables are {word}", where=str(path), expected=expected, received=received)
 
 
 def _check_digest(path: Path, dataset: Any, tables: dict[str, Table]) -> None:
     if digest(tables) != getattr(dataset, DIGEST, ""):
-        raise ArchiveError(
-            "damaged: values or attributes are not those that were written",
-            where=str(path),
-            remedy="run the study again with --overwrite",
-        )
+        what = "damaged: values or attributes are not those that were written"
+        raise ArchiveError(what, where=str(path), remedy="run the study again with --overwrite")
 
 
 _Loaded = tuple[np.ndarray, str]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from engine.scene.carriages import MAX_CONTACTS
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.at_rest.labelling import Gathering, asked_coordinates
 from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
@@ -121,11 +120,8 @@ def check_held(model: SceneModel) -> None:
     riding = {carriage.rides for carriage in model.carriages}
     for number, part in enumerate(model.bodies):
         if part.modal.rigid_modes and number not in riding:
-            raise BadInput(
-                "nothing holds this body, so it has no static state",
-                where=model.study.source.where(f"body.{part.name}.supports"),
-                expected="supports that hold it",
-            )
+            what = "nothing holds this body, so it has no static state"
+            raise model.study.source.fault(f"body.{part.name}.supports", what, expected="supports that hold it")
 
 
 def _numbers(study: Study, asked: Asked, positions: int) -> int:

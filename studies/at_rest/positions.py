@@ -70,9 +70,9 @@ def positions_of(study: Study, asked: Asked) -> Positions:
         found = np.array(asked.positions)
         slack = 1e-9 * (high - low)
         if found[0] < low - slack or found[-1] > high + slack:
-            raise BadInput(
+            raise study.source.fault(
+                "question.positions",
                 "a position where the carriage is off its body",
-                where=study.source.where("question.positions"),
                 expected=f"places within {low:.6g} to {high:.6g} m",
                 received=f"{found[0]:.6g} to {found[-1]:.6g} m",
             )
@@ -94,11 +94,8 @@ def way_of(study: Study) -> tuple[float, float]:
         first, last = carriage.motion.range()
         low, high = max(low, first), min(high, last)
     if not low < high:
-        raise BadInput(
-            "the carriage never stands on its body with all its contacts",
-            where=study.source.where(f"carriage.{name}.motion"),
-            expected=f"a way with a part within {free}",
-        )
+        what = "the carriage never stands on its body with all its contacts"
+        raise study.source.fault(f"carriage.{name}.motion", what, expected=f"a way with a part within {free}")
     return low, high
 
 
@@ -108,8 +105,8 @@ def check_mode_counts(study: Study, asked: Asked) -> None:
         try:
             with_modes(study, count, CORRECTED[0])
         except BadInput as error:
-            where = study.source.where("question.mode_counts")
-            raise BadInput(f"with {count} modes: {error.what}", where=where, expected=error.expected) from None
+            what = f"with {count} modes: {error.what}"
+            raise study.source.fault("question.mode_counts", what, expected=error.expected) from None
 
 
 def with_modes(study: Study, count: int, others: Mapping[str, Any]) -> Study:

@@ -91,12 +91,8 @@ class Scene:
         highest = (self.modes * np.pi / LENGTH) ** 2 * FLEXURAL_SPEED
         least = max(LEAST_SPEED, INSIDE * highest * LENGTH / (self.steps * limit))
         if least >= MOST_SPEED:
-            raise BadInput(
-                "the highest mode is too fast for the scheme at every speed of the scene",
-                where="--scheme",
-                expected=f"omega h <= {limit:.4g}",
-                remedy="more steps or fewer modes",
-            )
+            what, where = "the highest mode is too fast for the scheme at every speed of the scene", "--scheme"
+            raise BadInput(what, where=where, expected=f"omega h <= {limit:.4g}", remedy="more steps or fewer modes")
         return float(least)
 
 

@@ -62,12 +62,8 @@ def find_study(study: str) -> Path:
     if study in known:
         return known[study]
     if is_hdf5(path):
-        raise BadInput(
-            "this is an archive of results, not a study",
-            where=study,
-            expected="a study file (TOML)",
-            remedy=f"wanderlast report {study}, or wanderlast info {study}",
-        )
+        expected, remedy = "a study file (TOML)", f"wanderlast report {study}, or wanderlast info {study}"
+        raise BadInput("this is an archive of results, not a study", where=study, expected=expected, remedy=remedy)
     if path.is_file():
         return path
     near = _nearest(study, [*known, *map(str, sorted(path.parent.glob("*.toml")))])
@@ -75,24 +71,17 @@ def find_study(study: str) -> Path:
         raise BadInput("this is a folder", where=study, expected="a study file (TOML)", remedy=near)
     if path.suffix or len(path.parts) > 1:
         raise BadInput("the study file cannot be read: no such file", where=study, remedy=near)
-    raise BadInput(
-        "no such file, and no built-in study of that name",
-        where=study,
-        expected=f"a path, or one of {', '.join(known)}",
-        remedy=near,
-    )
+    what = "no such file, and no built-in study of that name"
+    raise BadInput(what, where=study, expected=f"a path, or one of {', '.join(known)}", remedy=near)
 
 
 def refuse_study(path: Path) -> None:
     """Tell what to do where a study stands in place of an archive. Raises BadInput."""
     is_built_in = str(path) in built_in() and not path.exists()
     if is_built_in or (path.suffix == ".toml" and path.is_file()):
-        raise BadInput(
-            f"this is a {'built-in study' if is_built_in else 'study file'}, not an archive of results",
-            where=str(path),
-            expected="an archive (.nc)",
-            remedy=f"first wanderlast run {path}, then the same with {path.stem}.nc",
-        )
+        what = f"this is a {'built-in study' if is_built_in else 'study file'}, not an archive of results"
+        remedy = f"first wanderlast run {path}, then the same with {path.stem}.nc"
+        raise BadInput(what, where=str(path), expected="an archive (.nc)", remedy=remedy)
 
 
 def as_typed(study: str) -> str:
@@ -116,12 +105,8 @@ def start_text(kind: str) -> str:
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:
-        raise BadInput(
-            "no such kind of study, or none with a file to start from",
-            where=kind,
-            expected=f"one of {', '.join([*known, *KINDS.foreign])}",
-            remedy=_nearest(kind, known),
-        )
+        what, remedy = "no such kind of study, or none with a file to start from", _nearest(kind, known)
+        raise BadInput(what, where=kind, expected=f"one of {', '.join([*known, *KINDS.foreign])}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
 
 

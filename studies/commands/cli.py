@@ -270,13 +270,9 @@ def _refuse_what_is_no_archive(archive: Path) -> None:
     so_far = counted(pieces, "finished piece") if pieces else f"parts with {counted(len(variants), 'finished variant')}"
     study = catalogue.as_typed(unfinished_study(archive))
     again = f"wanderlast run {study} -o {archive}" if study else "the same command that began it"
-    raise BadInput(
-        "not there yet; an unfinished run of it is",
-        where=str(archive),
-        expected="a finished archive",
-        received=so_far,
-        remedy=f"wait for the run if one is at work, or go on from there: {again}",
-    )
+    what = "not there yet; an unfinished run of it is"
+    remedy = f"wait for the run if one is at work, or go on from there: {again}"
+    raise BadInput(what, where=str(archive), expected="a finished archive", received=so_far, remedy=remedy)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

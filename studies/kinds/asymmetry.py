@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
@@ -112,20 +111,17 @@ class Asymmetry(Kind):
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
         name, carriage = first_carriage(study)
         if carriage.motion.legs is None:
-            raise BadInput(
-                "forward and backward need a motion that comes back",
-                where=study.source.where(f"carriage.{name}.motion.kind"),
-                expected='"out-and-back"',
-                received=f'"{study.value(f"carriage.{name}.motion.kind")}"',
-            )
+            what = "forward and backward need a motion that comes back"
+            received = f'"{study.value(f"carriage.{name}.motion.kind")}"'
+            raise study.source.fault(f"carriage.{name}.motion.kind", what, expected='"out-and-back"', received=received)
         _check_cruise(study, name)
         if not study.sensor:
-            raise BadInput("nothing is measured", where=study.source.where("sensor"), expected="at least one sensor")
+            raise study.source.fault("sensor", "nothing is measured", expected="at least one sensor")
         for sensor, place in study.sensor.items():
             if QUANTITIES[place.quantity].rate:
-                raise BadInput(
+                raise study.source.fault(
+                    f"sensor.{sensor}.quantity",
                     "an asymmetry compares with the static response, which this quantity does not have",
-                    where=study.source.where(f"sensor.{sensor}.quantity"),
                     expected=" | ".join(name for name, quantity in QUANTITIES.items() if not quantity.rate),
                     received=f'"{place.quantity}"',
                 )
@@ -164,12 +160,8 @@ def _check_cruise(study: Study, carriage: str) -> None:
     swept = [axis.values for axis in expand(study).axes if key in axis.paths]
     largest = float(max(swept[0])) if swept else float(study.value(key))
     if 1.0 - 2.0 * largest < LEAST_CRUISE:
-        raise BadInput(
-            "the carriage cruises over less than half of its stroke, too little to compare forward and backward",
-            where=study.source.where(key),
-            expected=f"at most {0.5 * (1.0 - LEAST_CRUISE):g}",
-            received=f"{largest:g}",
-        )
+        what = "the carriage cruises over less than half of its stroke, too little to compare forward and backward"
+        raise study.source.fault(key, what, expected=f"at most {0.5 * (1.0 - LEAST_CRUISE):g}", received=f"{largest:g}")
 
 
 def _start(results: Results, left: Array) -> str:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from results_schema.variables import AXES, MARCH, Variable, declare
 from studies.findings import indices, theory
@@ -139,9 +138,9 @@ class DoublePeak(Kind):
         """First carriage with a motion that repeats, and sensors."""
         name, carriage = first_carriage(study)
         if carriage.motion.period is None:
-            raise BadInput(
+            raise study.source.fault(
+                f"carriage.{name}.motion.kind",
                 "peaks per cycle need a motion that repeats",
-                where=study.source.where(f"carriage.{name}.motion.kind"),
                 expected='"sinusoidal" or "out-and-back"',
                 received=f'"{study.value(f"carriage.{name}.motion.kind")}"',
             )

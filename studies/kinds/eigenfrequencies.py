@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
 from results_schema.variable import beside
 from results_schema.variables import Variable, declare
 from studies.at_rest.at_rest import AtRestKind
@@ -107,11 +106,9 @@ class Eigenfrequencies(AtRestKind):
         first_carriage(study)
         forced = study.solver.fidelity in ("force", "static")  # a load, whatever it weighs
         if forced or not any(c.inertial for c in study.carriage.values()):
-            raise BadInput(
-                "forces have no inertia: frequencies do not depend on where they stand",
-                where=study.source.where("solver.fidelity" if forced else "carriage"),
-                expected='"auto"' if forced else 'a carriage of the kind "mass", "oscillator" or "body"',
-            )
+            what = "forces have no inertia: frequencies do not depend on where they stand"
+            expected = '"auto"' if forced else 'a carriage of the kind "mass", "oscillator" or "body"'
+            raise study.source.fault("solver.fidelity" if forced else "carriage", what, expected=expected)
         super().check(study)
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variable import axis, beside
@@ -121,12 +120,9 @@ class Influence(AtRestKind):
         check_sensors(study)
         for name, sensor in study.sensor.items():
             if QUANTITIES[sensor.quantity].rate:
-                raise BadInput(
-                    "this quantity has no static reading",
-                    where=study.source.where(f"sensor.{name}.quantity"),
-                    expected="displacement, a section force, stress or contact_force",
-                    received=sensor.quantity,
-                )
+                what = "this quantity has no static reading"
+                expected = "displacement, a section force, stress or contact_force"
+                raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)
         super().check(study)
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:

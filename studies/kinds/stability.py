@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import axes, declare
 from studies.maps.map_scene import Ground
@@ -43,8 +42,8 @@ class Stability(PiecedKind):
         _check_scene(study)
         for name in question_of(study, Asked).maps:
             if name not in MAPS:
-                where, expected = study.source.where("question.maps"), f"some of {', '.join(MAPS)}"
-                raise BadInput("no such map", where=where, expected=expected, received=repr(name))
+                expected = f"some of {', '.join(MAPS)}"
+                raise study.source.fault("question.maps", "no such map", expected=expected, received=repr(name))
 
     def pieces(self, study: Study) -> Sequence[Piece]:
         asked, ground = question_of(study, Asked), Ground(study)
@@ -79,46 +78,39 @@ def _present(results: Results) -> list[str]:
 def _check_scene(study: Study) -> None:
     """Refuse what the maps cannot stand on. Raises BadInput."""
     if len(study.carriage) != 1:
-        raise BadInput(
-            "the maps vary one carriage",
-            where=study.source.where("carriage"),
-            expected="exactly one table [carriage.name]",
-            received=f"{len(study.carriage)} of them",
-        )
+        what, expected = "the maps vary one carriage", "exactly one table [carriage.name]"
+        raise study.source.fault("carriage", what, expected=expected, received=f"{len(study.carriage)} of them")
     ((name, carriage),) = study.carriage.items()
     _check_carriage(study, name, carriage)
     body, here = study.body[carriage.on], f"body.{carriage.on}"
     if body.own_weight:
-        where = study.source.where(f"{here}.own_weight")
-        raise BadInput("the maps leave the body's own weight out", where=where, expected="own_weight = false")
+        what = "the maps leave the body's own weight out"
+        raise study.source.fault(f"{here}.own_weight", what, expected="own_weight = false")
     if any(coefficient > 0.0 for _, _, coefficient in body.dampers()):
-        where = study.source.where(f"{here}.supports")
-        raise BadInput("the maps know damping of the modes only", where=where, expected="supports without damping")
+        what = "the maps know damping of the modes only"
+        raise study.source.fault(f"{here}.supports", what, expected="supports without damping")
     if not isinstance(body.damping_ratio, float):
-        where = study.source.where(f"{here}.damping_ratio")
-        raise BadInput("the maps vary the number of modes", where=where, expected="one damping ratio for all modes")
+        what = "the maps vary the number of modes"
+        raise study.source.fault(f"{here}.damping_ratio", what, expected="one damping ratio for all modes")
     if Ground(study).is_loose:
-        where = study.source.where(f"{here}.supports")
-        raise BadInput("nothing holds this body", where=where, expected="supports that hold it")
+        raise study.source.fault(f"{here}.supports", "nothing holds this body", expected="supports that hold it")
 
 
 def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     """A mass that crosses, with its inertia. Raises BadInput."""
     if study.solver.fidelity in ("force", "static"):
-        where, received = study.source.where("solver.fidelity"), f'"{study.solver.fidelity}"'
-        raise BadInput("a force has no inertia that could fail", where=where, expected='"auto"', received=received)
+        received = f'"{study.solver.fidelity}"'
+        what = "a force has no inertia that could fail"
+        raise study.source.fault("solver.fidelity", what, expected='"auto"', received=received)
     if not carriage.inertial:
-        where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
-        raise BadInput("a force has no inertia that could fail", where=where, expected=expected)
+        raise study.source.fault(f"carriage.{name}.kind", "a force has no inertia that could fail", expected='"mass"')
     if carriage.masses != ("mass",):
-        where, expected = study.source.where(f"carriage.{name}.kind"), '"mass"'
-        raise BadInput("the maps know rigid masses only", where=where, expected=expected)
+        raise study.source.fault(f"carriage.{name}.kind", "the maps know rigid masses only", expected='"mass"')
     if carriage.pushes_along:
-        where = study.source.where(f"carriage.{name}.inertia_along")
-        raise BadInput("the maps know inertia across the track only", where=where, expected="inertia_along = false")
+        what = "the maps know inertia across the track only"
+        raise study.source.fault(f"carriage.{name}.inertia_along", what, expected="inertia_along = false")
     if not carriage.motion.passes:
-        where, expected = study.source.where(f"carriage.{name}.motion.kind"), '"cruise"'
-        raise BadInput("the maps start from a passage", where=where, expected=expected)
+        raise study.source.fault(f"carriage.{name}.motion.kind", "the maps start from a passage", expected='"cruise"')
 
 
 KIND = Stability()

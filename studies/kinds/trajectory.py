@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.errors import BadInput
 from results_schema.variables import MARCH, Variable, declare
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses
@@ -53,9 +52,9 @@ class Trajectory(Kind):
         first_carriage(study)
         check_sensors(study)
         if study.output.histories == "none":
-            raise BadInput(
+            raise study.source.fault(
+                "output.histories",
                 "a trajectory is its histories",
-                where=study.source.where("output.histories"),
                 expected='"auto", "all" or { every = n }',
                 received='"none"',
             )

@@ -115,9 +115,9 @@ class WorkPrecision(PiecedKind):
             try:
                 check_smooth(scene_model(study, overrides, asked.mode_counts[-1]), STATIC_QUANTITIES)
             except BadInput as error:
-                raise BadInput(
+                raise study.source.fault(
+                    f"question.scenes.{name}",
                     f"{error.where.rpartition(': ')[2]}: {error.what}",
-                    where=study.source.where(f"question.scenes.{name}"),
                     expected=error.expected,
                     received=error.received,
                     remedy=error.remedy,

@@ -30,11 +30,8 @@ def check_slugs(study: Study, asked: Question) -> None:
     slugs = [slug_of(name) for name in asked.scenes]
     for name, slug in zip(asked.scenes, slugs, strict=True):
         if not slug or slugs.count(slug) > 1 or len(name) > 60:
-            raise BadInput(
-                "not a usable name of a scene",
-                where=study.source.where(f"question.scenes.{name}"),
-                expected="up to 60 characters whose letters and digits differ from those of other names",
-            )
+            expected = "up to 60 characters whose letters and digits differ from those of other names"
+            raise study.source.fault(f"question.scenes.{name}", "not a usable name of a scene", expected=expected)
 
 
 def check_ladder(study: Study, asked: Question) -> None:
@@ -46,9 +43,9 @@ def check_ladder(study: Study, asked: Question) -> None:
         expected = f"at least one scheme of the march: {', '.join(MARCHED)}"
         raise BadInput("these schemes are for comparison only", where=where, expected=expected)
     if asked.mode_counts[-1] >= asked.reference_modes:
-        raise BadInput(
+        raise study.source.fault(
+            "question.reference_modes",
             "the reference has no more modes than what is compared with it",
-            where=study.source.where("question.reference_modes"),
             expected=f"more than {asked.mode_counts[-1]}",
             received=str(asked.reference_modes),
         )
@@ -61,13 +58,8 @@ def check_solver(study: Study) -> None:
     for key in VARIED:
         value = getattr(study.solver, key)
         if value != getattr(Solver(), key):
-            raise BadInput(
-                "a study of work and precision varies this itself",
-                where=study.source.where(f"solver.{key}"),
-                expected="no such key",
-                received=repr(value),
-                remedy=REMEDIES.get(key, REMEDIES["scheme"]),
-            )
+            what, remedy = "a study of work and precision varies this itself", REMEDIES.get(key, REMEDIES["scheme"])
+            raise study.source.fault(f"solver.{key}", what, expected="no such key", received=repr(value), remedy=remedy)
 
 
 def check_overrides(study: Study, name: str, overrides: Mapping[str, Any]) -> None:

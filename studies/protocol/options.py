@@ -17,9 +17,5 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         if self.scheduler is not None:
-            raise BadInput(
-                "running on a dask scheduler is not built yet",
-                where="--scheduler",
-                received=self.scheduler,
-                remedy="leave it out: the study runs on this machine",
-            )
+            what, where, received = "running on a dask scheduler is not built yet", "--scheduler", self.scheduler
+            raise BadInput(what, where=where, received=received, remedy="leave it out: the study runs on this machine")

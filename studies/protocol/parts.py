@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from results_schema.arrays import Counts
-from results_schema.errors import BadInput, Interrupted, OutputFailed
+from results_schema.errors import Interrupted, OutputFailed
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
@@ -251,11 +251,11 @@ class Pieces:
 
     def __init__(self, kind: PiecedKind, study: Study) -> None:
         if study.output.unreduced:
-            where = study.source.where("output.unreduced")
-            raise BadInput("a study that measures has no variants to compute again", where=where, expected="0")
+            what = "a study that measures has no variants to compute again"
+            raise study.source.fault("output.unreduced", what, expected="0")
         if study.solver.audit not in ("auto", 0):
-            where = study.source.where("solver.audit")
-            raise BadInput("a study of this kind marches no variants to audit", where=where, expected='0 or "auto"')
+            what = "a study of this kind marches no variants to audit"
+            raise study.source.fault("solver.audit", what, expected='0 or "auto"')
         self.kind, self.study = kind, study
         self.pieces = kind.pieces(study)
         self.names: Sequence[str] = [piece.name for piece in self.pieces]

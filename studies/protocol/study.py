@@ -60,12 +60,8 @@ class Kind:
         if self.settings is not None:
             question_of(study, self.settings)
         elif study.question:
-            raise BadInput(
-                f"studies of the kind {self.name} have no options",
-                where=study.source.where("question"),
-                expected="no table [question]",
-                received=f"the keys {', '.join(study.question)}",
-            )
+            what, received = f"studies of the kind {self.name} have no options", f"the keys {', '.join(study.question)}"
+            raise study.source.fault("question", what, expected="no table [question]", received=received)
 
     def parts(self, study: Study) -> Parts:
         """The work. Raises BadInput where it cannot be done."""
@@ -105,20 +101,16 @@ class PiecedKind(Kind, ABC):
 
     def check_tables(self, study: Study) -> None:
         if study.sweep.axes and not self.sweeps:
-            raise BadInput(
+            raise study.source.fault(
+                "sweep",
                 f"a study of the kind {self.name} takes no sweep: it varies methods, not the scene",
-                where=study.source.where("sweep"),
                 expected="no table [sweep]",
                 received=f"the axes {', '.join(study.sweep.axes)}",
                 remedy="what it varies stands in the table [question]",
             )
         if study.envelope:
-            raise BadInput(
-                f"studies of the kind {self.name} have no envelopes",
-                where=study.source.where("envelope"),
-                expected="no table [envelope]",
-                received=", ".join(study.envelope),
-            )
+            what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
+            raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))
         super().check_tables(study)
         if self.sweeps:
             _check_names(study)
@@ -167,11 +159,11 @@ def _check_names(study: Study) -> None:
     try:
         declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
     except BadInput as error:
-        raise BadInput(error.what, where=study.source.where(error.where), remedy=error.remedy) from None
+        raise study.source.fault(error.where, error.what, remedy=error.remedy) from None
     for name in study.sweep.axes:
         if name in declared:
-            where = study.source.where(f"sweep.{name}")
-            raise BadInput("a result has this name", where=where, remedy="choose another name for the axis")
+            what = "a result has this name"
+            raise study.source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
 
 
 KIND_HAS = ("name", "summary", "question", "start")  # those of another package

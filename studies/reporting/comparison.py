@@ -64,11 +64,8 @@ def compare(first: Results, second: Results) -> Comparison:
     import xarray as xr
 
     if first.dims != second.dims:
-        raise BadInput(
-            "the archives have different axes, so there is nothing to compare",
-            where=", ".join(second.dims) or "no axes",
-            expected=", ".join(first.dims) or "no axes",
-        )
+        what = "the archives have different axes, so there is nothing to compare"
+        raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")
     mine, other = xr.align(first.dataset, second.dataset, join="inner", exclude=_not_swept(first, second))
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)

@@ -39,11 +39,8 @@ def write_table(results: Results, path: Path) -> list[str]:
     try:
         files.write_whole(path, partial(getattr(table, WRITERS[path.suffix]), index=False))
     except ImportError:
-        raise BadInput(
-            "Parquet needs a package that is not installed",
-            where=str(path),
-            remedy="pip install pyarrow, or write a .csv",
-        ) from None
+        what = "Parquet needs a package that is not installed"
+        raise BadInput(what, where=str(path), remedy="pip install pyarrow, or write a .csv") from None
     return left_out
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity
 from studies.results.results import Index, Results, extreme, statuses
@@ -20,16 +19,14 @@ if TYPE_CHECKING:
 def first_carriage(study: Study) -> tuple[str, Carriage]:
     """Name and carriage that come first. Raises BadInput where nothing moves."""
     if not study.carriage:
-        where, expected = study.source.where("carriage"), "at least one table [carriage.name]"
-        raise BadInput("nothing moves", where=where, expected=expected)
+        raise study.source.fault("carriage", "nothing moves", expected="at least one table [carriage.name]")
     return next(iter(study.carriage.items()))
 
 
 def check_sensors(study: Study) -> None:
     """Refuse a study that measures nothing. Raises BadInput."""
     if not study.sensor:
-        where, expected = study.source.where("sensor"), "at least one table [sensor.name]"
-        raise BadInput("nothing is measured", where=where, expected=expected)
+        raise study.source.fault("sensor", "nothing is measured", expected="at least one table [sensor.name]")
 
 
 def in_words(results: Results, index: Index) -> str:

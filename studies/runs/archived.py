@@ -44,11 +44,8 @@ def results_of(archive: Archive) -> Results:
 
 
 def _refused(path: Path, text: str) -> ArchiveError:
-    return ArchiveError(
-        f"what this archive says of its study is not what it holds: {text}",
-        where=str(path),
-        remedy="run the study again with --overwrite",
-    )
+    what = f"what this archive says of its study is not what it holds: {text}"
+    return ArchiveError(what, where=str(path), remedy="run the study again with --overwrite")
 
 
 def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> dict[str, xr.Dataset]:

@@ -30,12 +30,8 @@ def check_unchanged(study: Study) -> None:
     for path, digest in files_of(study).items():
         file = Path(path)
         if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digest:
-            raise BadInput(
-                "a file of the model has changed while the study ran",
-                where=path,
-                expected="the file as it was when the study was read",
-                remedy="run again",
-            )
+            what = "a file of the model has changed while the study ran"
+            raise BadInput(what, where=path, expected="the file as it was when the study was read", remedy="run again")
 
 
 def run_key(study: Study, names: Sequence[str] = ()) -> str:

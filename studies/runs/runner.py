@@ -160,12 +160,9 @@ def _check_vacant(run: _Run) -> None:
     """Refuse to replace what has come to the output's place since the run began. Raises BadInput."""
     _check_target(run.study, run.archive)
     if run.archive.exists() and not run.options.overwrite:
-        raise BadInput(
-            "something else has come there while the study ran",
-            where=str(run.archive),
-            expected="no file",
-            remedy="choose another place with -o, or replace it with --overwrite; finished work is kept",
-        )
+        what = "something else has come there while the study ran"
+        remedy = "choose another place with -o, or replace it with --overwrite; finished work is kept"
+        raise BadInput(what, where=str(run.archive), expected="no file", remedy=remedy)
 
 
 def _check_target(study: Study, archive: Path) -> None:
@@ -191,12 +188,8 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
             remedy="choose another place with -o, or compute it again with --overwrite",
         )
     if state == "another study":
-        raise BadInput(
-            "there is something else already",
-            where=str(archive),
-            expected="no file, or the archive of this very study",
-            remedy="choose another place with -o, or replace it with --overwrite",
-        )
+        what, remedy = "there is something else already", "choose another place with -o, or replace it with --overwrite"
+        raise BadInput(what, where=str(archive), expected="no file, or the archive of this very study", remedy=remedy)
     return state
 
 

@@ -96,13 +96,8 @@ def stations(places: ArrayLike, length: float, *derivatives: int) -> Array:
     x = np.atleast_1d(np.asarray(places, dtype=np.float64)) / length
     if x.size and not (x.min() >= -_ON_BODY and x.max() <= 1.0 + _ON_BODY):  # in this form NaN is outside
         outside = ~((x >= -_ON_BODY) & (x <= 1.0 + _ON_BODY))
-        raise BadInput(
-            "place off the body",
-            where="s",
-            expected=f"0 to {length:g} m",
-            received=f"{x[outside][0] * length:g} m",
-            remedy="leave out the time when the load is off the body",
-        )
+        received, remedy = f"{x[outside][0] * length:g} m", "leave out the time when the load is off the body"
+        raise BadInput("place off the body", where="s", expected=f"0 to {length:g} m", received=received, remedy=remedy)
     return np.asarray(np.minimum(np.maximum(x, 0.0), 1.0))
 
 

@@ -87,9 +87,8 @@ def _places(lines: list[Line], values: Any, shape: tuple[int, int], symmetric: b
     wrong = ((places < 1) | (places > np.array(shape)) | (places != np.floor(places))).any(axis=1)
     if wrong.any():
         line = lines[int(np.argmax(wrong))]
-        raise line.fault(
-            "an entry outside the matrix", expected=f"rows 1 to {shape[0]}, columns 1 to {shape[1]}", received=line.text
-        )
+        what = "an entry outside the matrix"
+        raise line.fault(what, expected=f"rows 1 to {shape[0]}, columns 1 to {shape[1]}", received=line.text)
     rows, columns = places.astype(np.int64).T - 1
     low, high = (np.minimum(rows, columns), np.maximum(rows, columns)) if symmetric else (rows, columns)
     number = high * max(shape) + low

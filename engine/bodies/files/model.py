@@ -116,12 +116,8 @@ def _check_nodes(model: FileModel, where: str) -> None:
     wrong = np.flatnonzero(~np.isfinite(model.places).all(axis=1))
     if len(wrong):
         place = ", ".join(f"{part:g}" for part in model.places[wrong[0]])
-        raise BadInput(
-            f"node {model.nodes[wrong[0]]} has a coordinate that is not finite",
-            where=where,
-            expected="finite numbers",
-            received=place,
-        )
+        what = f"node {model.nodes[wrong[0]]} has a coordinate that is not finite"
+        raise BadInput(what, where=where, expected="finite numbers", received=place)
 
 
 def _check_rows(model: FileModel, where: str) -> None:
@@ -152,9 +148,8 @@ def _checked_matrix(model: FileModel, name: str, where: str) -> Any:
     diagonal = matrix.diagonal()
     if diagonal.size and diagonal.min() < 0.0:
         row = int(diagonal.argmin())
-        raise BadInput(
-            f"negative {name} of {model.name(row)}", where=where, expected=">= 0", received=f"{diagonal[row]:g}"
-        )
+        what = f"negative {name} of {model.name(row)}"
+        raise BadInput(what, where=where, expected=">= 0", received=f"{diagonal[row]:g}")
     return _symmetric(model, matrix, name, where)
 
 

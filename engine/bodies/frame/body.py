@@ -178,12 +178,8 @@ def kept_modes(frame: Frame, omega: Array) -> Counts:
     for index, number in enumerate(frame.leave_out):
         if number > len(omega):
             expected = f"numbers of modes, 1 to {len(omega)}"
-            raise BadInput(
-                "there is no such mode to leave out",
-                where=f"leave_out.{index}",
-                expected=expected,
-                received=str(number),
-            )
+            what = "there is no such mode to leave out"
+            raise BadInput(what, where=f"leave_out.{index}", expected=expected, received=str(number))
         out[number - 1] = True
     for first, end in pairwise([*groups(omega), len(omega)]):
         out[first:end] |= out[first:end].any()

@@ -110,11 +110,8 @@ def _check_member(frame: Frame, name: str) -> None:
         needed |= {} if frame.plane else {"shear_area_lateral": section.shear_area_lateral}
     for word, value in needed.items():
         if value is None:
-            refuse(
-                ("section", member.section, word),
-                "this key is missing",
-                expected=f"a number > 0 (for the member {name})",
-            )
+            what = "this key is missing"
+            refuse(("section", member.section, word), what, expected=f"a number > 0 (for the member {name})")
 
 
 def _check_connected(frame: Frame) -> None:
