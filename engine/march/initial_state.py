@@ -5,20 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import State
 from engine.model.attachment import rows
 from engine.model.station_path import Along, StationPath
 from engine.model.track import rate_rows
 from engine.statics.equilibrium import static_state
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.variant_values import LaneTable
     from engine.statics.equilibrium import StaticState
 
-Array = NDArray[np.float64]
 
 NOW = 1e-12  # of a rider's time: an event so early is that of time 0
 

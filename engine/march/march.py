@@ -29,6 +29,7 @@ from engine.model.track import tabulate_blow
 from engine.model.variant_values import from_blocks, lane_table
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import rows_sampled
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     from engine.model.timeline import Segment
     from engine.model.variant_values import LaneTable, VariantValues
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 MEANINGLESS = 1e6  # times its static value a signal counts as diverged
 #: Status of a variant by the code that the kernels return of its lane.

@@ -30,13 +30,12 @@ from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
+from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity, SchemeUsed, Status
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 STILL = 1e-6  # of the usual reading on its body: a static reading below, as on a support, is rounding (1e-12 at most)
 
 Flat = dict[str, NDArray[Any]]

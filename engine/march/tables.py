@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
@@ -25,9 +24,7 @@ from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
 from engine.statics.static_response import static_readings
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 SegmentKey = tuple[float, float, int, tuple[bool, ...]]
 Missed = list[Array]  # of one segment: residual flexibility between ties, and of the signals; or empty

@@ -11,13 +11,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
 from engine.model.numerics import Numerics
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
 from engine.model.timeline import Rider
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from engine.scene.motion_base import Motion
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 PROBED = 65  # places along a track at which it is looked for what a mode moves
 UNFELT = 1e-6  # of the largest: a mode that moves its track less is none of the loads' business

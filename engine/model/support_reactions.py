@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.ties import Attachment, Load, SpringTie
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 LIFTS = 1e-9  # of its weight: a contact that pulls more at rest would lift
 CLASH = 1e-7  # of a shape, per contact: rigid contacts that the modes cannot tell apart any better are one

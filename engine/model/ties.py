@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.timeline import Rider
 
-Array = NDArray[np.float64]
 
 Inertia = Literal["force", "mass", "mass-without-convective"]
 

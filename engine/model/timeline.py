@@ -19,9 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.scene.motion_base import Motion, Path
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 Window = Literal["whole", "last-cycle"]
 

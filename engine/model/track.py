@@ -14,6 +14,7 @@ from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
 from engine.model.attachment import along_shapes, holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.kernels.layout import Alpha, Newmark
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from engine.model.station_path import Along, StationPath
     from engine.model.ties import AlongTie, Attachment, SpringTie
     from engine.model.timeline import Segment
-
-Array = NDArray[np.float64]
 
 
 def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, missed: Array | None = None) -> Ties:

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES, Lanes
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.ties import DamperTie, SpringTie
     from engine.scene.study import Study
 
-Array = NDArray[np.float64]
 
 #: Keys of numbers that a lane may have to itself.
 LANE_KEYS = re.compile(

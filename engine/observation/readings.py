@@ -18,6 +18,7 @@ from engine.model.attachment import along_shapes, holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import Along, StationPath
 from engine.model.ties import Attachment
+from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from engine.model.scene_model import BodyPart, SceneModel
     from results_schema.quantities import Quantity
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding

@@ -28,8 +28,7 @@ from engine.model.attachment import residual_flexibility, shared, tie_shapes
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along
 from engine.model.variant_values import VariantValues, from_blocks, lane_table
-
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
 
 UNRESISTED = 1e-10  # of the shift: omega^2 below it is a motion that nothing resists, and rounding
 ENDLESS = 1e-13  # of the largest: what no force moves, as a joint or a massless wheel forbids it

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.attachment import modal_flexibility_between, residual, shared, tie_shapes
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
 
-Array = NDArray[np.float64]
 
 UNFELT = 1e-9  # of the largest row of a loose coordinate: what springs feel of one that they do not hold is rounding
 Indices = NDArray[np.int64]

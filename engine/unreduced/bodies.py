@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bodies.beam.beam import Beam, Spring
 from engine.bodies.frame.assembly import Assembly, assemble
@@ -27,12 +26,12 @@ from engine.bodies.rigid.rigid import Rigid
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, rows_of
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-Array = NDArray[np.float64]
 
 BEAM_ELEMENTS = 64
 MOST_SUPPORTS = 50

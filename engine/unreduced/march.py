@@ -23,9 +23,7 @@ from engine.observation.histories import rows_sampled
 from engine.unreduced.rows import Along, Readings, readings, rider_of, softness, softness_slopes, tie_rows
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.statics import level_readings, level_state, statics_at
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 BETA, GAMMA = 0.25, 0.5
 REGAIN = 0.05  # per step: the rate at which a rigid contact takes back its gap

@@ -14,9 +14,9 @@ from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
 from engine.unreduced.track import WIDTH, Rows, no_rows
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 

@@ -14,17 +14,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.timeline import Rider
 from engine.scene.carriages import Carriage, Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
+from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-Array = NDArray[np.float64]
 Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass along its track
 
 

@@ -11,15 +11,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from engine.bodies.modal.flexibility import of_unit_mass
 from engine.unreduced.rows import Along, at_positions, nowhere, readings, softness, tie_rows
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.track import Rows
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 UNRESISTED = 1e-9  # of the largest: below it no contact resists a rigid-body motion
 BALANCED = 1e-7  # of the weight: more is a load that no contact carries

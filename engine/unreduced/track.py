@@ -10,15 +10,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bodies.frame.assembly import Assembly, cross_matrix
 from engine.bodies.frame.sections import forces_from_ends, held_forces, section_weights, spread_forces
 from engine.bodies.frame.shapes import FORCES
 from engine.bodies.frame.track import TrackBeams, TrackPoints
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from results_schema.arrays import Array, Counts
 
 WIDTH = 12  # degrees of freedom of an element
 STEP = 1e-3  # of an element's length, between places of a derivative

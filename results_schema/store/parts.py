@@ -7,6 +7,8 @@ carries the same key.
 
 from __future__ import annotations
 
+import fcntl
+import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -15,13 +17,61 @@ from typing import Self
 
 import numpy as np
 
-from results_schema.errors import ArchiveError, BadInput
+from results_schema.errors import ArchiveBusy, ArchiveError, BadInput
 from results_schema.store import files
-from results_schema.store.locks import Lock
+from results_schema.store.files import output_failed
 from results_schema.store.reading import opened, read_tables
 from results_schema.store.rows import VARIANTS
 from results_schema.store.tables import CONTENTS, DIGEST, Table, seal
 from results_schema.store.writing import PLAIN, write_tables
+
+
+class Lock:
+    """An exclusive lock on `path` ("<archive>.lock"), taken at once or not at all.
+
+    Raises ArchiveBusy when another run holds it, OutputFailed when the lock file cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._descriptor = -1
+
+    def take(self) -> None:
+        """Take the lock; it is held until `release` or the end of the process."""
+        while self._descriptor < 0:
+            try:
+                descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            except OSError as error:
+                raise output_failed(self._path, error) from error
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                os.close(descriptor)
+                raise ArchiveBusy(
+                    "another run holds this archive", where=str(self._path), remedy="wait for it or stop it"
+                ) from error
+            except OSError as error:
+                os.close(descriptor)
+                raise output_failed(self._path, error) from error
+            if self._is_current(descriptor):
+                self._descriptor = descriptor
+            else:
+                # The former holder removed this file between our open and our lock: try the new one.
+                os.close(descriptor)
+
+    def release(self) -> None:
+        """Remove the lock file and let go (the removal comes first, so that nobody locks a file about to vanish)."""
+        if self._descriptor >= 0:
+            self._path.unlink(missing_ok=True)
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def _is_current(self, descriptor: int) -> bool:
+        try:
+            return os.path.samestat(os.fstat(descriptor), self._path.stat())
+        except FileNotFoundError:
+            return False
+
 
 _KEY_FILE = "key"
 _KEY = "run_key"

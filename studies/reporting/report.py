@@ -23,7 +23,6 @@ from results_schema.store import files
 from results_schema.store.archive import Archive, open_archive
 from results_schema.variables import Variable, expand
 from studies.findings.numerics_used import told_choices
-from studies.pictures.common import audit as audited
 from studies.pictures.common import estimates, unreduced
 from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
@@ -127,7 +126,7 @@ def _write(source: Archive, folder: Path) -> Path:
     results = results_of(source)
     figures = [
         *figures_of(results),
-        *audited.pictures(results, source.groups.get(audit.GROUP)),
+        *estimates.observed(results, source.groups.get(audit.GROUP)),
         *estimates.compared(source.groups.get(audit.GROUP)),
         *unreduced.pictures(results, source.groups.get(GROUP)),
     ]

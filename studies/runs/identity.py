@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
+from engine.bodies import BODIES
+from engine.scene.carriages import CARRIAGES
+from engine.scene.motions import MOTIONS
+from engine.scene.settings import ALL_SCHEMES
+from engine.scene.study import Study
 from results_schema.errors import BadInput
+from results_schema.pieces import Pieces
+from results_schema.quantities import QUANTITIES
 from studies.protocol.study import KINDS
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
 
 PROGRAM = Path(__file__).parents[2]
 PACKAGES = ("engine", "results_schema", "studies")
@@ -53,8 +57,6 @@ def sources() -> list[Path]:
 
 def foreign_sources(study: Study) -> list[Path]:
     """The files of all pieces of a study that other packages bring."""
-    from engine.scene.pieces import used
-
     return sorted({path for table, name in ((KINDS, study.kind), *used(study)) for path in table.sources(name)})
 
 
@@ -64,3 +66,13 @@ def sources_hash(paths: Sequence[Path]) -> str:
     for path in paths:
         digest.update(str(path.relative_to(PROGRAM)).encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
+
+
+def used(study: Study) -> Iterator[tuple[Pieces[Any], str]]:
+    """Every piece of a study's scene: its table and its name."""
+    yield from ((BODIES, body.kind) for body in study.body.values())
+    for carriage in study.carriage.values():
+        yield from ((CARRIAGES, carriage.kind), (MOTIONS, carriage.motion.kind))
+    yield from ((QUANTITIES, sensor.quantity) for sensor in study.sensor.values())
+    yield from ((QUANTITIES, envelope.quantity) for envelope in study.envelope.values())
+    yield ALL_SCHEMES, study.solver.scheme

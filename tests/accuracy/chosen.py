@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.choice import Choice
 from engine.accuracy.reference import converge, in_full
@@ -15,11 +14,11 @@ from engine.batch.execution import execute, run_jobs
 from engine.batch.plan import Plan, make_plan
 from engine.march.outcome import Flat
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from results_schema.store.rows import Collector
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
 from tests.engine.build import Table, beam, fixed
 
-Array = NDArray[np.float64]
 TOLERANCE = "solver.tolerance"
 LENGTHS = {"length": {"of": "body.bed.length", "values": [1.0, 1.1, 1.2]}}
 SPEEDS = {"speed": axis(SPEED, 0.3, 1.2, 30)}

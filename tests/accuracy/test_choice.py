@@ -14,11 +14,11 @@ from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
 from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
+from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.accuracy.chosen import SPEEDS, STUDIES, TOLERANCE, executed, observed, run_of
 from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[2]
 
 

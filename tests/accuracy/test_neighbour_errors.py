@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from engine.accuracy.choice import nearest_others, neighbour_errors_of, worst_but_one
 from engine.accuracy.ladder import Measured
-from engine.accuracy.neighbour_errors import nearest_others, neighbour_errors_of, worst_but_one
 from engine.accuracy.results import results_of
 from engine.march.outcome import Asked
+from results_schema.arrays import Array
 from tests.accuracy.chosen import run_of
 
-Array = NDArray[np.float64]
 COUNT, NEAR = 200, 8
 TOLERANCE = 1e-2
 

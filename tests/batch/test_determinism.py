@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from numpy.typing import NDArray
 
 import engine.march.march
 from engine.batch.dataset import build
@@ -26,8 +25,6 @@ from results_schema.errors import BadInput, Interrupted
 from results_schema.store.rows import Chunk, Collector
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
 from tests.reference import closed_forms, values
-
-Array = NDArray[np.float64]
 
 
 def mixed() -> Study:

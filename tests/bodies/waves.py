@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from results_schema.arrays import Array
+
 Support = tuple[float, float, float]  # place, stiffness, rotational stiffness
 
 

@@ -11,7 +11,6 @@ import argparse
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import engine
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid
@@ -23,9 +22,8 @@ from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from tests.calibration.scenes import draw, judged, planned
-
-Array = NDArray[np.float64]
 
 MODES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 CUTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # steps in one of the grid's

@@ -15,14 +15,11 @@ from multiprocessing import get_context
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.results import results_of
 from engine.batch.audit import SEED, audit
 from engine.linear_algebra import one_thread
 from tests.calibration.scenes import draw, judged, planned, reads_moment
-
-Array = NDArray[np.float64]
 
 JUDGED = 8  # variants of a scene
 CANNOT_JUDGE = 0.3  # of the tolerance: a truth that may be off by more

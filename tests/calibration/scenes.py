@@ -12,10 +12,10 @@ from engine.accuracy.reference import in_turn
 from engine.batch.plan import Plan, make_plan
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from studies.protocol.study import kind_of
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 
 SLOWEST, FASTEST = 0.002, 0.6  # alpha

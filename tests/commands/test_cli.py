@@ -13,7 +13,7 @@ import pytest
 from results_schema.errors import WorkersGaveUp
 from results_schema.store import files
 from results_schema.store.archive import open_archive
-from results_schema.store.locks import Lock
+from results_schema.store.parts import Lock
 from studies.commands import catalogue
 from studies.commands import error_exit as trouble
 from studies.commands.cli import main

@@ -15,13 +15,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bodies.build import build_body
 from engine.bodies.modal.modal_body import ModalBody
 from engine.scene.study import Study
+from results_schema.arrays import Array
 
-Array = NDArray[np.float64]
 Place = float | str
 
 EDGE = 1e-13  # m, by which a station at an event belongs to its own side

@@ -10,14 +10,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.bodies.build import build_body
 from engine.scene.motions import Cruise
 from engine.scene.study import Study
+from results_schema.arrays import Array
 
-Array = NDArray[np.float64]
 Touching = dict[tuple[str, int], bool]
 
 ITSELF = -1  # in place of a contact's number: the carriage

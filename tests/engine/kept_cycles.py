@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from results_schema.status import Fidelity
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.findings import indices
 from tests.naive import indices as naive
-
-Array = NDArray[np.float64]
 
 
 def waves(seed: int, stations: int, lanes: int) -> Array:

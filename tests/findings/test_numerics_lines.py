@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared, Reduction
+from results_schema.arrays import Array
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction
 from tests.engine.build import Table, beam, mass, shuttle, study, swing
-
-Array = NDArray[np.float64]
 
 MOST_CHANGES = 8  # of what is chosen along a line, that are looked at
 BED = beam(modes="auto", damping_ratio=0.05)

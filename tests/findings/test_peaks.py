@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from results_schema.arrays import Array
 from studies.findings.peaks import PEAKS, Peaks, peaks
 from tests.findings.test_indices import waves
 from tests.naive import indices as naive
-
-Array = NDArray[np.float64]
 
 
 def closed(cycle: Array) -> Array:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.plan import make_plan
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, generalized_alpha, hht_alpha, is_damped
@@ -16,10 +15,9 @@ from engine.methods.transition import spectral_radius, transitions
 from engine.model.scene_model import build_model
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study
-
-Array = NDArray[np.float64]
 
 X = np.array([1e-3, 0.1, 0.7, 1.5, 1.99])
 CONDITIONAL = ("linear-acceleration", "fox-goodwin", "central-difference")

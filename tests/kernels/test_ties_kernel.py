@@ -24,8 +24,8 @@ from engine.kernels.layout import (
 )
 from engine.kernels.stepping.march import march_many
 from engine.kernels.stepping.start import solve_initial_acceleration, watch_start
+from results_schema.arrays import Array
 
-Array = NDArray[np.float64]
 STATIONS, BLOCKS = 12, 2
 SCHEMES = {"average acceleration": Newmark(0.25, 0.5), "damped": Newmark(0.3025, 0.6)}
 

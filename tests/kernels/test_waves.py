@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.kernels.shapes import Span, beam_shapes
 from engine.kernels.sines import decay, sin_cos
+from results_schema.arrays import Array
 
-Array = NDArray[np.float64]
 LONG_PI = np.longdouble("3.14159265358979323846264338327950288")
 TURNS = np.concatenate([np.random.default_rng(1).uniform(-300.0, 300.0, 20_000), np.linspace(-2.0, 2.0, 4001)])
 PATHS = np.concatenate([np.random.default_rng(2).uniform(0.0, 60.0, 20_000), np.linspace(0.0, 700.0, 7001)])

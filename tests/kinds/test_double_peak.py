@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared
+from results_schema.arrays import Array
 from studies.findings.indices import harmonics
 from studies.findings.peaks import peaks
 from studies.kinds.double_peak import SAME_PEAK, DoublePeakReduction
 from tests.engine.build import beam, mass, study, swing
-
-Array = NDArray[np.float64]
 
 PHASE = np.linspace(0.0, 1.0, 801)
 

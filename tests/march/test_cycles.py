@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
@@ -12,8 +11,6 @@ from engine.model.timeline import Rider, build_timeline
 from engine.observation.histories import counts_reduced
 from tests.engine.build import beam, cruise, force, study, swing
 from tests.engine.kept_cycles import Kept
-
-Array = NDArray[np.float64]
 
 
 def test_phases_are_those_of_the_motion_where_steps_are_not_equal() -> None:

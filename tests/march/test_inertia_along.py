@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import engine
 from engine.bodies.imported import imported
@@ -22,6 +21,7 @@ from engine.scene.study import Study
 from engine.statics.coupled_modes import coupled_frequencies
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_frequencies
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from tests.bodies.frames import body
@@ -32,7 +32,6 @@ from tests.naive.scene import Phase
 from tests.observation.test_off_track import PORTAL, SECTION, SENSORS, SPAN, one_span, study
 from tests.unreduced.test_unreduced import apart
 
-Array = NDArray[np.float64]
 KILOGRAMS, GRAVITY, RATIO = 250.0, 9.81, 0.01
 BRAKES = shuttle(0.8, 3.1, 2.0, 0.3, 1)
 READ = {"sway": SENSORS["sway"], "deflection": {"at": 1.45}, "rate": SENSORS["sway"] | {"quantity": "velocity"}}

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
 from engine.march.march import March, prepare
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from tests.engine import twin
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.reading import Reading
@@ -23,7 +23,6 @@ from tests.engine.twin import march_twin
 from tests.naive import newmark, ode
 from tests.naive import scene as scenes
 
-Array = NDArray[np.float64]
 ALL = {"histories": "all"}
 SPRINGS = [{"at": 0.0, "stiffness": 60.0, "rotational": 0.3}, {"at": 0.8, "stiffness": 90.0, "damping": 0.5}]
 MIRRORED = [{"at": 0.2, "stiffness": 90.0, "damping": 0.5}, {"at": 1.0, "stiffness": 60.0, "rotational": 0.3}]

@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, study, under
 from tests.reference import closed_forms, values
-
-Array = NDArray[np.float64]
 
 STEPS = 20000
 SPAN = cruise(0.0, 1.0, 1.0)

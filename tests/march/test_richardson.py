@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
@@ -21,14 +20,13 @@ from engine.model.timeline import Window
 from engine.model.variant_values import VariantValues, padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.engine.build import beam, cruise, fixed, mass, shuttle, study, swing, under
 from tests.engine.kept_cycles import Kept
 from tests.engine.reading import Reading
 from tests.engine.twin import solve_twin
 from tests.march.test_twin import DAMPED, SPRINGS
-
-Array = NDArray[np.float64]
 
 SENSORS = {
     "place": fixed(0.61),

@@ -13,16 +13,15 @@ import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.batch.plan import make_plan
 from engine.kernels.layout import CLOSED, CURVE, FORCE, RATE, Lanes
 from engine.kernels.stepping.start import solve_initial_acceleration
 from engine.march.march import prepare
 from engine.march.step_rules import allow_any_steps
+from results_schema.arrays import Array
 from studies.commands.bench import MIDSPAN, Scene
 
-Array = NDArray[np.float64]
 SOURCE = Path(__file__).with_name("many_ties.c")
 ABREAST, BEST_OF = 8, 15
 FLAGS = ("-O3", "-march=native", "-mprefer-vector-width=512", "-ffp-contract=fast", "-shared", "-fPIC")

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.march.tables import SceneTables
 from engine.methods.comparison import runge_kutta, wilson_theta
@@ -23,9 +22,9 @@ from engine.methods.transition import (
 from engine.model.scene_model import SceneModel, build_model
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from tests.engine import build
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]  # s and its first two derivatives by time
 
 SCHEMES: dict[str, dict[str, Any]] = {

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
@@ -17,8 +16,6 @@ from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
 from tests.engine.kept_cycles import Kept
 from tests.reference import closed_forms
-
-Array = NDArray[np.float64]
 
 
 def shuttling(turn: float, cycles: int) -> OutAndBack:

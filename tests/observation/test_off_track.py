@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import engine
 from engine.batch.plan import make_plan
@@ -23,6 +22,7 @@ from engine.statics.static_response import static_values
 from engine.unreduced.march import march_unreduced
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_statics
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from tests.bodies.frames import LENGTH, body, straight
@@ -30,8 +30,6 @@ from tests.bodies.models import Files, in_process
 from tests.engine.build import beam, course_of, mass, shuttle, swing
 from tests.observation.plane_frame import PlaneFrame
 from tests.unreduced.test_unreduced import apart
-
-Array = NDArray[np.float64]
 
 GRAVITY, WEIGHT = 9.81, 2000.0
 SECTION = {"area": 0.01, "second_moment": 8e-6, "youngs_modulus": 2.1e11, "density": 7850.0}

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 
-from studies.pictures.common import audit
+from studies.pictures.common import estimates
 from studies.results.results import Axis, Results
 
 NAN = np.nan
@@ -31,7 +31,7 @@ def group() -> xr.Dataset:
 
 def drawn(given: xr.Dataset) -> list[Any]:
     speed = Axis("speed", "speed", {"carriage.car.motion.speed": 1}, np.array([1.0, 2.0, 3.0]), "m s-1")
-    return audit.pictures(cast(Results, SimpleNamespace(axis=lambda *_: speed, axes=(speed,))), given)
+    return estimates.observed(cast(Results, SimpleNamespace(axis=lambda *_: speed, axes=(speed,))), given)
 
 
 def test_every_variant_has_its_worst_error_over_the_tolerance_of_what_is_held() -> None:

@@ -7,14 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from results_schema.arrays import Array
 from tests.naive import indices, motions
 from tests.reference import closed_forms, passages, sliding, sprung, values
 from tests.reference.closed_forms import PinnedBeam
-
-Array = NDArray[np.float64]
 
 WEIGHT = values.WEIGHT
 

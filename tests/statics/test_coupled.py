@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
@@ -16,10 +15,9 @@ from engine.model.station_path import frozen
 from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
+from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
-
-Array = NDArray[np.float64]
 
 WAY = cruise(0.0, 1.0, 1.0)
 PLAIN: Table = {"static_correction": False}

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
@@ -14,10 +13,9 @@ from engine.model.variant_values import VariantValues
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.statics.static_response import StaticReadings, contact_names, static_values
+from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import TWO, UNEVEN, riding
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, study, swing, under
-
-Array = NDArray[np.float64]
 
 WAY = cruise(0.0, 1.0, 1.0)
 PLACES = np.linspace(0.0, 1.0, 9)

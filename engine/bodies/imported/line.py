@@ -85,32 +85,23 @@ class LineStatics:
         return np.asarray(np.sum(weights * response[numbers], axis=1))
 
 
+def _refuse(quantity: str) -> NoReturn:
+    what, expected = f"{quantity} is not available on an imported body", "displacement, velocity or acceleration"
+    raise BadInput(what, where="sensor", expected=expected)
+
+
 class NoSections:
-    """An imported body has no section forces, and without a recovery matrix no stress."""
+    """An imported body has no section forces, and without a recovery matrix no stress: all of it raises BadInput."""
 
-    def rows(self, quantity: str, s: ArrayLike) -> Array:
+    def rows(self, quantity: str, *_: Any, **__: Any) -> NoReturn:
         """Raises BadInput."""
-        self._refuse(quantity)
+        _refuse(quantity)
 
-    def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
-        """Raises BadInput."""
-        self._refuse(quantity)
-
-    def own_weight(self, quantity: str, x: ArrayLike) -> Array:
-        """Raises BadInput."""
-        self._refuse(quantity)
-
-    def under_response(self, quantity: str, response: Array, x: ArrayLike) -> Array:
-        """Raises BadInput."""
-        self._refuse(quantity)
-
-    def _refuse(self, quantity: str) -> NoReturn:
-        what, expected = f"{quantity} is not available on an imported body", "displacement, velocity or acceleration"
-        raise BadInput(what, where="sensor", expected=expected)
+    influence_at = own_weight = under_response = rows
 
 
 @dataclass(frozen=True, eq=False)
-class LineStress(NoSections):
+class LineStress:
     """Stress at the nodes of a track, linear in between: of N modes, values (P, N); per unit value and slope loads,
     response (P, 2 P); under own weight per unit gravity, weight (P,)."""
 
@@ -151,7 +142,7 @@ class LineStress(NoSections):
     def _between(self, quantity: str, x: ArrayLike) -> tuple[Any, Array]:
         """The node left of every place (X,), and how far towards the next one it lies."""
         if quantity != "stress":
-            self._refuse(quantity)
+            _refuse(quantity)
         places = self.statics.places
         at = track_places(x, float(places[-1]))
         left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)

@@ -1,18 +1,24 @@
-"""A rigid body as the user describes it: it rises, falls and pitches, and does not bend."""
+"""A rigid body, which rises, falls and pitches and does not bend: as the user describes it, and its two modes.
+
+These are heave and pitch about its centre of mass, each with unit modal mass.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from engine.bodies.modal.description import Body
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import ALONG, DOWN, Line, Lump, Outline, straight
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Inertia, Length, Mass
+from results_schema.errors import BadInput
 from results_schema.quantities import OF_SECTION
 
 BOX = 0.1  # height over length, as it is drawn
@@ -49,8 +55,6 @@ class Rigid(Body):
         return self
 
     def build(self) -> ModalBody:
-        from engine.bodies.rigid.body import rigid_body
-
         return rigid_body(self)
 
     def outline(self, modal: ModalBody) -> Outline:
@@ -67,3 +71,52 @@ class Rigid(Body):
             return []
         where = f"{here}.centre"
         return [on_body(where, (where, f"{here}.length"), "a centre of mass off the body")]
+
+
+@dataclass(frozen=True)
+class RigidShapes:
+    """phi = (1/sqrt(m), (s - centre)/sqrt(J))."""
+
+    mass: float
+    inertia: float
+    centre: float
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j phi / ds^j at the stations `s` (S,) for several j, as (orders, S, 2)."""
+        arm = np.asarray(s, dtype=np.float64) - self.centre
+        none = np.zeros_like(arm)
+        shapes = {0: (none + 1.0, arm), 1: (none, none + 1.0)}
+        sizes = np.sqrt([self.mass, self.inertia])
+        return np.stack([np.stack(shapes.get(order, (none, none)), axis=1) / sizes for order in orders])
+
+
+class RigidStatics:
+    """Nothing bends."""
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int) -> Array:
+        """Zero, for pairs."""
+        return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(s)))
+
+    def own_weight_deflection(self, x: ArrayLike, derivative: int) -> Array:
+        """Raises BadInput: no static state carries a free body."""
+        raise BadInput("own weight of a rigid body that nothing holds", where="own_weight", expected="false")
+
+
+def rigid_body(body: Rigid) -> ModalBody:
+    """The two modes of a rigid body.
+
+    >>> table = rigid_body(Rigid(kind="rigid", length=2.0, mass=4.0, inertia=9.0))
+    >>> table.shape([0.0, 1.0]).tolist()
+    [[0.5, -0.3333333333333333], [0.5, 0.0]]
+    """
+    return ModalBody(
+        length=body.length,
+        mass=body.mass,
+        omega=np.zeros(2),
+        participation=np.array([np.sqrt(body.mass), 0.0]),
+        wave_number=np.zeros(2),
+        bending_stiffness=np.nan,
+        dampers=(),
+        shapes=RigidShapes(body.mass, body.inertia, body.centre_of_mass),
+        statics=RigidStatics(),
+    )

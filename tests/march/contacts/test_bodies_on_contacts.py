@@ -15,11 +15,10 @@ from engine.march.march import march
 from engine.march.step_rules import contact_omega
 from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
+from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.bodies_on_contacts_dense import Twin, Where
 from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
-
-Array = NDArray[np.float64]
 
 
 def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, list[Where]], NDArray[np.bool_]]:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import engine
 import studies
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
 from engine.model.variant_values import padded
+from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
-
-Array = NDArray[np.float64]
 
 
 def test_on_one_rigid_contact_it_is_a_rigid_mass() -> None:
