@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import (
-    BELOW_AT,
-    BOUND,
-    DIVERGED_AT,
-    LANES,
-    LARGEST,
-    LARGEST_AT,
-    SMALLEST,
-    SMALLEST_AT,
-    STATISTICS,
-    Record,
-)
+from engine.kernels import layout
+from engine.kernels.layout import Record
 from engine.kernels.stepping.march import march_many, march_one
 from engine.kernels.stepping.start import solve_initial_acceleration, strike, watch_start
 from engine.march.initial_state import initial_state
@@ -156,8 +146,8 @@ def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled:
     guarded = sensors if signals > sensors else 0  # where no contacts are read, all signals stand guard
     statistics, unrecorded = _blank_statistics(blocks, signals), _blank_statistics(blocks, signals - guarded)
     bounds = _bounds(tables, lanes)
-    statistics[:, :, BOUND], unrecorded[:, :, BOUND] = bounds, bounds[:, guarded:]
-    history = np.full((blocks, counts.size, sensors if sampled is None else sampled, LANES), np.nan)
+    statistics[:, :, layout.BOUND], unrecorded[:, :, layout.BOUND] = bounds, bounds[:, guarded:]
+    history = np.full((blocks, counts.size, sensors if sampled is None else sampled, layout.LANES), np.nan)
     return March(tables, lanes, counts, initial_state(tables.model, lanes), statistics, unrecorded, history)
 
 
@@ -175,9 +165,9 @@ def march(
 
 
 def _blank_statistics(blocks: int, signals: int) -> Array:
-    statistics = np.zeros((blocks, signals, STATISTICS, LANES))
-    statistics[:, :, LARGEST], statistics[:, :, SMALLEST] = -np.inf, np.inf
-    statistics[:, :, [LARGEST_AT, SMALLEST_AT, BELOW_AT, DIVERGED_AT]] = -1.0
+    statistics = np.zeros((blocks, signals, layout.STATISTICS, layout.LANES))
+    statistics[:, :, layout.LARGEST], statistics[:, :, layout.SMALLEST] = -np.inf, np.inf
+    statistics[:, :, [layout.LARGEST_AT, layout.SMALLEST_AT, layout.BELOW_AT, layout.DIVERGED_AT]] = -1.0
     return statistics
 
 

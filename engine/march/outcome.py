@@ -9,16 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import (
-    BELOW_AT,
-    DIVERGED_AT,
-    LARGEST,
-    LARGEST_AT,
-    SECONDS,
-    SMALLEST,
-    SMALLEST_AT,
-    SQUARES,
-)
+from engine.kernels import layout
 from engine.kernels.schemes import Scheme
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
@@ -164,20 +155,23 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
         _include(marched.statistics[side.sensor], reading, side.at)
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         statistics = marched.statistics[j]
-        seen = np.isfinite(statistics[LARGEST]) | np.isnan(statistics[LARGEST])
-        found[f"{sensor.name}_max"] = np.where(seen, statistics[LARGEST], np.nan)
-        found[f"{sensor.name}_min"] = np.where(seen, statistics[SMALLEST], np.nan)
-        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, statistics[LARGEST_AT])
-        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, statistics[SMALLEST_AT])
+        seen = np.isfinite(statistics[layout.LARGEST]) | np.isnan(statistics[layout.LARGEST])
+        found[f"{sensor.name}_max"] = np.where(seen, statistics[layout.LARGEST], np.nan)
+        found[f"{sensor.name}_min"] = np.where(seen, statistics[layout.SMALLEST], np.nan)
+        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, statistics[layout.LARGEST_AT])
+        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, statistics[layout.SMALLEST_AT])
         found[f"{sensor.name}_rms"] = np.sqrt(
-            statistics[SQUARES] / np.where(statistics[SECONDS] > 0.0, statistics[SECONDS], 1.0)
+            statistics[layout.SQUARES] / np.where(statistics[layout.SECONDS] > 0.0, statistics[layout.SECONDS], 1.0)
         )
     return found
 
 
 def _include(statistics: Array, reading: Array, at: float) -> None:
     """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
-    for value, place, beyond in ((LARGEST, LARGEST_AT, np.greater), (SMALLEST, SMALLEST_AT, np.less)):
+    for value, place, beyond in (
+        (layout.LARGEST, layout.LARGEST_AT, np.greater),
+        (layout.SMALLEST, layout.SMALLEST_AT, np.less),
+    ):
         more = beyond(reading, statistics[value])
         statistics[value], statistics[place] = (
             np.where(more, reading, statistics[value]),
@@ -192,7 +186,7 @@ def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Calla
     for tables in own.companions:
         marched = march_scheme(tables, values, nothing, size, halted)
         for j, place in enumerate(tables.sensors):
-            for end, mark in (("max", LARGEST), ("min", SMALLEST)):
+            for end, mark in (("max", layout.LARGEST), ("min", layout.SMALLEST)):
                 found[f"{place.name}_envelope_{end}"].append(marched.statistics[j, mark])
         if len(own.companions) > MOST_KEPT:
             tables.forget()
@@ -204,13 +198,13 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
     found: Flat = {}
     for c, carriage in enumerate(tables.model.carriages):
         statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
-        seen = (statistics[:, LARGEST_AT] >= 0.0).any(axis=0)
-        least = np.argmin(statistics[:, SMALLEST], axis=0)[
+        seen = (statistics[:, layout.LARGEST_AT] >= 0.0).any(axis=0)
+        least = np.argmin(statistics[:, layout.SMALLEST], axis=0)[
             None
         ]  # where a contact never counts, its smallest is infinite
-        found[f"{carriage.name}_contact_force_max"] = np.where(seen, statistics[:, LARGEST].max(axis=0), np.nan)
-        found[f"{carriage.name}_contact_force_min"] = np.where(seen, statistics[:, SMALLEST].min(axis=0), np.nan)
-        place = tables.timeline.positions(c, np.take_along_axis(statistics[:, SMALLEST_AT], least, axis=0)[0])
+        found[f"{carriage.name}_contact_force_max"] = np.where(seen, statistics[:, layout.LARGEST].max(axis=0), np.nan)
+        found[f"{carriage.name}_contact_force_min"] = np.where(seen, statistics[:, layout.SMALLEST].min(axis=0), np.nan)
+        place = tables.timeline.positions(c, np.take_along_axis(statistics[:, layout.SMALLEST_AT], least, axis=0)[0])
         found[f"{carriage.name}_contact_force_min_position"] = place
         opened = _opened_at(tables, marched, c)
         found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
@@ -223,7 +217,7 @@ def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
     if not tables.model.reacts(carriage):
         return np.full(marched.statistics.shape[-1], -1.0)
     after = [len(tables.sensors) + number for number in contacts]
-    below = np.concatenate([marched.unrecorded[contacts, BELOW_AT], marched.statistics[after, BELOW_AT]])
+    below = np.concatenate([marched.unrecorded[contacts, layout.BELOW_AT], marched.statistics[after, layout.BELOW_AT]])
     first = np.min(np.where(below >= 0.0, below, np.inf), axis=0)
     return np.asarray(np.where(np.isfinite(first), first, -1.0))
 
@@ -235,12 +229,15 @@ def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
     """Status of every variant, and the first step at which it had diverged, or -1."""
-    bad = np.concatenate([marched.statistics[:, DIVERGED_AT], marched.unrecorded[:, DIVERGED_AT]])
+    bad = np.concatenate([marched.statistics[:, layout.DIVERGED_AT], marched.unrecorded[:, layout.DIVERGED_AT]])
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     sensors = len(marched.statistics) - len(marched.unrecorded)
     reactive = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
     below = np.concatenate(
-        [marched.statistics[[sensors + c for c in reactive], BELOW_AT], marched.unrecorded[reactive, BELOW_AT]]
+        [
+            marched.statistics[[sensors + c for c in reactive], layout.BELOW_AT],
+            marched.unrecorded[reactive, layout.BELOW_AT],
+        ]
     )
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))

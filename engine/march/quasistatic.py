@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.layout import (
-    BELOW_AT,
-    LARGEST,
-    LARGEST_AT,
-    SECONDS,
-    SMALLEST,
-    SMALLEST_AT,
-    SQUARES,
-    STATISTICS,
-)
+from engine.kernels import layout
 from engine.march.march import Marched
 from engine.model.variant_values import weights
 from engine.statics.static_response import static_readings
@@ -48,7 +39,7 @@ def quasistatic_extremes(
     at = tables.static_counts
     unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
-    statistics = np.zeros((len(signals), STATISTICS, distinct.shape[1]))
+    statistics = np.zeros((len(signals), layout.STATISTICS, distinct.shape[1]))
     piece = max(1, MOST_READINGS // unit[:, :, 0].size)
     for first in range(0, distinct.shape[1], piece):
         part = slice(first, first + piece)
@@ -56,8 +47,8 @@ def quasistatic_extremes(
     statistics = statistics[:, :, inverse.reshape(-1)]
     sensors = len(tables.sensors)
     time_scale = values.scene_time_scale[:size]
-    statistics[:sensors, SQUARES], statistics[:sensors, SECONDS] = _squares(tables, loads, time_scale)
-    unrecorded = np.full((len(signals) - sensors, STATISTICS, size), -1.0)
+    statistics[:sensors, layout.SQUARES], statistics[:sensors, layout.SECONDS] = _squares(tables, loads, time_scale)
+    unrecorded = np.full((len(signals) - sensors, layout.STATISTICS, size), -1.0)
     shown = sensors if sampled is None else sampled
     history = np.zeros((counts.size, shown, size))
     if counts.size:
@@ -86,15 +77,15 @@ def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> 
 
 def _statistics(readings: Array, counted: Flags, at: Array) -> Array:
     """(J, STATISTICS, V) of readings (S, J, V) at stations by their count (S,)."""
-    found = np.full((readings.shape[1], STATISTICS, readings.shape[2]), -1.0)  # none has diverged
+    found = np.full((readings.shape[1], layout.STATISTICS, readings.shape[2]), -1.0)  # none has diverged
     seen = counted[:, :, None]
-    for value, where, sign in ((LARGEST, LARGEST_AT, 1.0), (SMALLEST, SMALLEST_AT, -1.0)):
+    for value, where, sign in ((layout.LARGEST, layout.LARGEST_AT, 1.0), (layout.SMALLEST, layout.SMALLEST_AT, -1.0)):
         signed = np.where(seen, sign * readings, -np.inf)
         place = np.argmax(signed, axis=0)
         found[:, value] = sign * np.take_along_axis(signed, place[None], axis=0)[0]
         found[:, where] = np.where(np.asarray(counted.any(axis=0))[:, None], at[place], -1.0)
     below: Flags = np.logical_and(seen, readings < 0.0)
-    found[:, BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
+    found[:, layout.BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
     return found
 
 

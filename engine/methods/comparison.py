@@ -14,19 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.kernels.layout import (
-    CURVE,
-    FORCE,
-    LANES,
-    RATE,
-    STATISTICS,
-    Alpha,
-    Lanes,
-    Newmark,
-    Observation,
-    Record,
-    State,
-)
+from engine.kernels import layout
+from engine.kernels.layout import Alpha, Lanes, Newmark, Observation, Record, State
 from engine.kernels.schemes import NewmarkScheme
 from engine.kernels.stepping.comparison import (
     Carried,
@@ -192,7 +181,7 @@ def prepare_comparison(
     """Set up a march by a comparison scheme as `engine.march.march.prepare` does. Raises BadInput."""
     check_comparison(scheme, tables.model)
     ready = prepare(tables, values, counts, sampled)
-    kept = np.zeros((ready.lanes.gravity.shape[0], KEPT, LANES))
+    kept = np.zeros((ready.lanes.gravity.shape[0], KEPT, layout.LANES))
     return ComparisonMarch(**vars(ready), scheme=scheme, kept=kept)
 
 
@@ -206,15 +195,15 @@ def propagate_comparison(scheme: ComparisonScheme, track: Track, lanes: Lanes, s
     moved = State(*(part.copy() for part in state))
     steps, modes = track.rows.shape[1:3]
     blocks = free.step.shape[0]
-    kept = np.zeros((blocks, KEPT, LANES))
+    kept = np.zeros((blocks, KEPT, layout.LANES))
     start_own(kept, track, free, moved)
     record = Record(
-        np.zeros((blocks, 0, STATISTICS, LANES)),
+        np.zeros((blocks, 0, layout.STATISTICS, layout.LANES)),
         np.full(steps + 1, -1, dtype=np.int64),
-        np.zeros((blocks, 0, 0, LANES)),
+        np.zeros((blocks, 0, 0, layout.LANES)),
     )
     march_by_rule(scheme.rule, track, free, Carried(*moved, kept), _nothing_watched(modes), record, 0)
-    return Propagated(moved, _effort(kept, steps, blocks * LANES))
+    return Propagated(moved, _effort(kept, steps, blocks * layout.LANES))
 
 
 def frozen_track(scheme: ComparisonScheme, model: SceneModel, place: float, steps: int, advance: float = 0.0) -> Track:
@@ -291,9 +280,9 @@ def start_own(kept: Array, track: Track, lanes: Lanes, state: State) -> None:
         return np.asarray(np.einsum("n,bnj->bj", row[:, column], modal))
 
     kept[:, OWN_Q:] = 0.0
-    kept[:, OWN_Q] = over(FORCE, state.q)
-    kept[:, OWN_V] = over(FORCE, state.v) + 0.5 * over(RATE, state.q) / h
-    kept[:, OWN_A] = over(FORCE, state.a) + over(RATE, state.v) / h + over(CURVE, state.q) / h**2
+    kept[:, OWN_Q] = over(layout.FORCE, state.q)
+    kept[:, OWN_V] = over(layout.FORCE, state.v) + 0.5 * over(layout.RATE, state.q) / h
+    kept[:, OWN_A] = over(layout.FORCE, state.a) + over(layout.RATE, state.v) / h + over(layout.CURVE, state.q) / h**2
 
 
 def _way(carriage: CarriageTie, segment: Segment, offset: float) -> StationPath:

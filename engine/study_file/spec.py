@@ -144,6 +144,20 @@ def one_of(*words: str, planned: Sequence[str] = (), meant: Mapping[str, str] | 
     return check
 
 
+def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Validator of a list that has nothing twice."""
+    if len(set(values)) < len(values):
+        raise fault("an entry stands here twice", expected="each one once", received=shortened(values))
+    return values
+
+
+def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Validator of a list in ascending order."""
+    if list(values) != sorted(set(values)):
+        raise fault("a list in ascending order is wanted here", expected="each once", received=shortened(values))
+    return values
+
+
 def nearest(word: object, names: Sequence[str]) -> str:
     """A hint at the name that was probably meant, or "".
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag
 
-from engine.study_file.spec import LIST, NUMBER, Spec, by_form
-from engine.study_file.units import Length, fault
+from engine.study_file.spec import LIST, NUMBER, Spec, ascending, by_form
+from engine.study_file.units import Length
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from studies.results.findings_common import first_carriage
@@ -23,14 +23,8 @@ if TYPE_CHECKING:
 CORRECTED: Sequence[Mapping[str, Any]] = ({"solver.static_correction": True}, {"solver.static_correction": False})
 
 
-def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
-    if list(values) != sorted(set(values)):
-        raise fault("a list in ascending order is wanted here", expected="each once")
-    return values
-
-
 _Number = Annotated[int, Field(ge=2, le=2001)]
-_Listed = Annotated[tuple[Length, ...], Strict(False), Field(min_length=1, max_length=2001), AfterValidator(_ascending)]
+_Listed = Annotated[tuple[Length, ...], Strict(False), Field(min_length=1, max_length=2001), AfterValidator(ascending)]
 _Modes = Annotated[int, Field(ge=1, le=64)]
 
 
@@ -43,7 +37,7 @@ class Asked(Spec):
     """
 
     positions: Annotated[Annotated[_Number, Tag(NUMBER)] | Annotated[_Listed, Tag(LIST)], by_form] = 41
-    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), AfterValidator(_ascending)] = ()
+    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), AfterValidator(ascending)] = ()
     unreduced: int = Field(default=0, ge=0, le=101)
 
     @property

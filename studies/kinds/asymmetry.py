@@ -22,7 +22,6 @@ from studies.results.results import VARIANT, Index, Results, extreme
 if TYPE_CHECKING:
     from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 
@@ -106,6 +105,7 @@ class Asymmetry(Kind):
     name = "asymmetry"
     summary = "forward against backward at equal positions: lag, loop area, odd and even parts of the last cycle"
     question = "Does the response differ when the carriage comes back?"
+    drawn_by = "studies.pictures.asymmetry"
 
     def check(self, study: Study) -> None:
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
@@ -142,11 +142,6 @@ class Asymmetry(Kind):
         """For every sensor the variant with the largest odd part."""
         places = map(extreme, np.moveaxis(odd_parts(results), -1, 0))
         return [place for place in places if place is not None]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import asymmetry
-
-        return asymmetry.pictures(results)
 
 
 KIND = Asymmetry()

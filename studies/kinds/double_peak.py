@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 
 MOST_SENSORS = 3
@@ -133,6 +132,7 @@ class DoublePeak(Kind):
     name = "double-peak"
     summary = "peaks and harmonics of the last cycle of a carriage that goes to and fro"
     question = "How often does the response peak while the carriage goes to and fro once?"
+    drawn_by = "studies.pictures.double_peak"
 
     def check(self, study: Study) -> None:
         """First carriage with a motion that repeats, and sensors."""
@@ -179,11 +179,6 @@ class DoublePeak(Kind):
         places = [first_break(results, sensor) for sensor in sensors]
         places += [extreme(results.of_sensor("dynamic_amplification", sensor)) for sensor in sensors]
         return [place for place in places if place is not None]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import double_peak
-
-        return double_peak.pictures(results)
 
 
 KIND = DoublePeak()

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 
 SHOWN = 3  # frequencies that a sentence lists
@@ -99,6 +98,7 @@ class Eigenfrequencies(AtRestKind):
     name = "eigenfrequencies"
     summary = "natural frequencies and shapes of the coupled system against the carriage's position"
     question = "How do the natural frequencies change with the place of the carriage?"
+    drawn_by = "studies.pictures.eigenfrequencies"
     settings = Question
 
     def check(self, study: Study) -> None:
@@ -141,11 +141,6 @@ class Eigenfrequencies(AtRestKind):
     def findings(self, results: Results) -> list[str]:
         said = [_along(results), *_together(results), *_sweep(results)]
         return [*said, *_unreduced(results), *_mode_counts(results)]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import eigenfrequencies
-
-        return eigenfrequencies.pictures(results)
 
 
 KIND = Eigenfrequencies()

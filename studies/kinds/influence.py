@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from engine.model.station_path import Along
     from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 
 MOST_SENSORS = 6
@@ -113,6 +112,7 @@ class Influence(AtRestKind):
     name = "influence"
     summary = "static readings, contact forces and deflected shapes under gravity against the carriage's position"
     question = "What do the weights do at rest, wherever the carriage stands?"
+    drawn_by = "studies.pictures.influence"
 
     def check(self, study: Study) -> None:
         """Something stands on a body, something with a static reading is measured, and positions exist."""
@@ -181,11 +181,6 @@ class Influence(AtRestKind):
         said = [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
         said += _contacts(results)
         return [*said, *_unreduced(results), *_mode_counts(results), *told_statuses(results)]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import influence
-
-        return influence.pictures(results)
 
 
 KIND = Influence()

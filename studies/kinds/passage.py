@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 
 MOST_SENSORS = 4
@@ -34,6 +33,7 @@ class Passage(Kind):
     name = "passage"
     summary = "largest and smallest of every sensor and of the contact force, dynamic amplification"
     question = "How large does the response get, and does the contact hold?"
+    drawn_by = "studies.pictures.passage"
 
     def check(self, study: Study) -> None:
         """Something moves and something is measured."""
@@ -52,11 +52,6 @@ class Passage(Kind):
         """For every sensor of the answer the variants with the largest value and the largest amplification."""
         places = (place for sensor in _told(results) for place in _extremes(results, sensor))
         return [place for place in places if place is not None]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import passage
-
-        return passage.pictures(results)
 
 
 KIND = Passage()

@@ -14,7 +14,6 @@ from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
-    from studies.pictures.common.figures import Figure
 
 MOST_SENSORS = 4
 
@@ -46,6 +45,7 @@ class Trajectory(Kind):
     name = "trajectory"
     summary = "histories of every sensor and of the carriages' motion"
     question = "What do the sensors and the carriages do over time?"
+    drawn_by = "studies.pictures.trajectory"
 
     def check(self, study: Study) -> None:
         """Something moves, something is measured, and histories are kept."""
@@ -64,11 +64,6 @@ class Trajectory(Kind):
         said = [_kept(results)] if traced else ["No history was kept."]
         said += [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
         return [*said, *told_statuses(results)]
-
-    def figures(self, results: Results) -> list[Figure]:
-        from studies.pictures import trajectory
-
-        return trajectory.pictures(results)
 
 
 KIND = Trajectory()

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
-from engine.study_file.spec import Spec, one_of
+from engine.study_file.spec import Spec, ascending, distinct, one_of
 from engine.study_file.units import fault
 from results_schema.arrays import Array
-from results_schema.errors import BadInput, shortened
+from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
 from studies.precision.checks import slug_of
@@ -49,18 +49,6 @@ def _even(count: int) -> int:
     return count
 
 
-def _ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    if list(values) != sorted(set(values)):
-        raise fault("a list in ascending order is wanted here", expected="each once", received=shortened(list(values)))
-    return values
-
-
-def _distinct(values: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(values)) != len(values):
-        raise fault("a name stands twice", expected="each once", received=shortened(list(values)))
-    return values
-
-
 _Steps = Annotated[int, Field(ge=4, le=1_000_000), AfterValidator(_even)]
 _Modes = Annotated[int, Field(ge=1, le=64)]
 _Part = Annotated[float, Field(gt=0, lt=1)]
@@ -77,14 +65,12 @@ class Question(Spec):
     """
 
     scenes: dict[str, dict[str, Any]] = Field(default={"the scene": {}}, min_length=1)
-    schemes: Annotated[tuple[_Scheme, ...], Strict(False), Field(min_length=1), AfterValidator(_distinct)] = SCHEMES
-    step_counts: Annotated[tuple[_Steps, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = LADDER
-    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = MODES
+    schemes: Annotated[tuple[_Scheme, ...], Strict(False), Field(min_length=1), AfterValidator(distinct)] = SCHEMES
+    step_counts: Annotated[tuple[_Steps, ...], Strict(False), Field(min_length=1), AfterValidator(ascending)] = LADDER
+    mode_counts: Annotated[tuple[_Modes, ...], Strict(False), Field(min_length=1), AfterValidator(ascending)] = MODES
     reference_modes: int = Field(default=64, ge=4, le=64)
     wanted: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1)] = WANTED
-    tolerances: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1), AfterValidator(_ascending)] = (
-        TOLERANCES
-    )
+    tolerances: Annotated[tuple[_Part, ...], Strict(False), Field(min_length=1), AfterValidator(ascending)] = TOLERANCES
 
 
 declare("work-precision", *RESULTS, *COORDINATES)

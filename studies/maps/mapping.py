@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Field, Strict
 
-from engine.study_file.spec import Spec
-from engine.study_file.units import fault
+from engine.study_file.spec import Spec, distinct
 from results_schema.variables import Variable, axes
 
 if TYPE_CHECKING:
@@ -17,13 +16,6 @@ if TYPE_CHECKING:
 
     from studies.maps.map_scene import Ground
     from studies.protocol.parts import Work
-
-
-def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The values, none of them twice."""
-    if len(set(values)) < len(values):
-        raise fault("the same value twice", expected="values that differ")
-    return values
 
 
 Part = Annotated[float, Field(gt=0, le=100)]

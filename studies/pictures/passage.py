@@ -11,16 +11,8 @@ from matplotlib.lines import Line2D
 
 from studies.findings.amplification import largest, sizes
 from studies.findings.theory import body_mass
-from studies.pictures.common.figures import (
-    HAIR,
-    VERMILION,
-    Figure,
-    colour_bar,
-    draw,
-    legend_of_all,
-    shades,
-    zero_line,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MASSES,
@@ -197,8 +189,8 @@ def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
     _speed_ratio(axes, seen)
     if seen.y is not None and seen.x is not None and _has_line(seen, force):
         x, y = seen.along(seen.x), seen.along(seen.y)
-        axes.contour(x, y, seen.plane(force).T, [0.0], colors=VERMILION, linewidths=1.8)
-        line = Line2D([], [], color=VERMILION, linewidth=1.8)
+        axes.contour(x, y, seen.plane(force).T, [0.0], colors=look.VERMILION, linewidths=1.8)
+        line = Line2D([], [], color=look.VERMILION, linewidth=1.8)
         axes.legend([line], ["contact opens"], loc="lower right", framealpha=0.85, frameon=True)
 
 
@@ -249,5 +241,5 @@ def _shade_left(axes: Any, results: Results, index: Index, end: float) -> None:
         return
     end = min(end, 2.0 * on[-1] - on[0])
     if end > on[-1] + LEFT * (on[-1] - on[0]):
-        axes.axvspan(on[-1], end, color=HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
+        axes.axvspan(on[-1], end, color=look.HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
         axes.set_xlim(on[0], end)

@@ -42,7 +42,8 @@ class Kind:
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
     settings: the class of its table [question], None where it has none. sweeps: whether it takes a [sweep], whose grid
     is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
-    failure of the run. start: a study file to start from, of a kind of another package.
+    failure of the run. drawn_by: the module whose `pictures` makes its figures of the results. start: a study file to
+    start from, of a kind of another package.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Kind:
     question: str
     settings: type[Spec] | None = None
     sweeps = True
+    drawn_by = ""
     start: str
 
     def check(self, study: Study) -> None:
@@ -91,7 +93,7 @@ class Kind:
 
     def figures(self, results: Results) -> list[Figure]:
         """The figures of the report, the most important first."""
-        return []
+        return import_module(self.drawn_by).pictures(results) if self.drawn_by else []
 
 
 class PiecedKind(Kind, ABC):

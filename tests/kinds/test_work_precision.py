@@ -264,7 +264,7 @@ def test_figures_are_drawn_with_what_there_is() -> None:
     ("lines", "words"),
     [
         ('schemes = ["average"]', r"question.schemes.0: unknown name.*one of average-acceleration"),
-        ('schemes = ["rk4", "rk4"]', r"question.schemes: a name stands twice"),
+        ('schemes = ["rk4", "rk4"]', r"question.schemes: an entry stands here twice"),
         ('schemes = ["rk4"]', r"question.schemes: .*at least one scheme of the march"),
         ("step_counts = [51]", r"question.step_counts.0: a Richardson pair halves.*an even number.*51"),
         ("step_counts = [100, 50]", r"question.step_counts: a list in ascending order"),

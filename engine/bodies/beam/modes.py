@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from engine.bodies.beam.dimensionless_modes import UnitModes, unit_modes
 from engine.bodies.beam.statics import Restraint, beam_statics, merge, stations
-from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.modal_body import Array, ModalBody, frozen
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -56,9 +56,9 @@ def uniform_beam(beam: Beam, modes: int) -> ModalBody:
     return ModalBody(
         length=length,
         mass=mass,
-        omega=_frozen(unit.omega * math.sqrt(stiffness / line_mass) / length**2),
-        participation=_frozen(unit.integral * math.sqrt(mass)),
-        wave_number=_frozen(np.sqrt(unit.omega) / length),
+        omega=frozen(unit.omega * math.sqrt(stiffness / line_mass) / length**2),
+        participation=frozen(unit.integral * math.sqrt(mass)),
+        wave_number=frozen(np.sqrt(unit.omega) / length),
         bending_stiffness=stiffness,
         second_moment=beam.second_moment,
         fibre_distance=math.nan if beam.fibre_distance is None else beam.fibre_distance,
@@ -81,8 +81,3 @@ class BeamShapes:
         x = stations(s, self.length, *orders)
         scale = [1.0 / (math.sqrt(self.mass) * self.length**order) for order in orders]
         return self.unit.derivatives(x, orders, scale)
-
-
-def _frozen(values: Array) -> Array:
-    values.flags.writeable = False
-    return values

@@ -26,7 +26,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine.bodies.modal.modal_body import Array, refuse_loose
+from engine.bodies.modal.modal_body import Array, frozen, refuse_loose
 from engine.kernels.influence import Functionals, functionals, influence
 from results_schema.errors import BadInput
 
@@ -151,9 +151,7 @@ def _inverse(restraints: tuple[Restraint, ...]) -> Array:
         for i, (a, b) in enumerate(rigid, start=count):
             system[i, count:] = rows @ (0.5 * weights * (a + b * x))
             system[count:, i] = system[i, count:]
-    inverse = _equilibrated_inverse(system)
-    inverse.flags.writeable = False
-    return inverse
+    return frozen(_equilibrated_inverse(system))
 
 
 def _equilibrated_inverse(system: Array) -> Array:

@@ -20,7 +20,7 @@ from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Spots
 from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, solving, without_rounding
-from engine.bodies.modal.modal_body import Array, ModalBody, Shapes
+from engine.bodies.modal.modal_body import Array, ModalBody, Shapes, frozen
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         length=statics.length,
         mass=assembly.total_mass,
         omega=omega,
-        participation=_frozen(shapes.T @ pull),
-        wave_number=_frozen(track.wave_number(omega)),
+        participation=frozen(shapes.T @ pull),
+        wave_number=frozen(track.wave_number(omega)),
         bending_stiffness=float(bending[0]) if np.ptp(bending) <= 1e-9 * bending[0] else np.nan,
         dampers=(),
         shapes=track_shapes(track, moved, forces),
@@ -107,7 +107,7 @@ def _kept(frame: Frame, whole: _Whole) -> tuple[Array, Array, Array]:
     along = track_shapes(track, moved, mode_forces(track, moved, omega, MASSES[frame.mass_matrix](track.beams)))
     turn = settled(omega, along, whole.statics.length, shapes)
     kept = kept_modes(frame, omega)
-    return _frozen(omega[kept]), without_rounding(moved @ turn, (0, 1))[:, :, kept], (shapes @ turn)[:, kept]
+    return frozen(omega[kept]), without_rounding(moved @ turn, (0, 1))[:, :, kept], (shapes @ turn)[:, kept]
 
 
 def motion_of_points(frame: Frame) -> tuple[Assembly, Array]:
@@ -189,8 +189,3 @@ def kept_modes(frame: Frame, omega: Array) -> Counts:
     if not len(kept):
         raise BadInput("no mode is left", where="leave_out" if frame.leave_out else "modes", expected="at least one")
     return kept
-
-
-def _frozen(values: Array) -> Array:
-    values.flags.writeable = False
-    return values

@@ -21,7 +21,7 @@ from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.checks import Check
-from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
+from engine.study_file.spec import LIST, WORD, Spec, by_form, distinct, one_of
 from engine.study_file.units import (
     Area,
     Damping,
@@ -57,23 +57,17 @@ def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     return vector
 
 
-def _each_once(words: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(words)) < len(words):
-        raise fault("an entry stands here twice", expected="each one once", received=shortened(words))
-    return words
-
-
 Vector = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False), AfterValidator(_not_zero)]
 Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
 Place = Annotated[tuple[Coordinate, Coordinate, Coordinate], Strict(False)]
 Node = Annotated[tuple[Coordinate, ...], Strict(False), Field(min_length=2, max_length=3)]
 Two = Annotated[tuple[str, str], Strict(False)]
-Names = Annotated[tuple[str, ...], Strict(False), AfterValidator(_each_once)]
+Names = Annotated[tuple[str, ...], Strict(False), AfterValidator(distinct)]
 Three = tuple[float, float, float]
 
 _DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
 _Directions = Annotated[
-    tuple[_DirectionWord, ...], Strict(False), Field(min_length=1, max_length=6), AfterValidator(_each_once)
+    tuple[_DirectionWord, ...], Strict(False), Field(min_length=1, max_length=6), AfterValidator(distinct)
 ]
 _HOLDS = {"clamped": DIRECTIONS, "pinned": DIRECTIONS[:3]}
 _HoldWord = Annotated[str, AfterValidator(one_of(*_HOLDS, meant={"fixed": "clamped", "hinged": "pinned"}))]

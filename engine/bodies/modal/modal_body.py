@@ -99,6 +99,12 @@ class Points:
         return held_weight(self.rigid, float(self.weight[self.numbers[name]]))
 
 
+def frozen(values: Array) -> Array:
+    """The array, which nobody can change from now on."""
+    values.flags.writeable = False
+    return values
+
+
 def refuse_loose(rigid: int) -> None:
     """Raise BadInput for a body with rigid-body modes, which no static state can carry."""
     if rigid:

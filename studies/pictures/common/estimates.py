@@ -10,17 +10,8 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array, Mask
 from studies.findings.numerics_used import is_marched, known
-from studies.pictures.common.figures import (
-    BLUE,
-    INK,
-    MUTED,
-    VERMILION,
-    Figure,
-    draw,
-    legend_beside,
-    logarithmic,
-    on_method,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, on_method
 from studies.results.formatting import counted, number, percent
 from studies.results.results import PACES, Axis, Results
 from studies.runs.audit import relative_errors
@@ -71,10 +62,12 @@ def _title(name: str, error: Array, tolerance: float) -> str:
 def _draw_results(rows: list[tuple[str, Array, float]], drawing: Drawing) -> None:
     axes = drawing.subplots()
     for place, (_, error, tolerance) in enumerate(rows):
-        sizes, colour = np.maximum(error, LEAST), MUTED if np.isnan(tolerance) else BLUE
+        sizes, colour = np.maximum(error, LEAST), look.MUTED if np.isnan(tolerance) else look.BLUE
         axes.plot([sizes.min(), sizes.max()], [place, place], color=colour, linewidth=2.0)
         axes.plot(np.median(sizes), place, "o", color=colour)
-        (mark,) = axes.plot(tolerance, place, "|", color=VERMILION, markersize=9.0, label="" if place else "tolerance")
+        (mark,) = axes.plot(
+            tolerance, place, "|", color=look.VERMILION, markersize=9.0, label="" if place else "tolerance"
+        )
         mark.set_markeredgewidth(1.6)
     axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="estimated error")
@@ -110,12 +103,12 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
 def _draw_compared(pairs: Array, held: Mask, tolerances: Array, drawing: Drawing) -> None:
     axes = drawing.subplots()
     ends = pairs.min() / 1.8, max(pairs.max(), *tolerances, LEAST) * 1.8
-    axes.plot(ends, ends, color=INK, linewidth=0.9, label="equal")
-    for label, own, colour in (("held to a tolerance", held, BLUE), ("not held", ~held, MUTED)):
+    axes.plot(ends, ends, color=look.INK, linewidth=0.9, label="equal")
+    for label, own, colour in (("held to a tolerance", held, look.BLUE), ("not held", ~held, look.MUTED)):
         if own.any():
             axes.plot(*pairs[:, own], "o", color=colour, markersize=3.0, label=label, rasterized=own.sum() > 500)
     for place, tolerance in enumerate(tolerances):
-        axes.axhline(tolerance, color=VERMILION, linewidth=0.9, linestyle="--", label="" if place else "tolerance")
+        axes.axhline(tolerance, color=look.VERMILION, linewidth=0.9, linestyle="--", label="" if place else "tolerance")
     for axis in (axes.xaxis, axes.yaxis):
         logarithmic(axis)
     axes.set(xlim=ends, ylim=ends, xlabel="estimated error", ylabel="observed error")
@@ -141,8 +134,8 @@ def observed(results: Results, group: xr.Dataset | None) -> list[Figure]:
 def _draw_observed(group: xr.Dataset, axis: Axis, drawing: Drawing) -> None:
     axes = drawing.subplots()
     along = axis.factor * np.asarray(group[axis.name].values, dtype=np.float64)
-    axes.axhline(1.0, color=MUTED, linewidth=1.0, label="tolerance")
-    for name, mark, colour in (("observed", "o", BLUE), ("estimated", "x", VERMILION)):
+    axes.axhline(1.0, color=look.MUTED, linewidth=1.0, label="tolerance")
+    for name, mark, colour in (("observed", "o", look.BLUE), ("estimated", "x", look.VERMILION)):
         worst = _worst(relative_errors(group, f"{name}_error"))
         axes.plot(along, np.maximum(worst, LEAST), mark, color=colour, markersize=4.5, label=name)
     logarithmic(axes.yaxis)

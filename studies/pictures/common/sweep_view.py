@@ -13,17 +13,8 @@ from matplotlib.collections import PathCollection, QuadMesh
 
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
-from studies.pictures.common.figures import (
-    ALIKE,
-    BLUE,
-    MUTED,
-    SEQUENTIAL,
-    is_logarithmic,
-    legend_beside,
-    logarithmic,
-    shades,
-    widen,
-)
+from studies.pictures.common import figures as look
+from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
 from studies.results.formatting import listed
 from studies.results.results import VARIANT, Axis, Index, Results, spread, statuses
 
@@ -178,7 +169,7 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
         _draw_points(axes, seen, curves[0])
         return
     if seen.y is not None and coincide(curves):
-        axes.set_title(f"the same for {seen.y.noun} {seen.y.span}", loc="right", color=MUTED)
+        axes.set_title(f"the same for {seen.y.noun} {seen.y.span}", loc="right", color=look.MUTED)
         curves = [curves[-1]._replace(label="")]
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
         marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
@@ -194,7 +185,7 @@ def coincide(curves: Sequence[Curve]) -> bool:
     known = y[np.isfinite(y)]
     if len(curves) < 2 or not known.size or np.ptp(x, axis=0).any() or (np.isfinite(y) != np.isfinite(y[0])).any():
         return False
-    height = max(float(np.ptp(known)), ALIKE * float(np.abs(known).max()))
+    height = max(float(np.ptp(known)), look.ALIKE * float(np.abs(known).max()))
     return bool(np.nan_to_num(np.ptp(y, axis=0)).max() <= UNSEEN * height)
 
 
@@ -221,16 +212,16 @@ def per_shown(seen: View, axis: Axis | None, ratio: Any) -> float | None:
         return None
     factors = np.asarray(seen.cut(ratio).values, dtype=np.float64) / np.where(axis.shown, axis.shown, np.nan)
     known = factors[np.isfinite(factors)]
-    return float(known[0]) if known.size and np.ptp(known) <= ALIKE * abs(known[0]) and known[0] > 0.0 else None
+    return float(known[0]) if known.size and np.ptp(known) <= look.ALIKE * abs(known[0]) and known[0] > 0.0 else None
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
     size = 14.0 if len(curve.x) < 500 else 4.0
     style: dict[str, Any] = {"s": size, "linewidths": 0.0, "rasterized": len(curve.x) > VECTOR_CELLS}
     if seen.y is None:
-        axes.scatter(curve.x, curve.y, color=BLUE, **style)
+        axes.scatter(curve.x, curve.y, color=look.BLUE, **style)
         return
-    points = axes.scatter(curve.x, curve.y, c=seen.y.shown, cmap=SEQUENTIAL, **style)
+    points = axes.scatter(curve.x, curve.y, c=seen.y.shown, cmap=look.SEQUENTIAL, **style)
     axes.figure.colorbar(points, ax=axes, label=seen.y.title, pad=0.02).outline.set_visible(False)
 
 
