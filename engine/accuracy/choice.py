@@ -19,8 +19,8 @@ from engine.accuracy.reference import DOUBTED, Halted, Share, across_and_within
 from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
-from engine.model.variant_values import VariantValues
 from engine.scene.sweep import Cases
+from engine.scene.variants import VariantValues, axes_of_scene, cases_tolerance
 from results_schema.arrays import Array, Counts
 
 Numbers = NDArray[np.int32]
@@ -135,7 +135,6 @@ NEIGHBOURS = 10
 LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out; 0.005 to 0.1 chose alike
 NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights: 6 to 40 took 0.7 to 1 times the work
 SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell the same twice
-TOLERANCE = "solver.tolerance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +182,8 @@ def choose(
     across, within = across_and_within(share, sum(part.size > 0 for part in parts))
     for grid, own in zip(grids, parts, strict=True):
         if own.size:
-            columns = cases.columns_of(own)
-            if TOLERANCE in columns:  # pilots serve the tightest that has them for neighbours
-                columns = {**columns, TOLERANCE: np.full(own.size, span[0] * asked.study.solver.tolerance)}
-            values = VariantValues(grid.scene.study, columns, own.size)
+            # Pilots serve the tightest that has them for neighbours.
+            values = VariantValues.of(grid.scene.study, cases, own).all_as_tight(span[0])
             climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, within, span))
     across([climb.go for climb in climbs])
     return _chosen(asked, cases, climbs, np.concatenate([own for own in parts if own.size]), share)
@@ -202,7 +199,7 @@ def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, 
     ranked = ranked[np.any(np.isfinite(measured.held.reshape(cost.size, -1)[ranked]), axis=1)]
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
     errors = neighbour_errors_of(asked, measured, nearest_others(pilots, NEIGHBOURS), span)
-    tighter, rung = cases_tolerance(asked, cases), np.empty(cases.size, dtype=np.int32)
+    tighter, rung = cases_tolerance(asked.study, cases), np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=np.int32)
 
     def choose_for(part: Counts) -> None:
@@ -241,16 +238,9 @@ AT_ONCE = 65536  # variants that are chosen for at once: some ten milliseconds
 MOST_SCENES = 24  # that pilots are drawn from: each climbs the ladder by tables of its own, about a second
 
 
-def cases_tolerance(asked: Asked, cases: Cases) -> Array:
-    """(V,) `solver.tolerance` of every variant over the study's."""
-    if TOLERANCE not in cases.paths:
-        return np.ones(cases.size)
-    return cases.column(TOLERANCE) / asked.study.solver.tolerance
-
-
 def tolerance_span(asked: Asked, cases: Cases) -> tuple[float, float]:
-    """The least and the largest of them."""
-    found = cases_tolerance(asked, cases)
+    """The least and the largest `solver.tolerance` of the variants over the study's."""
+    found = cases_tolerance(asked.study, cases)
     return float(found.min()), float(found.max())
 
 
@@ -260,9 +250,9 @@ def coordinates(cases: Cases, variants: Counts) -> Array:
     sweeps took 1.4 times the work, and 1.2 % of displacements missed in place of 0.8."""
     positions = cases.positions(variants)
     columns = []
-    for axis in cases.axes:
+    for axis in axes_of_scene(cases):
         values = np.asarray(axis.values, dtype=np.float64)
-        if values.min() < values.max() and axis.paths != (TOLERANCE,):
+        if values.min() < values.max():
             roots = np.cbrt(values)
             columns.append(((roots - roots.min()) / np.ptp(roots))[positions[axis.dim]])
     return np.stack(columns, axis=1) if columns else np.zeros((variants.size, 1))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from engine.model.numerics import Numerics
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Grid
-    from engine.model.variant_values import VariantValues
+    from engine.scene.variants import VariantValues
 
 
 #: Steps of the grid over a passage, or over a cycle. The cheapest march that holds 1e-2 took
@@ -63,7 +63,7 @@ class SceneGrid:
     @property
     def fixed(self) -> bool:
         """Whether the study says how many steps."""
-        return fixed_steps(self.values)
+        return self.values.has_fixed_steps
 
     @property
     def _free_unit(self) -> int:
@@ -140,11 +140,6 @@ class SceneGrid:
         model = self.model(numerics)
         times = least_steps(model, values) / (self.unit * model.scheme.stride * by)
         return by * np.exp2(np.ceil(np.log2(np.maximum(times, 1.0)) - 1e-9)).astype(np.int64)
-
-
-def fixed_steps(values: VariantValues) -> bool:
-    """Whether the study says how many steps."""
-    return values.study.solver.steps != "auto" or "solver.steps" in values.columns
 
 
 def unit_steps(scene: SceneModel) -> int:

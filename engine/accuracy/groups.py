@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from engine.march.tables import SceneTables
     from engine.model.numerics import Numerics
     from engine.model.scene_model import SceneModel
-    from engine.model.variant_values import VariantValues
+    from engine.scene.variants import VariantValues
 
 Kept = Literal["numbers", "histories"]
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by

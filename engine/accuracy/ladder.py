@@ -22,7 +22,7 @@ from engine.march.outcome import Asked, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import VariantValues
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 

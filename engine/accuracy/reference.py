@@ -28,7 +28,7 @@ from engine.kernels.schemes import Scheme
 from engine.march.outcome import Flat, Outcome, outcome, used
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
-from engine.model.variant_values import VariantValues
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 
 Halted = Callable[[], bool]

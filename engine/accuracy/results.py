@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.march.envelopes import envelope_names
-from engine.model.variant_values import weights
+from engine.model.lane_table import weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
@@ -23,8 +23,8 @@ from results_schema.status import Status
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome
     from engine.model.scene_model import SceneModel
-    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
 
 
 EXTREMES = ("max", "min", "rms")

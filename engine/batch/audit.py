@@ -30,7 +30,7 @@ from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
-from engine.model.variant_values import VariantValues
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
@@ -99,7 +99,7 @@ def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) 
     found: list[Audit] = []
 
     def of_scene(grid: SceneGrid, own: Counts) -> None:
-        values = VariantValues(grid.scene.study, plan.cases.columns_of(own), own.size)
+        values = VariantValues.of(grid.scene.study, plan.cases, own)
         truth = converge(
             grid, values, in_full(grid), REFERENCE_PART, beyond=Beyond(1, _dear(plan)), halted=halted, share=within
         )

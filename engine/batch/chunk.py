@@ -14,8 +14,8 @@ from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import Flat, histories
 from engine.march.tables import SceneTables
-from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.store.rows import Rows, joined
@@ -100,7 +100,7 @@ def _marched_again(
     """Histories of some variants of a scene, marched again with samples. Raises Halted."""
     if not variants.size:
         return
-    values = VariantValues(grid.scene.study, plan.cases.columns_of(variants), variants.size)
+    values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
         yield Rows(variants[own], histories(tables, values.part(own), _counts(plan, tables), halted))
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from engine.accuracy.results import results_of, tolerances
 from engine.batch.plan import Plan
 from engine.march.envelopes import envelope_places
+from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Cases
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.store.rows import Rows
 from results_schema.variables import Variable, axes, declarations, expand, sensor_unit

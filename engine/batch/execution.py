@@ -117,7 +117,7 @@ def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> f
     from engine.march.march import prepare
     from engine.march.richardson import march_pair
     from engine.march.tables import SceneTables
-    from engine.model.variant_values import padded
+    from engine.model.lane_table import padded
 
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
     tables = {id(b): SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in plan.groups}
@@ -216,10 +216,11 @@ def _first_steps(grid: SceneGrid) -> None:
     from engine.march.richardson import march_scheme
     from engine.march.stepper import Halted as Gone
     from engine.march.tables import SceneTables
+    from engine.model.lane_table import in_whole_blocks
 
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
     with suppress(Gone):
-        values = grid.values.part(np.zeros(1, dtype=np.int64)).padded
+        values = in_whole_blocks(grid.values.part(np.zeros(1, dtype=np.int64)))
         march_scheme(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
 
 

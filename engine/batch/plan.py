@@ -13,8 +13,8 @@ from math import prod
 
 import numpy as np
 
-from engine.accuracy.choice import PILOTS, Choice, cases_tolerance, choose
-from engine.accuracy.grids import SceneGrid, fixed_steps, unit_steps
+from engine.accuracy.choice import PILOTS, Choice, choose
+from engine.accuracy.grids import SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
 from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import Share
@@ -27,11 +27,11 @@ from engine.march.tables import SceneTables
 from engine.model.distinct_models import base_scene, scenes, split
 from engine.model.scene_model import SceneModel, check_moves
 from engine.model.timeline import Window
-from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
+from engine.scene.variants import VariantValues, cases_tolerance
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -100,7 +100,7 @@ class Plan:
     @property
     def cases_tolerance(self) -> Array:
         """(V,) `solver.tolerance` of every variant over the study's."""
-        return cases_tolerance(self.asked, self.cases)
+        return cases_tolerance(self.study, self.cases)
 
     def choose(self, share: Share, halted: Callable[[], bool], pilots: int = PILOTS) -> None:
         """Measure pilots and choose, where the study has many variants. Raises Halted."""
@@ -122,7 +122,7 @@ class Plan:
         """Variants on a rung, those that must take more steps apart."""
         ladder = ladder_of(self.asked, grid)
         column, cut = divmod(rung, len(ladder.cuts))
-        values = VariantValues(grid.scene.study, self.cases.columns_of(variants), variants.size)
+        values = VariantValues.of(grid.scene.study, self.cases, variants)
         numerics = ladder.columns[column]
         by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
         pace = values.scene_time_scale
@@ -186,7 +186,7 @@ class Plan:
 
     def values(self, group: Group, variants: Counts) -> VariantValues:
         """Numbers of some variants of a group."""
-        return VariantValues(group.scene.study, self.cases.columns_of(variants), variants.size)
+        return VariantValues.of(group.scene.study, self.cases, variants)
 
 
 def _even(size: int, most: int) -> int:
@@ -231,9 +231,9 @@ def _grids(
     asked: Asked, cases: Cases, scene: SceneModel, variants: Counts, check_steps: CheckSteps
 ) -> Iterator[tuple[SceneGrid, Counts]]:
     """The variants of a scene, by their steps where the study fixes these. Raises BadInput."""
-    values = VariantValues(scene.study, cases.columns_of(variants), variants.size)
+    values = VariantValues.of(scene.study, cases, variants)
     check_readings(scene, asked.window)
-    if scene.fidelity is Fidelity.STATIC or not fixed_steps(values):
+    if scene.fidelity is Fidelity.STATIC or not values.has_fixed_steps:
         if scene.fidelity is not Fidelity.STATIC:
             check_slowest(scene, values)
             check_springs(scene)

@@ -9,7 +9,7 @@ import numpy as np
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
 from engine.bodies.modal.modal_body import ModalBody
-from engine.model.variant_values import moving_mass, weight
+from engine.model.lane_table import moving_mass, weight
 from engine.scene.sweep import broken
 from results_schema.arrays import Array
 

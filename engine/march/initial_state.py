@@ -14,8 +14,8 @@ from engine.statics.equilibrium import static_state
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
+    from engine.model.lane_table import LaneTable
     from engine.model.scene_model import SceneModel
-    from engine.model.variant_values import LaneTable
     from engine.statics.equilibrium import StaticState
 
 

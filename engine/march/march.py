@@ -15,8 +15,8 @@ from engine.kernels.stepping.march import march_many, march_one
 from engine.kernels.stepping.start import solve_initial_acceleration, strike, watch_start
 from engine.march.initial_state import initial_state
 from engine.march.stepper import go
+from engine.model.lane_table import from_blocks, lane_table
 from engine.model.track import tabulate_blow
-from engine.model.variant_values import from_blocks, lane_table
 from engine.observation.contact_forces import contact_forces
 from engine.observation.histories import rows_sampled
 from results_schema.arrays import Array, Counts
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     )
     from engine.march.stepper import Codes
     from engine.march.tables import SceneTables, SegmentTable
+    from engine.model.lane_table import LaneTable
     from engine.model.timeline import Segment
-    from engine.model.variant_values import LaneTable, VariantValues
+    from engine.scene.variants import VariantValues
 
 
 MEANINGLESS = 1e6  # times its static value a signal counts as diverged

@@ -15,12 +15,13 @@ from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
+from engine.model.lane_table import in_whole_blocks, weights
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
-from engine.model.variant_values import VariantValues, weights
 from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity, SchemeUsed, Status
 
@@ -101,7 +102,7 @@ def outcome(
     """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
     own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
     counts = np.unique(np.concatenate([own, stations, *(side.counts for side in tables.kinks)]))
-    lanes, size = values.padded, values.size
+    lanes, size = in_whole_blocks(values), values.size
     marched = march_scheme(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
@@ -291,7 +292,7 @@ def histories(
     tables: SceneTables, values: VariantValues, counts: Counts, halted: Callable[[], bool]
 ) -> dict[str, Array]:
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
-    marched = march_scheme(tables, values.padded, counts, values.size, halted)
+    marched = march_scheme(tables, in_whole_blocks(values), counts, values.size, halted)
     time_scale = values.scene_time_scale
     arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):

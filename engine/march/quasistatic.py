@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout
 from engine.march.march import Marched
-from engine.model.variant_values import weights
+from engine.model.lane_table import weights
 from engine.statics.static_response import static_readings
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
@@ -21,8 +21,8 @@ from results_schema.status import Status
 if TYPE_CHECKING:
     from engine.march.tables import SceneTables
     from engine.model.station_path import Along
-    from engine.model.variant_values import VariantValues
     from engine.observation.signals import Signal
+    from engine.scene.variants import VariantValues
 
 Flags = NDArray[np.bool_]
 

@@ -18,9 +18,10 @@ from engine.march.march import March, Marched, Observed, march, prepare
 from engine.march.quasistatic import quasistatic_extremes
 from engine.march.stepper import Codes, go
 from engine.march.tables import SceneTables, SegmentTable
+from engine.model.lane_table import from_blocks
 from engine.model.timeline import Segment
-from engine.model.variant_values import VariantValues, from_blocks
 from engine.observation.histories import rows_sampled
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 

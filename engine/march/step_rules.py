@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from engine.kernels.schemes import Scheme
     from engine.model.scene_model import SceneModel
     from engine.model.ties import CarriageTie, SpringTie
-    from engine.model.variant_values import VariantValues
+    from engine.scene.variants import VariantValues
 
 
 FREE_STEPS = 200  # per first period of free vibration where the study fixes the steps: 8e-5 of phase a period
@@ -200,12 +200,12 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
         return np.zeros(values.size)
     body = model.bodies[spring.body].modal
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
-    stiffness = values.stiffness(spring)
+    stiffness = values.stiffness(spring.keys)
     if spring.held is not None:
         own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
         return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
     contact = mobility / (1.0 + values.touching_mass(model.carriages[spring.carriage].name) * mobility)
-    return np.asarray(stiffness * (1.0 / values.sprung_mass(spring) + contact))
+    return np.asarray(stiffness * (1.0 / values.sprung_mass(spring.keys) + contact))
 
 
 def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:

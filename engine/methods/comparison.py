@@ -30,12 +30,13 @@ from engine.kernels.stepping.comparison_steps import ITERATIONS, KEPT, OWN_A, OW
 from engine.march.march import March, Marched, Observed, prepare
 from engine.march.stepper import Codes
 from engine.march.tables import SceneTables, SegmentTable
+from engine.model.lane_table import from_blocks
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along, StationPath
 from engine.model.ties import CarriageTie
 from engine.model.timeline import Segment
 from engine.model.track import tabulate_ties
-from engine.model.variant_values import VariantValues, from_blocks
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 

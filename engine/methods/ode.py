@@ -18,9 +18,10 @@ import numpy as np
 from engine.kernels.layout import LANES
 from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
+from engine.model.lane_table import lane_table, moving_mass, weight
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Segment, build_timeline
-from engine.model.variant_values import VariantValues, lane_table, moving_mass, weight
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import Interrupted
 

@@ -18,12 +18,13 @@ from engine.kernels.stepping.start import solve_initial_acceleration
 from engine.march.march import prepare, step_kernel
 from engine.march.tables import SceneTables
 from engine.methods.comparison import ComparisonScheme, frozen_track, propagate_comparison
+from engine.model.lane_table import LaneTable, from_blocks, lane_table, padded, to_blocks
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along, StationPath
 from engine.model.track import tabulate_ties
-from engine.model.variant_values import LaneTable, VariantValues, from_blocks, lane_table, padded, to_blocks
 from engine.observation.contact_forces import ContactForce
 from engine.observation.signals import tabulate_watch
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
 

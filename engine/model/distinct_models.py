@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import LANE_KEYS, VariantValues
 from engine.scene.study import Study
 from engine.scene.sweep import Cases
+from engine.scene.variants import VariantValues, structural
 from results_schema.arrays import Counts
 
 
 def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
     """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
     for variants in split(chosen, structure(cases, chosen)):
-        own = cases.study_of(study, int(variants[0])) if _structural(cases) else study.without_sweep()
-        values = VariantValues(own, cases.columns_of(variants), variants.size)
+        own = cases.study_of(study, int(variants[0])) if structural(cases) else study.without_sweep()
+        values = VariantValues.of(own, cases, variants)
         timing = values.timing()
         columns = np.stack([column for pair in timing.values() for column in pair])
         codes = np.zeros(variants.size, dtype=np.int64)
@@ -42,15 +42,10 @@ def _timing_of(values: VariantValues, lane: int) -> tuple[dict[str, float], dict
     )
 
 
-def _structural(cases: Cases) -> list[str]:
-    """Swept keys that change the scene itself."""
-    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
-
-
 def structure(cases: Cases, variants: Counts) -> Counts:
     """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
     positions = cases.positions(variants)
-    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(_structural(cases))}
+    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(structural(cases))}
     code = np.zeros(variants.size, dtype=np.int64)
     for dim, size in zip(cases.dims, cases.shape, strict=True):
         if dim in dims:

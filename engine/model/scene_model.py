@@ -17,6 +17,7 @@ from engine.model.numerics import Numerics
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
 from engine.model.timeline import Rider
+from engine.scene.variants import SpringKeys, keys_of_carriage
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -213,10 +214,10 @@ def build_model(
             CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), (Load(number, 1.0, body),))
         )
     dampers = [
-        DamperTie(number, at, f"body.{name}.{key}")
+        DamperTie(number, at, key)
         for number, name in enumerate(used)
-        for key, at, coefficient in study.body[name].dampers()
-        if coefficient > 0.0 or f"body.{name}.{key}" in swept
+        for key, at, coefficient in study.dampers(name)
+        if coefficient > 0.0 or key in swept
     ]
     support_reactions = _standing(study, numerics, carriages, parts, swept)
     contacts = tuple(rider for stands in support_reactions.values() for rider in stands.riders)
@@ -265,7 +266,7 @@ def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]
     fidelity, carriage = numerics.fidelity, study.carriage[name]
     locked = _suspension(study, numerics, name) is None
     touching = carriage.masses if locked else carriage.touching
-    heavy = carriage.sum_of(touching) > 0.0 or any(f"carriage.{name}.{key}" in swept for key in touching)
+    heavy = carriage.sum_of(touching) > 0.0 or any(key in swept for key in keys_of_carriage(name, touching))
     if fidelity in ("force", "static") or not heavy:
         return "force"
     return "mass-without-convective" if fidelity == "mass-without-convective" else "mass"
@@ -284,9 +285,9 @@ def _springs(
     for number, tie in enumerate(carriages):
         suspension = _suspension(study, numerics, tie.name)
         if suspension is not None:
-            key = f"carriage.{tie.name}"
-            damped = suspension.damping > 0.0 or f"{key}.damping" in swept
-            found.append(SpringTie(number, number, tie.body, key, None, first + len(found), damped))
+            keys = SpringKeys.of_carriage(tie.name)
+            damped = suspension.damping > 0.0 or keys.damping in swept
+            found.append(SpringTie(number, number, tie.body, keys, None, first + len(found), damped))
     return tuple(found)
 
 

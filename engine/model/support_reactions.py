@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.model.ties import Attachment, Load, SpringTie
+from engine.scene.variants import SpringKeys
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -73,10 +74,10 @@ def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]
     loads = tuple(Load(*load) for load in zip(itertools.count(place.first), shares, place.below))
     springs = []
     for load, (word, contact) in zip(loads, carriage.riding_contacts.items(), strict=True):
-        key = f"carriage.{name}.contacts.{word}"
+        keys = SpringKeys.of_contact(name, word)
         held = Attachment(-1.0, place.rides, None, contact.place)
-        damped = contact.damping > 0.0 or f"{key}.damping" in swept
-        springs.append(SpringTie(place.number, load.rider, load.body, key, held, None, damped, contact.is_rigid))
+        damped = contact.damping > 0.0 or keys.damping in swept
+        springs.append(SpringTie(place.number, load.rider, load.body, keys, held, None, damped, contact.is_rigid))
     acting = tuple(springs) if numerics.knows_springs else ()
     reference = carriage.reference_on(modal.length)
     return SupportReactions(place.rides, modal.mass, reference, riders, acting, loads)

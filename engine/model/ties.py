@@ -12,6 +12,7 @@ from results_schema.arrays import Array
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.timeline import Rider
+    from engine.scene.variants import SpringKeys
 
 
 Inertia = Literal["force", "mass", "mass-without-convective"]
@@ -79,24 +80,19 @@ class SpringTie:
     What rides counts from where its springs carry it on level rigid ground, so the tie's force is what the spring has
     beyond that, which stays with the carriage; off the body it stands on such ground.
 
-    carriage, rider: numbers. body: that of the body which it stands on. key: dotted key of the table with its stiffness
-    and damping. held: where it holds the body that rides; None for a sprung mass, whose mode is ``mode``.
-    damped: whether there is a damper. rigid: whether it is a rigid joint instead.
+    carriage, rider: numbers. body: that of the body which it stands on. keys: of its numbers in the study.
+    held: where it holds the body that rides; None for a sprung mass, whose mode is ``mode``. damped: whether there is a
+    damper. rigid: whether it is a rigid joint instead.
     """
 
     carriage: int
     rider: int
     body: int
-    key: str
+    keys: SpringKeys
     held: Attachment | None
     mode: int | None
     damped: bool
     rigid: bool = False
-
-    @property
-    def damping_key(self) -> str:
-        """The dotted key of the damper's N s/m."""
-        return f"{self.key}.damping"
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
@@ -107,16 +103,11 @@ class SpringTie:
 
 @dataclass(frozen=True, eq=False)
 class DamperTie:
-    """A damper at a place of a body's track (m) or a point of it (by name): force -c w', c at the dotted key, N s/m."""
+    """A damper at a place of a body's track (m) or a point of it (by name): force -c w', c N s/m at its key."""
 
     body: int
     at: float | str
     key: str
-
-    @property
-    def damping_key(self) -> str:
-        """The dotted key of c."""
-        return self.key
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

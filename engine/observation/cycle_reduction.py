@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.model.variant_values import VariantValues
     from engine.scene.motion_base import Motion
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
     from results_schema.status import Fidelity
 
 

@@ -145,6 +145,11 @@ class Study(Scene):
         found = ((name, sensor.spot) for name, sensor in self.sensor.items() if sensor.body == body)
         return tuple((name, spot) for name, spot in found if spot is not None)
 
+    def dampers(self, body: str) -> Iterator[tuple[str, float | str, float]]:
+        """Discrete dampers of a body: key, place on the track (m) or a point's name, coefficient (N s/m)."""
+        for key, at, coefficient in self.body[body].dampers():
+            yield f"body.{body}.{key}", at, coefficient
+
     def value(self, path: str) -> Any:
         """The value at a dotted key, SI, defaults included. KeyError where there is none.
 

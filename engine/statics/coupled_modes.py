@@ -25,9 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.attachment import residual_flexibility, shared, tie_shapes
+from engine.model.lane_table import from_blocks, in_whole_blocks, lane_table
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along
-from engine.model.variant_values import VariantValues, from_blocks, lane_table
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
 UNRESISTED = 1e-10  # of the shift: omega^2 below it is a motion that nothing resists, and rounding
@@ -117,7 +118,7 @@ def _parts(system: _System, size: int) -> Iterator[slice]:
 
 def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     """The matrices of all variants at all stations."""
-    lanes = lane_table(model, values.padded)
+    lanes = lane_table(model, in_whole_blocks(values))
     masses = [number for number, carriage in enumerate(model.carriages) if carriage.inertia != "force"]
     masses += range(model.first_push, model.ties)
     ties = np.array([*masses, *range(model.first_spring, model.first_push)], dtype=np.int64)

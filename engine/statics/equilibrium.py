@@ -64,7 +64,7 @@ def static_state(model: SceneModel, along: Along) -> StaticState:
     gap = np.zeros((stations, len(model.springs), count + 1))
     gap[:, :, :count] = soft[:, springs, :count]
     gap[:, :, count] = _level(model, along)
-    own = np.array([0.0 if s.rigid else 1.0 / model.study.value(f"{s.key}.stiffness") for s in model.springs])
+    own = np.array([0.0 if s.rigid else 1.0 / model.study.value(s.keys.stiffness) for s in model.springs])
     matrix = soft[:, springs, springs] + np.diag(own)
     force, coordinate = _solved(matrix, held, gap, pushed)
     whole = np.repeat(weights, stations, axis=0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.model.variant_values import weights
+from engine.model.lane_table import weights
 from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.readings import Sensor
 from engine.statics.equilibrium import static_state
@@ -16,8 +16,8 @@ from results_schema.arrays import Array
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
-    from engine.model.variant_values import VariantValues
     from engine.observation.contact_forces import ContactForce
+    from engine.scene.variants import VariantValues
 
 
 class StaticReadings(NamedTuple):

@@ -23,8 +23,8 @@ from engine.bodies.frame.track import track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
 from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.rigid.rigid import Rigid
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, rows_of
 from results_schema.arrays import Array
 from results_schema.errors import BadInput

@@ -17,11 +17,12 @@ from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.march.outcome import Flat
 from engine.march.tables import SceneTables
+from engine.model.lane_table import weights
 from engine.model.scene_model import build_model
 from engine.model.timeline import refined
-from engine.model.variant_values import VariantValues, weights
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.unreduced.march import Course, march_unreduced
 from engine.unreduced.rows import Along
 from engine.unreduced.scene import Unreduced, contacts_of, unreduced_model

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
-    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
     from results_schema.status import Fidelity
 
 Named = Mapping[str, NDArray[Any]]
@@ -141,8 +141,8 @@ def _shapes(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr
 def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
     """Some variants, in the order of the scenes that they share."""
     from engine.model.distinct_models import scenes, structure
-    from engine.model.variant_values import VariantValues
     from engine.scene.sweep import expand
+    from engine.scene.variants import VariantValues
 
     cases = expand(study)
     everything = np.arange(cases.size, dtype=np.int64)
@@ -150,7 +150,7 @@ def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, wo
     numbers, found = [], []
     for model, variants in scenes(study, cases, chosen):
         work.check()
-        values = VariantValues(model.study, cases.columns_of(variants), variants.size)
+        values = VariantValues.of(model.study, cases, variants)
         numbers.append(variants)
         found.append(_evaluated(kind, model, values, places))
     joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
@@ -180,7 +180,7 @@ def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, w
     """Results with another number of modes of every body, with and without static correction."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
-    from engine.model.variant_values import VariantValues
+    from engine.scene.variants import VariantValues
 
     found = []
     for correction in CORRECTED:
@@ -197,7 +197,7 @@ def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) ->
     """Results of the unreduced model, and those of the modes at the same positions."""
     from engine.model.distinct_models import base_scene
     from engine.model.station_path import frozen
-    from engine.model.variant_values import VariantValues
+    from engine.scene.variants import VariantValues
 
     model, positions = base_scene(study), places.all[places.unreduced]
     reduced = kind.variants(model, VariantValues(model.study, {}, 1), frozen(model, positions))

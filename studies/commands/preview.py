@@ -14,9 +14,10 @@ from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
 from engine.batch.plan import Plan
 from engine.model.distinct_models import base_scene
+from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import VariantValues, moving_mass
 from engine.scene.sweep import Axis, Cases, expand
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast

@@ -23,8 +23,8 @@ from studies.results.results import Results, extreme
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
-    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
 
 
 SHOWN = 3  # frequencies that a sentence lists
@@ -117,7 +117,7 @@ class Eigenfrequencies(AtRestKind):
         return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.model.variant_values import VariantValues
+        from engine.scene.variants import VariantValues
         from engine.statics.coupled_modes import coupled_modes
 
         found = coupled_modes(model, VariantValues(model.study, {}, 1), along, _count(model.study))

@@ -23,8 +23,8 @@ from studies.results.results import Index, Results, extreme
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
-    from engine.model.variant_values import VariantValues
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
 
 
 MOST_SENSORS = 6
@@ -142,7 +142,7 @@ class Influence(AtRestKind):
         return {**named, "contact_force": found.contacts}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.model.variant_values import VariantValues
+        from engine.scene.variants import VariantValues
         from engine.statics.static_response import static_shapes
 
         values = VariantValues(model.study, {}, 1)

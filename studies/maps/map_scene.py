@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from engine.methods.comparison import ComparisonScheme
     from engine.methods.transition import Frozen
     from engine.model.scene_model import SceneModel
-    from engine.model.variant_values import VariantValues
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
     from studies.protocol.parts import Work
 
 
@@ -124,7 +124,7 @@ class MapScene:
     def values(self, mass: Array, pace: Array | None = None, damping: Array | None = None) -> VariantValues:
         """Variants (V,) with masses over the body's, speeds over omega_1 L/pi or frequencies over omega_1, and damping
         ratios."""
-        from engine.model.variant_values import VariantValues
+        from engine.scene.variants import VariantValues
 
         key = f"carriage.{CARRIAGE}"
         columns = {f"{key}.mass": mass * self.model.leading_body.modal.mass}
@@ -157,7 +157,8 @@ class MapScene:
 
     def laid_out(self, steps: int, values: VariantValues) -> tuple[SceneTables, VariantValues]:
         """Tables of so many steps, and the variants filled up to whole blocks of lanes."""
-        from engine.model.variant_values import VariantValues, padded
+        from engine.model.lane_table import padded
+        from engine.scene.variants import VariantValues
 
         lanes = padded(np.arange(values.size))
         columns = {path: column[lanes] for path, column in values.columns.items()}

@@ -15,7 +15,8 @@ import numpy as np
 from engine.kernels.layout import CLOSED, CURVE, FORCE, LANES, RATE
 from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
-from engine.model.variant_values import VariantValues, lane_table
+from engine.model.lane_table import lane_table
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
 BATCH = 256

@@ -25,9 +25,9 @@ from engine.methods.ode import ModalEquations, Solution
 from engine.model.scene_model import SceneModel, build_model
 from engine.model.station_path import Along, ways
 from engine.model.timeline import Segment
-from engine.model.variant_values import VariantValues
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from studies.protocol.parts import Work

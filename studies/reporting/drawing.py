@@ -14,9 +14,10 @@ import numpy as np
 
 from engine.bodies.modal.outline import HELD_AT
 from engine.model.distinct_models import base_scene
+from engine.model.lane_table import moving_mass, weight
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues, moving_mass, weight
 from engine.scene.sweep import expand
+from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_modes
 from results_schema.arrays import Array
 from results_schema.errors import BadInput

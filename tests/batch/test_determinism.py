@@ -18,9 +18,10 @@ import engine.march.march
 from engine.batch.dataset import build
 from engine.batch.execution import execute, run
 from engine.batch.plan import Plan, make_plan
+from engine.model.lane_table import LaneTable, to_blocks
 from engine.model.scene_model import SceneModel
-from engine.model.variant_values import LaneTable, VariantValues, to_blocks
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput, Interrupted
 from results_schema.store.rows import Chunk, Collector
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under

@@ -20,8 +20,8 @@ from engine.linear_algebra import one_thread
 from engine.march.outcome import Outcome, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from tests.calibration.scenes import draw, judged, planned
 
@@ -65,7 +65,7 @@ def compared(plan: Plan, count: int, seed: int) -> dict[str, Any]:
     assert plan.choice is not None
     [grid] = plan.grids
     picked = judged(plan, count, seed)
-    values = VariantValues(grid.scene.study, plan.cases.columns_of(picked), picked.size)
+    values = VariantValues.of(grid.scene.study, plan.cases, picked)
     numerics, cut = REFERENCE
     truth = march(grid, values, numerics, int(grid.safe_cuts(numerics, values, cut).max()))
     work, error = [], []

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from engine.batch.execution import run
-from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared, Reduction
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.kinds.double_peak import DoublePeakReduction

@@ -13,8 +13,8 @@ from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme, Scheme, 
 from engine.march.tables import SceneTables
 from engine.methods.transition import spectral_radius, transitions
 from engine.model.scene_model import build_model
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.findings.indices import harmonics
 from studies.findings.peaks import peaks

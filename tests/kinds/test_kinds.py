@@ -9,8 +9,8 @@ import pytest
 
 import studies
 from engine.batch.execution import run
-from engine.model.variant_values import VariantValues
 from engine.observation.cycle_reduction import Compared
+from engine.scene.variants import VariantValues
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
 from studies.kinds.asymmetry import AsymmetryReduction

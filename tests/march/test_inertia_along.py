@@ -16,8 +16,8 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.bodies.reduced.body import save_body
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_frequencies

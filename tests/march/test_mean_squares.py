@@ -14,8 +14,8 @@ import engine
 from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, SECONDS, SQUARES
 from engine.march.march import march
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, under
 from tests.reference import closed_forms
 

@@ -15,11 +15,12 @@ from engine.batch.plan import make_plan
 from engine.kernels.layout import LANES, SMALLEST
 from engine.march.richardson import march_pair
 from engine.march.tables import SceneTables
+from engine.model.lane_table import padded
 from engine.model.scene_model import build_model
 from engine.model.timeline import Window
-from engine.model.variant_values import VariantValues, padded
 from engine.observation.histories import counts_reduced
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.engine.build import beam, cruise, fixed, mass, shuttle, study, swing, under

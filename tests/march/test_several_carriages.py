@@ -11,7 +11,7 @@ import pytest
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
-from engine.model.variant_values import padded
+from engine.model.lane_table import padded
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.bodies_on_contacts import RIGID as TABLE

@@ -10,8 +10,8 @@ from engine.march.march import prepare
 from engine.march.stepper import Codes, Halted, go
 from engine.march.tables import SceneTables
 from engine.model.scene_model import build_model
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from tests.engine.build import beam, cruise, fixed, mass, study
 
 

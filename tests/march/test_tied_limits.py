@@ -11,8 +11,8 @@ from engine.batch.execution import run
 from engine.batch.plan import make_plan
 from engine.march.step_rules import contact_omega, least_steps
 from engine.model.scene_model import build_model
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, study, under

@@ -21,9 +21,10 @@ from engine.methods.comparison import (
     rigid_tie,
     wilson_theta,
 )
+from engine.model.lane_table import padded
 from engine.model.scene_model import build_model
-from engine.model.variant_values import VariantValues, padded
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from tests.engine.build import beam, cruise, force, mass, shuttle, study, swing

@@ -17,8 +17,9 @@ from engine.methods.comparison import (
     picard_relaxed,
     propagate_comparison,
 )
+from engine.model.lane_table import from_blocks, lane_table, padded, to_blocks
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import VariantValues, from_blocks, lane_table, padded, to_blocks
+from engine.scene.variants import VariantValues
 from tests.engine.build import beam, cruise, force, mass, study
 from tests.naive.scene import Array
 

@@ -20,8 +20,8 @@ from engine.methods.transition import (
     transitions,
 )
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from tests.engine import build
 

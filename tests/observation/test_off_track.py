@@ -15,9 +15,9 @@ from engine.bodies.imported import imported
 from engine.bodies.reduced.body import save_body
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.statics.static_response import static_values
 from engine.unreduced.march import march_unreduced
 from engine.unreduced.scene import unreduced_model

@@ -8,9 +8,10 @@ import pytest
 from engine.batch.plan import make_plan
 from engine.march.march import march
 from engine.march.step_rules import allow_any_steps
+from engine.model.lane_table import padded
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues, padded
 from engine.observation.signals import build_sensors
+from engine.scene.variants import VariantValues
 from engine.statics.static_response import static_values
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, UNEVEN, quiet, riding
 from tests.engine.bodies_on_contacts_dense import Twin

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
 from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding

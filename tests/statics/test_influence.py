@@ -9,9 +9,9 @@ import pytest
 
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from engine.statics.static_response import StaticReadings, contact_names, static_values
 from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import TWO, UNEVEN, riding

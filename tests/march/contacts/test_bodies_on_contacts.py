@@ -13,8 +13,9 @@ import studies
 from engine.batch.plan import make_plan
 from engine.march.march import march
 from engine.march.step_rules import contact_omega
-from engine.model.variant_values import VariantValues, padded
+from engine.model.lane_table import padded
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.bodies_on_contacts_dense import Twin, Where

@@ -9,7 +9,7 @@ import engine
 import studies
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
-from engine.model.variant_values import padded
+from engine.model.lane_table import padded
 from results_schema.arrays import Array
 from tests.engine.bodies_on_contacts import FLEXIBLE, RIGID, THREE, TWO, UNEVEN, riding
 from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under

@@ -14,11 +14,11 @@ from engine.batch.plan import make_plan
 from engine.march.step_rules import contact_omega
 from engine.model.numerics import open_bodies
 from engine.model.station_path import frozen
-from engine.model.variant_values import VariantValues
 from engine.observation import kinks
 from engine.observation.contact_forces import ContactForce
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study, load
+from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies
 from engine.statics.static_response import static_values
 from engine.unreduced.scene import unreduced_model

@@ -1,0 +1,131 @@
+"""The numbers of whole blocks of variants of one scene as the kernels take them, and what carriages weigh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels.layout import LANES, Lanes
+from results_schema.arrays import Array
+
+if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
+    from engine.scene.variants import VariantValues
+
+
+def moving_mass(model: SceneModel, values: VariantValues, carriage: int) -> Array:
+    """(V,) kg of a whole carriage."""
+    tie = model.carriages[carriage]
+    return values.own_mass(tie.name) + tie.own_mass
+
+
+def weight(model: SceneModel, values: VariantValues, carriage: int) -> Array:
+    """(V,) N of a carriage along the deflections of the track that it rides."""
+    tie = model.carriages[carriage]
+    share = model.bodies[tie.body].modal.gravity_share
+    return values.force(tie.name) + moving_mass(model, values, carriage) * values.gravity * share
+
+
+def weights(model: SceneModel, values: VariantValues) -> Array:
+    """(C, V) N of all carriages."""
+    return np.stack([weight(model, values, number) for number in range(len(model.carriages))])
+
+
+def padded(variants: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Variants filled up to whole blocks by repeating the last one."""
+    return np.pad(variants, (0, -variants.size % LANES), mode="edge")
+
+
+def in_whole_blocks(values: VariantValues) -> VariantValues:
+    """The values filled up in the same way."""
+    return values.part(padded(np.arange(values.size)))
+
+
+def to_blocks(values: Array) -> Array:
+    """(..., V) as (V/LANES, ..., LANES)."""
+    cut = values.reshape(*values.shape[:-1], -1, LANES)
+    return np.ascontiguousarray(cut.transpose(values.ndim - 1, *range(values.ndim - 1), values.ndim))
+
+
+def from_blocks(blocks: Array, size: int) -> Array:
+    """(blocks, ..., LANES) as (..., size)."""
+    joined = blocks.transpose(*range(1, blocks.ndim - 1), 0, blocks.ndim - 1)
+    return joined.reshape(*joined.shape[:-2], blocks.shape[0] * blocks.shape[-1])[..., :size]
+
+
+@dataclass(frozen=True, eq=False)
+class LaneTable:
+    """Numbers of whole blocks of variants of one scene, in SI units.
+
+    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  inverse_modal_mass (blocks, N, LANES): 1, and 1/m (1/kg) of
+    sprung masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what
+    touches the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties,
+    LANES): N s/m and N/m, zero for carriages;  time_scale, gravity (blocks, LANES).
+    """
+
+    omega: Array
+    rates: Array
+    inverse_modal_mass: Array
+    mass: Array
+    joint: Array
+    weight: Array
+    damper: Array
+    spring: Array
+    time_scale: Array
+    gravity: Array
+
+    def steps_of(self, step: Array) -> Lanes:
+        """The kernels' lanes for a step h (blocks, LANES) in s."""
+        h = step[:, None, :]
+        return Lanes(
+            stiffness=(self.omega[:, None] * h) ** 2,
+            damping=self.rates * h,
+            inverse_modal_mass=self.inverse_modal_mass,
+            coupling_mass=self.mass + self.joint + self.damper * h,
+            coupling_stiffness=self.spring * h**2,
+            load=self.weight * h**2,
+            gravity=self.gravity,
+            step=step,
+        )
+
+
+def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
+    """The lanes of some variants, whose number must be a multiple of LANES."""
+    rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
+    none, numbers = np.zeros(values.size), range(len(model.carriages))
+    masses = [_contact_mass(model, values, number) for number in numbers]
+    carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
+    rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
+    coefficients = [values.damping(damper.key) for damper in model.dampers]
+    coefficients += [values.damping(spring.keys.damping) for spring in model.springs]
+    pushes, alongside = [none] * len(model.pushes), [moving_mass(model, values, p.carriage) for p in model.pushes]
+    stiffness = [none if spring.rigid else values.stiffness(spring.keys) for spring in model.springs]
+    ones, others = np.ones((model.body_modes, values.size)), model.omega.size - model.body_modes
+    constant = others - len(model.sprung)
+    return LaneTable(
+        omega=model.omega,
+        rates=to_blocks(np.concatenate([*rates, np.zeros((others, values.size))])),
+        inverse_modal_mass=to_blocks(
+            np.concatenate([ones, *(1.0 / values.sprung_mass(s.keys)[None] for s in model.sprung), ones[:constant]])
+        ),
+        mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
+        joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),
+        weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs, *pushes])),
+        damper=to_blocks(np.stack(carriages + coefficients + pushes)),
+        spring=to_blocks(np.stack(carriages + dampers + stiffness + pushes)),
+        time_scale=to_blocks(values.scene_time_scale),
+        gravity=to_blocks(values.gravity),
+    )
+
+
+def _contact_mass(model: SceneModel, values: VariantValues, number: int) -> Array:
+    """(V,) kg of a carriage whose inertia acts where it touches its body."""
+    carriage = model.carriages[number]
+    if carriage.inertia == "force":
+        return np.zeros(values.size)
+    if not model.springs_of(number):
+        return moving_mass(model, values, number)
+    return values.touching_mass(carriage.name)

@@ -1,0 +1,201 @@
+"""What differs from variant to variant: columns of numbers for the models below, which know no dotted key.
+
+Mass, force, pace, damping and gravity may differ within one scene; every other swept number changes the scene itself,
+and the plan groups by it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from results_schema.arrays import Array, Counts
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
+    from engine.scene.sweep import Axis, Cases
+
+
+STEPS, TOLERANCE = "solver.steps", "solver.tolerance"
+#: Keys of numbers that a lane may have to itself.
+LANE_KEYS = re.compile(
+    r"gravity|solver\.(steps|tolerance)"
+    r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
+    r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|force|delay|headway)"
+    r"|carriage\.\w+\.contacts\.\w+\.damping"
+    r"|carriage\.\w+\.motion\.(speed|frequency)"
+)
+_DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
+
+
+class SpringKeys(NamedTuple):
+    """The keys of a spring's numbers: N/m, N s/m of the damper beside it, kg that stand on it."""
+
+    stiffness: str
+    damping: str
+    mass: str
+
+    @classmethod
+    def of_carriage(cls, name: str) -> SpringKeys:
+        """Of the spring under a sprung mass."""
+        return cls(*keys_of_carriage(name, cls._fields))
+
+    @classmethod
+    def of_contact(cls, carriage: str, contact: str) -> SpringKeys:
+        """Of a contact of a body that rides."""
+        return cls(*keys_of_carriage(f"{carriage}.contacts.{contact}", cls._fields))
+
+
+def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:
+    """The dotted keys of some numbers of a carriage."""
+    return tuple(f"carriage.{name}.{key}" for key in keys)
+
+
+def structural(cases: Cases) -> list[str]:
+    """Swept keys that change the scene itself."""
+    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
+
+
+def axes_of_scene(cases: Cases) -> list[Axis]:
+    """The axes of a sweep that change something else than the tolerance alone."""
+    return [axis for axis in cases.axes if axis.paths != (TOLERANCE,)]
+
+
+def cases_tolerance(study: Study, cases: Cases) -> Array:
+    """(V,) `solver.tolerance` of every variant over the study's."""
+    if TOLERANCE not in cases.paths:
+        return np.ones(cases.size)
+    return cases.column(TOLERANCE) / study.solver.tolerance
+
+
+@dataclass(frozen=True, eq=False)
+class VariantValues:
+    """Numbers of a study for some variants: swept columns (V,) by dotted key, the study's own value elsewhere."""
+
+    study: Study
+    columns: Mapping[str, Array]
+    size: int
+
+    @classmethod
+    def of(cls, study: Study, cases: Cases, variants: Counts) -> VariantValues:
+        """Of some variants of a sweep, given by their flat numbers."""
+        return cls(study, cases.columns_of(variants), variants.size)
+
+    def _of(self, path: str) -> Array:
+        """(V,) values at a dotted key."""
+        found = self.columns.get(path)
+        if found is None:
+            value = self.study.value(path)
+            return np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
+        return found
+
+    @property
+    def gravity(self) -> Array:
+        """(V,) m/s^2."""
+        return self._of("gravity")
+
+    @property
+    def has_fixed_steps(self) -> bool:
+        """Whether the study says how many steps."""
+        return self.study.solver.steps != "auto" or STEPS in self.columns
+
+    @property
+    def steps(self) -> Counts:
+        """(V,) steps over a passage or cycle, where the study fixes them."""
+        return self._of(STEPS).astype(np.int64)
+
+    @property
+    def tighter(self) -> Array:
+        """(V,) `solver.tolerance` over the study's own."""
+        return self._of(TOLERANCE) / self.study.solver.tolerance
+
+    def all_as_tight(self, factor: float) -> VariantValues:
+        """The same, but where the tolerance is swept it is this part of the study's own."""
+        if TOLERANCE not in self.columns:
+            return self
+        wanted = np.full(self.size, factor * self.study.solver.tolerance)
+        return replace(self, columns={**self.columns, TOLERANCE: wanted})
+
+    def speed(self, carriage: str) -> Array:
+        """(V,) m/s, the top speed of a motion that has one."""
+        return self._of(f"carriage.{carriage}.motion.speed")
+
+    def force(self, carriage: str) -> Array:
+        """(V,) N of a carriage besides its weight."""
+        return self._sum(carriage, self.study.carriage[carriage].forces)
+
+    def touching_mass(self, carriage: str) -> Array:
+        """(V,) kg of a carriage that touch the body."""
+        return self._sum(carriage, self.study.carriage[carriage].touching)
+
+    def sprung_mass(self, spring: SpringKeys) -> Array:
+        """(V,) kg that stand on a spring."""
+        return self._of(spring.mass)
+
+    def stiffness(self, spring: SpringKeys) -> Array:
+        """(V,) N/m."""
+        return self._of(spring.stiffness)
+
+    def damping(self, damper: str) -> Array:
+        """(V,) N s/m of a damper by its key."""
+        return self._of(damper)
+
+    def part(self, lanes: Counts) -> VariantValues:
+        """Some of the variants."""
+        return VariantValues(self.study, {path: column[lanes] for path, column in self.columns.items()}, lanes.size)
+
+    def time_scale(self, carriage: str) -> Array:
+        """(V,) seconds per unit of a carriage's own tau."""
+        motion = self.study.carriage[carriage].motion
+        if motion.pace is None:
+            return np.full(self.size, motion.time_scale)
+        key = f"carriage.{carriage}.motion.{motion.pace}"
+        return float(motion.time_scale * self.study.value(key)) / self._of(key)
+
+    @property
+    def scene_time_scale(self) -> Array:
+        """(V,) seconds per unit of scene time."""
+        return self.time_scale(self.study.clock)
+
+    def start_time(self, carriage: str) -> Array:
+        """(V,) seconds after time 0 at which a carriage sets off."""
+        spec = self.study.carriage[carriage]
+        if spec.headway is None:
+            return self._of(f"carriage.{carriage}.delay")
+        return self._of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
+
+    def timing(self) -> dict[str, tuple[Array, Array]]:
+        """Per carriage pace and delay (V,) relative to the scene's time scale, rounded so that they group."""
+        first = self.scene_time_scale
+        return {
+            name: (rounded(first / self.time_scale(name)), rounded(self.start_time(name) / first))
+            for name in self.study.carriage
+        }
+
+    def own_mass(self, carriage: str) -> Array:
+        """(V,) kg of a carriage by its own keys."""
+        return self._sum(carriage, self.study.carriage[carriage].masses)
+
+    def _sum(self, carriage: str, keys: tuple[str, ...]) -> Array:
+        return sum(map(self._of, keys_of_carriage(carriage, keys)), np.zeros(self.size))
+
+    def damping_rates(self, body: str, omega: Array) -> Array:
+        """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
+        key = f"body.{body}.damping_ratio"
+        spec = self.study.body[body]
+        if spec.rayleigh is not None:
+            return self._of(f"{key}.rayleigh.0") + self._of(f"{key}.rayleigh.1") * omega[:, None] ** 2
+        if spec.modal_ratios:
+            last = len(spec.modal_ratios) - 1  # goes on for modes beyond the list
+            return np.stack([2.0 * self._of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
+        return 2.0 * self._of(key) * omega[:, None]
+
+
+def rounded(values: Array) -> Array:
+    """Values rounded to 40 binary digits."""
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.rint(mantissa * _DIGITS) / _DIGITS, exponent)
