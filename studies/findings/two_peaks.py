@@ -11,11 +11,6 @@ from studies.results.results import PACES, Index, Results
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 
 
-def counts_of(results: Results, sensor: str) -> Array:
-    """Peaks per cycle in the sweep's shape; NaN without values."""
-    return np.asarray(results.of_sensor("peaks_per_cycle", sensor).values, dtype=np.float64)
-
-
 def slowest(results: Results, ratio: Array) -> Mask:
     """Variants at the lowest frequency of the motion; ratio: to the first natural one, in the sweep's shape."""
     axis = results.axis(*PACES)
@@ -26,7 +21,7 @@ def slowest(results: Results, ratio: Array) -> Mask:
 def first_break(results: Results, sensor: str) -> Index | None:
     """The variant with another number of peaks at the lowest frequency ratio; None where there is none, or none has two
     below it."""
-    counts, ratio = counts_of(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    counts, ratio = results.numbers("peaks_per_cycle", sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     other = known & (counts != EXPECTED)
     first = float(ratio[other].min()) if other.any() else -np.inf

@@ -215,7 +215,7 @@ def _answer(results: Results) -> str:
 
 def _lag(results: Results, sensor: str) -> str:
     """How far the response trails where damping alone decides, up to where that is, and what comes beyond."""
-    lag = np.asarray(results.of_sensor("lag", sensor).values, dtype=np.float64)
+    lag = results.numbers("lag", sensor)
     expected = results.everywhere(theory.lag(results, sensor))
     if not np.isfinite(lag).any():
         return f"{sensor}: no lag is defined, as its static response does not vary or no variant has values."
@@ -252,7 +252,7 @@ def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
 
 def _first_beyond(results: Results, sensor: str, settled: Mask) -> str:
     """Where the odd part exceeds each threshold first, in the variants that have settled, or in all if none has."""
-    odd = np.asarray(results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    odd = results.numbers("odd_rms", sensor)
     some = settled.any() and not settled.all()
     odd, of = (np.where(settled, odd, np.nan), " of those that have settled") if some else (odd, "")
     if not np.isfinite(odd).any():

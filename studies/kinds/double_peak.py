@@ -14,7 +14,7 @@ from results_schema.variables import AXES, MARCH, Variable, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.findings.peaks import PEAKS, peaks
-from studies.findings.two_peaks import EXPECTED, counts_of, first_break, slowest
+from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import MINUS, counted, listed, number, percent
@@ -223,7 +223,7 @@ def _axis(name: str) -> dict[str, object]:
 
 def _answer(results: Results, sensor: str) -> str:
     """How often the response peaks, up to where, and how many variants have how many peaks."""
-    counts, ratio = counts_of(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    counts, ratio = results.numbers("peaks_per_cycle", sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     if not known.any():
         return f"{sensor}: no variant has values, so the question stays open."
@@ -255,7 +255,7 @@ def _pace(results: Results, ratio: float) -> str:
 
 def _breaks(results: Results, sensor: str) -> list[str]:
     """Up to which frequency ratio there are exactly two peaks, for each mass, and which harmonic breaks the pattern."""
-    counts, ratio = counts_of(results, sensor), results.everywhere(theory.frequency_ratio(results))
+    counts, ratio = results.numbers("peaks_per_cycle", sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
         return []
@@ -303,7 +303,7 @@ def _end_springs(results: Results, sensor: str) -> list[str]:
     softness = theory.end_spring_difference(results, sensor)
     if softness is None:
         return []
-    counts = counts_of(results, sensor)
+    counts = results.numbers("peaks_per_cycle", sensor)
     slow = slowest(results, results.everywhere(theory.frequency_ratio(results)))
     one, two = (softness[slow & (counts == count)] for count in (1, EXPECTED))
     if not (one.size and two.size and two.max() < one.min()):
@@ -317,7 +317,7 @@ def _end_springs(results: Results, sensor: str) -> list[str]:
 
 def _amplified(results: Results, sensor: str) -> list[str]:
     """The largest amplification, and at low frequency beside the rule of thumb of a pinned beam."""
-    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+    gain = results.numbers("dynamic_amplification", sensor)
     ratio = results.everywhere(theory.frequency_ratio(results))
     top, slow = extreme(gain), extreme(np.where(ratio <= SLOW, gain, np.nan))
     if top is None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.arrays import Array, Mask
+from results_schema.arrays import Mask
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind
@@ -62,18 +62,15 @@ def _told(results: Results) -> list[str]:
     return list(results.sensors)[:MOST_SENSORS]
 
 
-def _gain(results: Results, sensor: str) -> Array:
-    return np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
-
-
 def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
     """The variants with the largest value and with the largest amplification of one sensor."""
-    return largest(results, sizes(results, sensor)), largest(results, _gain(results, sensor))
+    gain = results.numbers("dynamic_amplification", sensor)
+    return largest(results, sizes(results, sensor)), largest(results, gain)
 
 
 def _largest(results: Results, sensor: str) -> str:
     """The largest value and the largest amplification of one sensor, and where they are, while the contact holds."""
-    gain, (top, best) = _gain(results, sensor), _extremes(results, sensor)
+    gain, (top, best) = results.numbers("dynamic_amplification", sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
     shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""

@@ -232,7 +232,7 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
 
 def _map(seen: View, sensor: str) -> Figure:
     caption = seen.caption("Rms of half the difference of forward and backward.")
-    odd = np.asarray(seen.results.of_sensor("odd_rms", sensor).values, dtype=np.float64)
+    odd = seen.results.numbers("odd_rms", sensor)
     told = exceeds(seen.results, odd, THRESHOLDS[0])
     title = f"{sensor.replace('_', ' ')}: the difference of the ways {told}"
     return draw("odd-map", title, caption, 3.0, partial(_draw_map, seen, sensor))

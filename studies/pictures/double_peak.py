@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
 from studies.findings import theory
-from studies.findings.two_peaks import counts_of, first_break
+from studies.findings.two_peaks import first_break
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, logarithmic, shades
 from studies.pictures.common.sweep_view import (
@@ -36,6 +36,18 @@ MOST_SENSORS = 3
 MOST_CYCLES = 3
 ALIKE = 1e-3  # odd over even harmonics below which there is nothing to show
 LEAST_RATIO = 1e-6  # below, ratios are rounding
+RATIOS = {  # file name, title and caption of the figure of each
+    "dynamic_amplification": (
+        "amplification",
+        "Statics are exceeded {} times at most, in {}",
+        "Largest absolute value in the last cycle over the largest absolute static value.",
+    ),
+    "odd_even_ratio": (
+        "odd-even",
+        "Odd harmonics reach {} times the even ones at most, in {}",
+        "Rms of the odd over rms of the even harmonics of the last cycle: 0 where its two halves are alike.",
+    ),
+}
 PEAK_BANDS = (0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5)
 PEAK_COLOURS = ("#56b4e9", "#eef0f3", "#e69f00", "#0072b2", "#cc79a7", "#d55e00")
 
@@ -54,11 +66,9 @@ def pictures(results: Results) -> list[Figure]:
             own = view(results, SPEEDS, axis.paths, top) if axis is not None else seen
             if np.unique(_counts(own, sensor)).size > 1:
                 found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
-        amplified = [sensor for sensor in sensors if _has_values(seen, "dynamic_amplification", sensor)]
-        found += [_gain(seen, amplified)] if amplified else []
+        found += _ratio(seen, "dynamic_amplification", sensors)
         if float(np.nanmax(results.dataset["odd_even_ratio"].values, initial=0.0)) > ALIKE:
-            halved = [sensor for sensor in sensors if _has_values(seen, "odd_even_ratio", sensor)]
-            found += [_halves(seen, halved)] if halved else []
+            found += _ratio(seen, "odd_even_ratio", sensors)
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
 
 
@@ -82,23 +92,18 @@ def _peaks_title(seen: View, sensor: str) -> str:
     return f"{name} has {usual} peaks per cycle up to {until}; beyond, also {others}"
 
 
-def _has_values(seen: View, variable: str, sensor: str) -> bool:
-    """Whether a result of a sensor has values in a view: without a static response there is no amplification."""
-    return bool(np.isfinite(seen.plane(seen.results.of_sensor(variable, sensor))).any())
-
-
 def _typical(results: Results, sensor: str) -> list[Index]:
     """At most three variants with a history: where two peaks end, the one with the largest amplification, one of each
     number of peaks, and others; from slow to fast."""
     ratio = results.everywhere(theory.frequency_ratio(results))
-    counts = counts_of(results, sensor)
+    counts = results.numbers("peaks_per_cycle", sensor)
     traced = sorted(results.traced(), key=lambda index: float(ratio[index]))
     groups: dict[float, list[Index]] = {}
     for index in traced:
         groups.setdefault(float(counts[index]), []).append(index)
     largest = sorted(groups.values(), key=len, reverse=True)
     found = [group[len(group) // 2] for group in largest[:MOST_CYCLES]]
-    gain = np.asarray(results.of_sensor("dynamic_amplification", sensor).values, dtype=np.float64)
+    gain = results.numbers("dynamic_amplification", sensor)
     broken = first_break(results, sensor)
     named = [index for index in traced if index == broken]
     found = list(dict.fromkeys([*named, *picked(results, gain, results.size)[-1:], *found]))[:MOST_CYCLES]
@@ -238,30 +243,20 @@ def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
         _draw_resonances(axes, seen, frequency, None)
 
 
-def _gain(seen: View, sensors: list[str]) -> Figure:
-    caption = seen.caption("Largest absolute value in the last cycle over the largest absolute static value.")
-    height = 0.6 + 2.2 * len(sensors)
-    title = f"Statics are exceeded {_top_words(seen, sensors, 'dynamic_amplification')}"
-    return draw("amplification", title, caption, height, partial(_draw_rows, seen, sensors, "dynamic_amplification"))
-
-
-def _top_words(seen: View, sensors: list[str], variable: str, of: str = "") -> str:
-    """The largest value of a ratio in a view, and its sensor."""
-    tops = {
-        sensor: float(np.nanmax(seen.plane(seen.results.of_sensor(variable, sensor)), initial=0.0))
-        for sensor in sensors
-    }
+def _ratio(seen: View, variable: str, sensors: list[str]) -> list[Figure]:
+    """A ratio over the sweep; without a static response there is no amplification."""
+    tops = {}
+    for sensor in sensors:
+        plane = seen.plane(seen.results.of_sensor(variable, sensor))
+        if np.isfinite(plane).any():
+            tops[sensor] = float(np.nanmax(plane, initial=0.0))
+    if not tops:
+        return []
+    name, title, caption = RATIOS[variable]
     best = max(tops, key=lambda sensor: tops[sensor])
-    return f"{number(tops[best])} times{of} at most, in {best.replace('_', ' ')}"
-
-
-def _halves(seen: View, sensors: list[str]) -> Figure:
-    caption = seen.caption(
-        "Rms of the odd over rms of the even harmonics of the last cycle: 0 where its two halves are alike."
-    )
-    height = 0.6 + 2.2 * len(sensors)
-    title = f"Odd harmonics reach {_top_words(seen, sensors, 'odd_even_ratio', ' the even ones')}"
-    return draw("odd-even", title, caption, height, partial(_draw_rows, seen, sensors, "odd_even_ratio"))
+    top = title.format(number(tops[best]), best.replace("_", " "))
+    height, fill = 0.6 + 2.2 * len(tops), partial(_draw_rows, seen, list(tops), variable)
+    return [draw(name, top, seen.caption(caption), height, fill)]
 
 
 def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) -> None:

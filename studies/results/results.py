@@ -297,6 +297,10 @@ class Results:
         """A result over sensors for one of them."""
         return self.dataset[variable].sel(sensor=sensor)
 
+    def numbers(self, variable: str, sensor: str) -> Array:
+        """The same as plain numbers."""
+        return np.asarray(self.of_sensor(variable, sensor).values, dtype=np.float64)
+
     def traced(self) -> list[Index]:
         """The variants whose values and histories are kept, in the order of their flat numbers."""
         names = [name for name in self.sensors if name in self.dataset]
