@@ -159,7 +159,10 @@ class Plan:
     @property
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
-        shown = (int(self.shown.size) + NAMED) * self.stations_shown * (len(self.study.sensor) + 2)
+        kept = int(self.shown.size)
+        if self.study.output.histories == "auto":
+            kept = min(kept + NAMED, self.size)
+        shown = kept * self.stations_shown * (len(self.study.sensor) + 2)
         return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
 
     @property
