@@ -32,6 +32,13 @@ def sizes(results: Results, sensor: str) -> Array:
     return np.asarray(np.maximum(*(np.abs(side.values) for side in sides)), dtype=np.float64)
 
 
+def size_errors(results: Results, sensor: str) -> Array:
+    """The estimated error of the same: that of the extreme which is larger."""
+    sides = [results.dataset[f"{sensor}_{side}"].transpose(*results.dims).values for side in ("max", "min")]
+    errors = (results.estimated_error(f"{sensor}_{side}") for side in ("max", "min"))
+    return np.where(np.abs(sides[0]) >= np.abs(sides[1]), *errors)
+
+
 def largest(results: Results, values: Array) -> Index | None:
     """The variant with the largest of values, among those whose contact holds where there are such."""
     held = results.held if np.isfinite(values[results.held]).any() else np.isfinite(values)

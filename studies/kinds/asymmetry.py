@@ -15,7 +15,7 @@ from results_schema.variables import MARCH, Variable, declare
 from studies.findings import indices, theory
 from studies.findings.settled import LEFT_OVER, odd_parts
 from studies.protocol.study import Kind
-from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
+from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, percent, quantity
 from studies.results.results import VARIANT, Index, Results, extreme
 
@@ -201,7 +201,7 @@ def _answer(results: Results) -> str:
     if place is None:
         return "No variant that has settled has values, so the question stays open."
     largest, sensor = float(odd[place]), list(results.sensors)[place[-1]]
-    at = in_words(results, place[:-1])
+    at = f"{uncertainty(results, f'odd_rms {sensor}', place[:-1])}{in_words(results, place[:-1])}"
     if largest < NOTICEABLE:
         return (
             f"Hardly: at {sensor}, where they differ most, forward and backward differ by {percent(largest)} of the "

@@ -16,7 +16,7 @@ from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplifica
 from studies.findings.peaks import PEAKS, peaks
 from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
-from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import MINUS, counted, listed, number, percent
 from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
 
@@ -322,10 +322,13 @@ def _amplified(results: Results, sensor: str) -> list[str]:
     top, slow = extreme(gain), extreme(np.where(ratio <= SLOW, gain, np.nan))
     if top is None:
         return []
-    said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{in_words(results, top)}"
+    result = f"dynamic_amplification {sensor}"
+    loosely = uncertainty(results, result, top)
+    said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{loosely}{in_words(results, top)}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]
     below = f"below {number(SLOW)} of the first natural frequency at most {number(float(gain[slow]), 4)} times"
+    below += uncertainty(results, result, slow)
     return [f"{said}; {below}{in_words(results, slow)}{_rule(results, sensor, slow)}."]
 
 

@@ -10,7 +10,7 @@ from results_schema.arrays import Mask
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind
-from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, number, quantity
 from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
 
@@ -82,9 +82,10 @@ def _largest(results: Results, sensor: str) -> str:
     amplified = f"{number(float(gain[best]))} times the static {quantity(float(static), results.sensors[sensor])}"
     if best == top:
         return f"{said}, {amplified},{where}."
+    loosely = uncertainty(results, f"dynamic_amplification {sensor}", best)
     return (
         f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "
-        f"{amplified}."
+        f"{amplified}{loosely}."
     )
 
 
@@ -103,7 +104,8 @@ def _value(results: Results, sensor: str, place: Index) -> str:
     side = max(sides, key=lambda name: abs(sides[name]))
     at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
     then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else ""
-    return f"{quantity(sides[side], results.sensors[sensor])}{then}"
+    loosely = uncertainty(results, f"{sensor}_{side}", place)
+    return f"{quantity(sides[side], results.sensors[sensor])}{loosely}{then}"
 
 
 def _contact(results: Results, carriage: str) -> list[str]:
@@ -120,7 +122,8 @@ def _contact(results: Results, carriage: str) -> list[str]:
         assert least is not None
         return [
             f"{carriage} keeps its contact everywhere; the smallest contact force is "
-            f"{quantity(float(force[least]), 'N')}{in_words(results, least)}."
+            f"{quantity(float(force[least]), 'N')}{uncertainty(results, f'{carriage}_contact_force_min', least)}"
+            f"{in_words(results, least)}."
         ]
     return [_onset(results, carriage, opened, known)]
 

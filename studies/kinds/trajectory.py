@@ -8,7 +8,7 @@ import numpy as np
 
 from results_schema.variables import MARCH, Variable, declare
 from studies.protocol.study import Kind
-from studies.results.findings_common import check_sensors, first_carriage, told_statuses
+from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
 from studies.results.results import Results
 
@@ -89,6 +89,11 @@ def _span(results: Results, sensor: str) -> str:
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
     over = " over all variants" if results.size > 1 else ""
-    ends = float(np.nanmin(low)), float(np.nanmax(high))
-    span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
+    places = np.nanargmin(low), np.nanargmax(high)
+    ends = low.flat[places[0]], high.flat[places[1]]
+    span = " to ".join(
+        f"{quantity(float(end), units, beside=max(map(abs, ends)))}"
+        f"{uncertainty(results, f'{sensor}_{side}', results.index_of(int(place)))}"
+        for end, side, place in zip(ends, ("min", "max"), places, strict=True)
+    )
     return f"{sensor}: from {span}{over}."

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from studies.findings.amplification import largest, sizes
+from studies.findings.amplification import largest, size_errors, sizes
 from studies.findings.theory import body_mass
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_of_all, shades, zero_line
@@ -17,6 +17,7 @@ from studies.pictures.common.sweep_view import (
     DAMPING,
     MASSES,
     SPEEDS,
+    Curve,
     View,
     along_axis,
     draw_curves,
@@ -26,8 +27,8 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import over_way, picked
-from studies.results.findings_common import in_words
-from studies.results.formatting import number, quantity, scale_for
+from studies.results.findings_common import LOOSE, in_words
+from studies.results.formatting import listed, number, percent, quantity, scale_for
 from studies.results.results import Index, Results, chosen, extreme
 
 MOST_SENSORS = 4
@@ -85,10 +86,27 @@ def _largest(seen: View, sensors: list[str], top: Index) -> Figure:
     title = f"The largest {results.noun(first)} {results.place(first)} is {value},{in_words(results, top)}"
     hang = " Displacements point down." if "m" in map(results.sensors.get, sensors) else ""
     held = " While the contact holds the answer counts; lines go on beyond." if not results.held.all() else ""
+    loose = [sensor.replace("_", " ") for sensor in sensors if _is_loose(seen, sensor)]
+    dashed = f" Dashed: {listed(loose)} estimated to within more than {percent(LOOSE)}." if loose else ""
     right = "; right: over the largest absolute static value of the same model" if amplified else ""
-    caption = seen.caption(f"{'Left: l' if amplified else 'L'}argest absolute values{right}.{hang}{held}")
+    caption = seen.caption(f"{'Left: l' if amplified else 'L'}argest absolute values{right}.{dashed}{hang}{held}")
     height = 0.9 + 1.9 * len(sensors)
     return draw("largest", title, caption, height, partial(_draw_largest, seen, sensors, 1 + amplified))
+
+
+def _is_loose(seen: View, sensor: str) -> bool:
+    """Whether curves of a sensor's largest values are dashed anywhere; sampled points are not."""
+    return not seen.is_sampled and any((curve.y > LOOSE).any() for curve in seen.curves(_errors(seen, sensor)))
+
+
+def _errors(seen: View, sensor: str) -> Any:
+    return seen.results.dataset["status"].copy(data=size_errors(seen.results, sensor))
+
+
+def _curves(seen: View, sensor: str, values: Any) -> list[Curve]:
+    """Curves of a sensor's largest values, or of what is proportional to them."""
+    pairs = zip(seen.curves(values), seen.curves(_errors(seen, sensor)), strict=True)
+    return [curve._replace(loose=error.y > LOOSE) for curve, error in pairs]
 
 
 def _draw_largest(seen: View, sensors: list[str], columns: int, drawing: Drawing) -> None:
@@ -97,7 +115,7 @@ def _draw_largest(seen: View, sensors: list[str], columns: int, drawing: Drawing
     for row, sensor in zip(grid, sensors, strict=True):
         units, size = results.sensors[sensor], seen.results.dataset["status"].copy(data=sizes(results, sensor))
         scale = scale_for(float(np.nanmax(seen.plane(size), initial=0.0)), units)
-        draw_curves(row[0], seen, [curve._replace(y=curve.y * scale.factor) for curve in seen.curves(size)])
+        draw_curves(row[0], seen, [curve._replace(y=curve.y * scale.factor) for curve in _curves(seen, sensor, size)])
         row[0].set_ylabel(results.label(sensor, scale.unit, "largest"))
         row[0].set_title(sensor.replace("_", " "))
         row[0].set_ylim(0.0, None)
@@ -106,13 +124,15 @@ def _draw_largest(seen: View, sensors: list[str], columns: int, drawing: Drawing
         if columns == 1:
             continue
         if np.isfinite(seen.plane(_gain(results, sensor))).any():
-            draw_curves(row[1], seen, seen.curves(_gain(results, sensor)))
+            draw_curves(row[1], seen, _curves(seen, sensor, _gain(results, sensor)))
             row[1].set_ylabel(f"dynamic amplification\n{results.place(sensor)}")
         else:
             row[1].set_visible(False)
     one_legend([axes for row in grid for axes in row[::-1]])
-    for axes in grid[-1]:
-        along_axis(axes, seen)
+    for column in grid.T:
+        lowest = [axes for axes in column if axes.get_visible()][-1]
+        lowest.tick_params(labelbottom=True)
+        along_axis(lowest, seen)
     for axes in grid[0]:
         _speed_ratio(axes, seen)
     drawing.align_ylabels()

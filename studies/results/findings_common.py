@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
 
+LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
+
 
 def first_carriage(study: Study) -> tuple[str, Carriage]:
     """Name and carriage that come first. Raises BadInput where nothing moves."""
@@ -33,6 +35,20 @@ def in_words(results: Results, index: Index) -> str:
     """Where in the sweep, as the end of a sentence; "" without a sweep."""
     at = results.at(index)
     return f" at {at}" if at else ""
+
+
+def uncertainty(results: Results, result: str, place: Index) -> str:
+    """How loosely a named value is known, for the sentence that names it; "" where its estimated error is small.
+
+    result: as in the archive's `result`. What is held to no tolerance, though a sensor's could hold it, is told so.
+    """
+    error = float(results.estimated_error(result)[place])
+    if not error > LOOSE:
+        return ""
+    sensor = next((name for name in results.sensors if result in (f"{name}_max", f"{name}_min")), "")
+    free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
+    remedy = f"; a `tolerance` of its own on sensor {sensor} holds it" if free else ""
+    return f" (estimated to within {percent(error)}{remedy})"
 
 
 def exceeds(results: Results, values: Array, threshold: float) -> str:
@@ -55,12 +71,14 @@ def told_envelopes(results: Results) -> list[str]:
     said = []
     for name, envelope in results.study.envelope.items():
         ends = [results.envelope(name, end) for end in ("max", "min")]
-        values = np.where(np.abs(ends[0]) >= np.abs(ends[1]), *ends)
+        upper = np.abs(ends[0]) >= np.abs(ends[1])
+        values = np.where(upper, *ends)
         place = extreme(np.where(results.with_values[..., None], np.abs(values), np.nan))
         if place is None:
             said.append(f"{name}: no variant has values.")
             continue
-        value = quantity(float(values[place]), results.envelopes[name])
+        result = f"{name}_envelope_{'max' if upper[place] else 'min'}"
+        value = f"{quantity(float(values[place]), results.envelopes[name])}{uncertainty(results, result, place[:-1])}"
         at = quantity(float(results.dataset[f"{name}_place"].values[place[-1]]), "m")
         held = "while the contact holds, " if not results.held.all() and results.held.any() else ""
         words = envelope.quantity.replace("_", " ")

@@ -164,6 +164,12 @@ class Results:
         varied = [axis for axis in self.axes if len(axis.values) > 1]
         return next((axis for ending in endings for axis in varied if axis.sets(ending)), None)
 
+    def written(self, axis: Axis) -> float | None:
+        """What the scene without sweep has in place of an axis; None where that is no one number."""
+        found = [(self.study.value(path), factor) for path, factor in axis.targets.items()]
+        values = [value / factor for value, factor in found if isinstance(value, int | float)]
+        return values[0] if len(values) == len(found) and np.allclose(values, values[0], atol=0.0) else None
+
     @cached_property
     def sensors(self) -> dict[str, str]:
         """Name and unit of every sensor."""
@@ -300,6 +306,13 @@ class Results:
     def numbers(self, variable: str, sensor: str) -> Array:
         """The same as plain numbers."""
         return np.asarray(self.of_sensor(variable, sensor).values, dtype=np.float64)
+
+    def estimated_error(self, result: str) -> Array:
+        """The estimated error of a reported number, in the sweep's shape; NaN where none is known."""
+        if "estimated_error" not in self.dataset or result not in self.dataset["result"].values:
+            return np.full(self.shape, np.nan)
+        error = self.dataset["estimated_error"].sel(result=result).transpose(*self.dims)
+        return np.asarray(error.values, dtype=np.float64)
 
     def traced(self) -> list[Index]:
         """The variants whose values and histories are kept, in the order of their flat numbers."""

@@ -217,6 +217,34 @@ def test_a_zipped_passage_claims_nothing_that_was_not_computed() -> None:
     assert f"would lift off in {opened.sum()} of 3 variants; worst is" in text
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_value_that_is_known_loosely_says_so_in_its_own_sentence(kind: str) -> None:
+    """Every kind that names an extreme, of all variants and of one."""
+    for sweep in (scenes.pace(kind), "") if scenes.PACE[kind] else ("",):
+        dataset = scenes.run(kind, sweep)
+        assert "estimated to within" not in "\n".join(answers.answer(dataset))
+        assert "(estimated to within 40 %" in "\n".join(answers.answer(scenes.with_errors(dataset, 0.4)))
+
+
+def test_what_a_tolerance_of_its_sensor_would_hold_is_told_with_it() -> None:
+    dataset = scenes.run("passage", scenes.pace("passage"))
+    of_moment, of_force = "moment_max", "table_contact_force_min"
+    midspan, moment, contact, *_ = answers.answer(scenes.with_errors(dataset, 0.4, of_moment, of_force))
+    assert "estimated" not in midspan
+    assert "N m (estimated to within 40 %; a `tolerance` of its own on sensor moment holds it) with" in moment
+    assert "N (estimated to within 40 %) at" in contact
+    held = scenes.with_errors(dataset, 0.4, of_moment)
+    held["tolerance"].values[...] = 0.1
+    assert "N m (estimated to within 40 %) with" in answers.answer(held)[1]
+
+
+def test_an_envelope_that_is_known_loosely_says_so() -> None:
+    envelope = '[envelope.along]\nbody = "bed"\nplaces = 5'
+    dataset = scenes.run("passage", scenes.pace("passage"), extra=envelope)
+    text = "\n".join(answers.answer(scenes.with_errors(dataset, 0.4, "along_envelope_max")))
+    assert "mm (estimated to within 40 %), at 5 m of its track" in text
+
+
 def test_findings_of_a_trajectory() -> None:
     assert "Histories of 1 variant out of 1, each over 3 s on 401 stations" in said("trajectory")
 

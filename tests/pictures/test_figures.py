@@ -93,6 +93,44 @@ def test_unsorted_axes_are_drawn_in_order() -> None:
     assert curve.y.tolist() == [float(by_mass.sel(mass=mass)) for mass in (50, 100, 200)]
 
 
+def test_the_lowest_panel_of_each_column_has_the_speeds() -> None:
+    """Of what has no static value there is no amplification, so that the panel above is the lowest."""
+    rate = '[sensor.shaken]\nbody = "bed"\nat = 5.0\nquantity = "velocity"'
+    largest = answers.figures(scenes.run("passage", scenes.pace("passage"), extra=rate))[0]
+    midspan, gain, *_, shaken, none = (axes for axes in largest.drawing.axes if axes.get_subplotspec() is not None)
+    assert not none.get_visible()
+    lowest = [largest.drawing.axes[place] for place in (3, 4)]
+    assert all(axes.get_xlabel() == "pace (m/s)" for axes in lowest)
+    assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in lowest)
+    assert not midspan.get_xlabel() and not gain.get_xlabel() and shaken is lowest[1]
+
+
+def test_curves_that_are_known_loosely_are_dashed_and_the_caption_says_which() -> None:
+    dataset = scenes.run("passage", f"{scenes.pace('passage', count=20)}\n{DAMPING}")
+    one = dataset["estimated_error"].sel(result="midspan_max").copy()
+    one[5:9] = 0.4
+    dataset["estimated_error"].loc[{"result": "midspan_max"}] = one
+    largest = answers.figures(dataset)[0]
+    panels = largest.drawing.axes[:4]
+    dashed = [sum(line.get_linestyle() == "--" for line in axes.lines) for axes in panels]
+    assert dashed[0] == dashed[1] > 0 and dashed[2:] == [0, 0]
+    assert "Dashed: midspan estimated to within more than 5 %." in largest.caption
+    solid = next(line for line in panels[0].lines if line.get_linestyle() == "-")
+    assert np.isnan(np.asarray(solid.get_ydata(), dtype=float)).nonzero()[0].tolist() == [5, 6, 7, 8]
+
+
+def test_a_caption_tells_what_is_held_beside_what_the_study_file_has() -> None:
+    results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}\n{DAMPING}"))
+    damping = results.axis(".damping_ratio")
+    assert damping is not None
+    ends = [views.view(results, y=(".mass",), at=(0, 0, place)).words for place in range(len(damping.values))]
+    assert [text.removesuffix(".").partition(" (")[0] for text in ends] == [
+        f"Held at {damping.at(place)}" for place in range(len(damping.values))
+    ]
+    own = np.isclose(damping.values, 0.03)
+    assert ["in the study file 0.03" in text for text in ends] == (~own).tolist()
+
+
 def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
     dataset = scenes.run("passage", scenes.pace("passage"))
     found = answers.figures(dataset)

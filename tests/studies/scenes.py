@@ -93,3 +93,12 @@ def with_failures(dataset: xr.Dataset, every: int) -> xr.Dataset:
         if grid and array.dtype.kind == "f":
             array.values.reshape(failed.size, -1)[failed] = np.nan
     return changed
+
+
+def with_errors(dataset: xr.Dataset, error: float, *results: str) -> xr.Dataset:
+    """The same with these results, or all, estimated so loosely, held to no tolerance."""
+    changed = dataset.copy(deep=True)
+    which = np.isin(changed["result"].values, results) if results else np.ones(changed.sizes["result"], dtype=bool)
+    changed["estimated_error"].values[..., which] = error
+    changed["tolerance"].values[which] = np.nan
+    return changed

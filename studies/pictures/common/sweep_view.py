@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 MOST_CURVES = 6
+DASHED = (0, (3, 2))
 UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
 SPEEDS = (".motion.speed", ".motion.frequency")
@@ -31,11 +32,12 @@ DAMPING = (".damping_ratio",)
 
 
 class Curve(NamedTuple):
-    """y (n,) over x (n,) for one value of the second axis; place: where in the sweep each point lies."""
+    """y (n,) over x (n,) for one value of the second axis. loose: where y is dashed, as it is known loosely."""
 
     label: str
     x: Array
     y: Array
+    loose: Mask | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +97,17 @@ class View:
     def words(self) -> str:
         """What is held where, "" if nothing is."""
         axes = [axis for axis in self.results.axes if len(axis.values) > 1]
-        held = [axis.at(self.held[axis.dim]) for axis in axes if axis.dim in self.held]
+        held = [self._held(axis) for axis in axes if axis.dim in self.held]
         others = [axis for axis in axes if axis.dim not in self.held and axis not in (self.x, self.y)]
         varied = f"{listed([axis.name for axis in others])} differ from point to point." if others else ""
         return " ".join(text for text in (f"Held at {', '.join(held)}." if held else "", varied) if text)
+
+    def _held(self, axis: Axis) -> str:
+        """Where an axis is held, beside what the study file has for its number where that is something else."""
+        place, own = self.held[axis.dim], self.results.written(axis)
+        if own is None or np.isclose(own, axis.values[place], atol=0.0):
+            return axis.at(place)
+        return f"{axis.at(place)} (in the study file {axis.in_words(own)})"
 
     @property
     def missing(self) -> str:
@@ -172,11 +181,19 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
         axes.set_title(f"the same for {seen.y.noun} {seen.y.span}", loc="right", color=look.MUTED)
         curves = [curves[-1]._replace(label="")]
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
-        marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
-        axes.plot(curve.x, curve.y, color=colour, marker=marker, label=curve.label)
+        _draw_curve(axes, curve, colour)
     if seen.y is not None and len(curves) > 1:
         legend_beside(axes, seen.y.noun)
     widen(axes, [curve.y for curve in curves])
+
+
+def _draw_curve(axes: Axes, curve: Curve, colour: Any) -> None:
+    """A curve, with marks where its points are few; dashed from and to every point that is known loosely."""
+    marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
+    loose = np.zeros(curve.y.shape, dtype=bool) if curve.loose is None else curve.loose
+    axes.plot(curve.x, np.where(loose, np.nan, curve.y), color=colour, marker=marker, label=curve.label)
+    if loose.any():
+        axes.plot(curve.x, curve.y, color=colour, marker=marker, linestyle=DASHED, markerfacecolor="none")
 
 
 def coincide(curves: Sequence[Curve]) -> bool:
