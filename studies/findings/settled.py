@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Annotated
 
+import numpy as np
+from pydantic import Field, Strict
+
+from engine.study_file.spec import Spec
+from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
 from studies.findings import theory
+from studies.protocol.study import question_of
 from studies.results.results import Results
 
 LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
+
+
+class Asked(Spec):
+    """The table [question]. odd_rms: parts of the static range, of which is told where the odd part exceeds them."""
+
+    odd_rms: Annotated[tuple[Annotated[Dimensionless, Field(gt=0)], ...], Strict(False), Field(min_length=1)] = (
+        0.01,
+        0.05,
+    )
+
+
+def thresholds(results: Results) -> tuple[float, ...]:
+    """What the question names of the odd part, ascending."""
+    return tuple(sorted(question_of(results.study, Asked).odd_rms))
 
 
 def settled(results: Results) -> Mask:

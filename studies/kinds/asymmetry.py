@@ -13,7 +13,7 @@ from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variables import MARCH, Variable, declare
 from studies.findings import indices, theory
-from studies.findings.settled import LEFT_OVER, odd_parts
+from studies.findings.settled import LEFT_OVER, Asked, odd_parts, thresholds
 from studies.protocol.study import Kind
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, percent, quantity
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
-THRESHOLDS = (0.01, 0.05)
 CLOSE = 0.05
 MOST_SENSORS = 3
 REMAINDER = "by the damping of the first mode"
@@ -105,6 +104,7 @@ class Asymmetry(Kind):
     name = "asymmetry"
     summary = "forward against backward at equal positions: lag, loop area, odd and even parts of the last cycle"
     question = "Does the response differ when the carriage comes back?"
+    settings = Asked
     drawn_by = "studies.pictures.asymmetry"
 
     def check(self, study: Study) -> None:
@@ -257,8 +257,9 @@ def _first_beyond(results: Results, sensor: str, settled: Mask) -> str:
     odd, of = (np.where(settled, odd, np.nan), " of those that have settled") if some else (odd, "")
     if not np.isfinite(odd).any():
         return f"{sensor}: no odd part is defined, as its static response does not vary."
-    told = THRESHOLDS if np.nanmax(odd) > THRESHOLDS[0] else THRESHOLDS[:1]
-    said = [exceeds(results, odd, part) for part in told]
+    parts = thresholds(results)
+    exceeded = sum(bool(np.nanmax(odd) > part) for part in parts)
+    said = [exceeds(results, odd, part) for part in parts[: exceeded + 1]]
     return f"{sensor}: the odd part{of} {listed(said)}."
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
+from engine.study_file.spec import Spec
+from engine.study_file.units import Dimensionless
 from results_schema.arrays import Mask
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
-from studies.protocol.study import Kind
-from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
-from studies.results.formatting import counted, number, quantity
+from studies.protocol.study import Kind, question_of
+from studies.results.findings_common import check_sensors, exceeds, first_carriage, in_words, told_statuses, uncertainty
+from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
@@ -22,9 +26,16 @@ if TYPE_CHECKING:
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5
+MOST_PARTS = 3  # of a sweep that are told one by one
 BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
+
+
+class Asked(Spec):
+    """The table [question]. amplification: dynamic over static, of which is told from which speed on it is exceeded."""
+
+    amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
 
 
 class Passage(Kind):
@@ -33,6 +44,7 @@ class Passage(Kind):
     name = "passage"
     summary = "largest and smallest of every sensor and of the contact force, dynamic amplification"
     question = "How large does the response get, and does the contact hold?"
+    settings = Asked
     drawn_by = "studies.pictures.passage"
 
     def check(self, study: Study) -> None:
@@ -44,7 +56,7 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        said = [_largest(results, sensor) for sensor in _told(results)]
+        said = [f"{_largest(results, sensor)}{_amplified(results, sensor)}" for sensor in _told(results)]
         said += [text for carriage in results.study.carriage for text in _contact(results, carriage)]
         return [*said, *told_statuses(results)]
 
@@ -87,6 +99,45 @@ def _largest(results: Results, sensor: str) -> str:
         f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "
         f"{amplified}{loosely}."
     )
+
+
+def _amplified(results: Results, sensor: str) -> str:
+    """Where statics are exceeded by as much as the question names; "" without anything to compare."""
+    gain = np.where(results.with_values, results.numbers("dynamic_amplification", sensor), np.nan)
+    if results.size < 2 or not np.isfinite(gain).any():
+        return ""
+    threshold, axis = question_of(results.study, Asked).amplification, results.axis(*PACES)
+    if axis is None or axis.dim == VARIANT:
+        return f" The dynamic amplification {exceeds(results, gain, threshold, number)}."
+    beyond = np.nan_to_num(gain) > threshold
+    return f" The dynamic amplification exceeds {number(threshold)} {_paces(results, axis, beyond)}."
+
+
+def _paces(results: Results, axis: Axis, beyond: Mask) -> str:
+    """The parts of a swept pace in which any variant is beyond a threshold, and which variants these are."""
+    along = results.everywhere(results.dataset[axis.name])
+    paces = np.unique(along)
+    over = np.isin(paces, along[beyond])
+    if not over.any():
+        return f"nowhere from {axis.span}"
+    if over.all():
+        return f"everywhere from {axis.span}{_common(results, axis, beyond)}"
+    turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
+    parts = [paces[first:end] for first, end in zip(turns[::2], turns[1::2], strict=True)]
+    told = [f"at {replace(axis, values=part).span}" for part in parts]
+    if over[-1]:
+        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} on"
+    told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
+    return listed(told) if len(told) <= MOST_PARTS else f"first {told[0]}, last {told[-1]}"
+
+
+def _common(results: Results, pace: Axis, which: Mask) -> str:
+    """What else is swept and has not all of its values among some variants, in brackets."""
+    others = [axis for axis in results.axes if axis.name != pace.name]
+    values = [np.unique(results.everywhere(results.dataset[axis.name])[which]) for axis in others]
+    pairs = zip(others, values, strict=True)
+    told = [f"{axis.noun} {replace(axis, values=own).span}" for axis, own in pairs if own.size < axis.values.size]
+    return f" ({', '.join(told)})" if told else ""
 
 
 def _at_the_end(results: Results, place: Index) -> str:

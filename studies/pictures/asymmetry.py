@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from results_schema.arrays import Array
 from studies.findings import theory
-from studies.findings.settled import odd_parts
+from studies.findings.settled import odd_parts, thresholds
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, banded, colour_bar, draw, logarithmic, zero_line
 from studies.pictures.common.sweep_view import (
@@ -34,7 +34,6 @@ from studies.results.formatting import percent, quantity, scale_for
 from studies.results.results import Index, Results, chosen, extreme
 
 MOST_SENSORS = 3
-THRESHOLDS = (0.01, 0.05)
 BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent
 LAGS_SHOWN = 1.6
 NARROW = 22  # letters of a line in a legend beside
@@ -221,7 +220,7 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
             draw_curves(axes, seen, [curve._replace(y=100.0 * curve.y) for curve in curves])
             if any((curve.y > 0.0).any() for curve in curves):
                 logarithmic(axes.yaxis)
-            for threshold in THRESHOLDS:
+            for threshold in thresholds(seen.results):
                 axes.axhline(100.0 * threshold, color=look.MUTED, linestyle=":", linewidth=0.9)
             axes.set_title(f"{title}, {sensor}")
         row[0].set_ylabel("% of the static range")
@@ -233,7 +232,7 @@ def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
 def _map(seen: View, sensor: str) -> Figure:
     caption = seen.caption("Rms of half the difference of forward and backward.")
     odd = seen.results.numbers("odd_rms", sensor)
-    told = exceeds(seen.results, odd, THRESHOLDS[0])
+    told = exceeds(seen.results, odd, thresholds(seen.results)[0])
     title = f"{sensor.replace('_', ' ')}: the difference of the ways {told}"
     return draw("odd-map", title, caption, 3.0, partial(_draw_map, seen, sensor))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,19 +52,20 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     return f" (estimated to within {percent(error)}{remedy})"
 
 
-def exceeds(results: Results, values: Array, threshold: float) -> str:
-    """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept."""
+def exceeds(results: Results, values: Array, threshold: float, told: Callable[[float], str] = percent) -> str:
+    """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept. told: how the
+    threshold is written."""
     beyond = np.isfinite(values) & (values > threshold)
     if not beyond.any():
-        return f"stays below {percent(threshold)}"
+        return f"stays below {told(threshold)}"
     axis = results.axis(".motion.speed", ".motion.frequency")
     if axis is None:
-        return f"exceeds {percent(threshold)} in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+        return f"exceeds {told(threshold)} in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
     along = results.everywhere(results.dataset[axis.name])
     lowest = float(along[beyond].min())
     if lowest == axis.values.min():
-        return f"exceeds {percent(threshold)} already at {axis.in_words(lowest)}"
-    return f"first exceeds {percent(threshold)} at {axis.in_words(lowest)}"
+        return f"exceeds {told(threshold)} already at {axis.in_words(lowest)}"
+    return f"first exceeds {told(threshold)} at {axis.in_words(lowest)}"
 
 
 def told_envelopes(results: Results) -> list[str]:

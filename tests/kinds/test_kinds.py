@@ -207,6 +207,42 @@ def test_findings_of_a_passage_tell_where_the_contact_opens() -> None:
     assert "while the contact holds" in text and "; up to 10 kg never" in text
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "words"),
+    [
+        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere from 1 m/s to 6 m/s."),
+        ([1.2] * 6, [1.3] * 6, "everywhere from 1 m/s to 6 m/s."),
+        ([1.2] * 6, [1.0] * 6, "everywhere from 1 m/s to 6 m/s (zeta 0.01)."),
+        ([1.0, 1.0, 1.0, 1.2, 1.0, 1.2], [1.0, 1.0, 1.0, 1.2, 1.2, 1.2], "from 4 m/s on."),
+        ([1.0, 1.2, 1.2, 1.0, 1.0, 1.2], [1.0] * 5 + [1.2], "at 2 m/s to 3 m/s (zeta 0.01) and from 6 m/s on."),
+        ([np.nan, 1.2, 1.0, 1.0, 1.0, np.nan], [1.0] * 6, "at 2 m/s (zeta 0.01)."),
+    ],
+)
+def test_a_passage_tells_at_which_speeds_statics_are_exceeded(
+    first: list[float], second: list[float], words: str
+) -> None:
+    zeta = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
+    pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 4, 5, 6] }'
+    dataset = scenes.run("passage", f"{pace}\n{zeta}", extra="[question]\namplification = 1.15").copy(deep=True)
+    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = np.transpose([first, second])
+    assert f"The dynamic amplification exceeds 1.15 {words}" in answers.answer(dataset)[0]
+
+
+def test_without_swept_speeds_variants_that_exceed_statics_are_counted() -> None:
+    dataset = scenes.run("passage", 'mass = { of = "carriage.table.mass", values = [10, 600] }').copy(deep=True)
+    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [1.0, 1.3]
+    assert "The dynamic amplification exceeds 1.1 in 1 variant of 2." in answers.answer(dataset)[0]
+    assert "The dynamic amplification" not in said("passage")
+
+
+def test_the_parts_of_which_an_asymmetry_tells_are_the_questions() -> None:
+    pace = scenes.pace("asymmetry")
+    usual = "\n".join(answers.answer(scenes.run("asymmetry", pace)))
+    asked = "\n".join(answers.answer(scenes.run("asymmetry", pace, extra='[question]\nodd_rms = ["90 %", "0.01 %"]')))
+    assert "1 %" in usual and "0.01 %" not in usual
+    assert " 0.01 %" in asked and "stays below 90 %" in asked
+
+
 def test_a_zipped_passage_claims_nothing_that_was_not_computed() -> None:
     mass = 'mass = { of = "carriage.table.mass", values = [10, 600, 600] }'
     pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 20, 40] }'
