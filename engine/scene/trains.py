@@ -35,9 +35,10 @@ class Train(Spec):
     axles: how many, which a list of distances tells too. spacing: m from every axle to the next, or one for each,
     from the front. spacing_scale, load_scale: factors of all distances, and of all forces and masses.
     loads, springs: keys of numbers that are the same for all axles, or listed for each from the front; the former are
-    those that `load_scale` multiplies.
+    those that `load_scale` multiplies, in `units`.
     """
 
+    units: ClassVar[str] = "kg"
     loads: ClassVar[tuple[str, ...]] = ()
     springs: ClassVar[tuple[str, ...]] = ()
 
@@ -60,6 +61,16 @@ class Train(Spec):
         if isinstance(self.spacing, tuple):
             return tuple(accumulate(self.spacing, initial=0.0))
         return tuple(self.spacing * axle for axle in range(self.count))
+
+    @property
+    def length(self) -> float:
+        """m from its first axle to its last."""
+        return self.distances[-1] * self.spacing_scale
+
+    @property
+    def load(self) -> float:
+        """N or kg of all its axles together."""
+        return sum(sum(self.own(key)) * self.scale(key) for key in self.loads)
 
     @property
     def each(self) -> tuple[str, ...]:
@@ -114,6 +125,7 @@ class Train(Spec):
 class ForceTrain(Train):
     """Constant forces in N along gravity."""
 
+    units = "N"
     loads = ("force",)
     kind: Literal["force"]
     force: OneOrEach[Force]

@@ -22,6 +22,7 @@ from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
+from studies.results.findings_common import told_trains
 from studies.results.formatting import counted, number, unit_text
 from studies.results.results import typed_unit
 
@@ -91,6 +92,7 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
     cases = expand(study)
     if kind.sweeps:
         rows.insert(1, ("variants", f"{cases.size:,}"))
+        rows += told_trains(study)
     work = [(piece.name, piece.words, duration(piece.seconds)) for piece in pieces]
     tables = (
         Table(study.title or study.source.name, ("", ""), rows),
@@ -142,6 +144,7 @@ def _study(plan: Plan) -> Table:
     shape = " x ".join(f"{length} {dim}" for dim, length in zip(plan.cases.dims, plan.cases.shape, strict=True))
     variants = f"{plan.size:,} = {shape}" if len(plan.cases.dims) > 1 else f"{plan.size:,}"
     rows = [("kind", study.kind), ("variants", variants), ("start", _START[study.start])]
+    rows += told_trains(study)
     return Table(study.title or study.source.name, ("", ""), rows)
 
 

@@ -29,6 +29,7 @@ from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
+from studies.results.findings_common import told_trains
 from studies.results.formatting import counted, number, percent, quantity
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def page_of(study: Study, remarks: Sequence[str]) -> Page:
         Drawn(place, figure.title, figure.caption, figure.name, svg(figure))
         for place, figure in enumerate(pictures(scene), 1)
     ]
+    trains = [Row(name, words) for name, words in told_trains(study)]
     unused = [
         f"nothing rides on body {name} and nothing reads it: it is left out"
         for name in study.body
@@ -97,7 +99,7 @@ def page_of(study: Study, remarks: Sequence[str]) -> Page:
     ]
     return Page(
         title=study.title or study.kind,
-        facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}")],
+        facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}"), *trains],
         remarks=[f"{text[0].upper()}{text[1:]}." for text in (*remarks, *unused)],
         figures=drawn,
         shapes=[*(_of_body(model, body) for body in scene.bodies.values()), *_of_whole(model)],

@@ -32,6 +32,18 @@ def check_sensors(study: Study) -> None:
         raise study.source.fault("sensor", "nothing is measured", expected="at least one table [sensor.name]")
 
 
+def told_trains(study: Study) -> list[tuple[str, str]]:
+    """Every train with how many axles it has, how long and how heavy it is: a list of spacings tells none of these."""
+    return [
+        (
+            f"train {name}",
+            f"{counted(train.count, 'axle')}, {quantity(train.length, 'm', 4)} from first to last, "
+            f"{quantity(train.load, train.units, 4)}",
+        )
+        for name, train in study.train.items()
+    ]
+
+
 def in_words(results: Results, index: Index) -> str:
     """Where in the sweep, as the end of a sentence; "" without a sweep."""
     at = results.at(index)

@@ -10,6 +10,10 @@ import engine
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
+from studies.commands.preview import preview
+from studies.protocol.study import kind_of
+from studies.reporting.drawing import page_of
+from studies.results.findings_common import told_trains
 from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
 
 WAY = cruise(0.0, 1.0, 0.8)
@@ -171,3 +175,30 @@ def test_words(old: str, new: str, words: list[str]) -> None:
     with pytest.raises(BadInput) as error:
         expand(load(TEXT.replace(old, new, 1)))
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        (
+            {"kind": "force", "force": [2e4, 1e4, 1e4], "spacing": [3.0, 1.5]},
+            "3 axles, 4.5 m from first to last, 40 kN",
+        ),
+        ({"kind": "force", "force": 1e3, "axles": 11, "spacing": 2.0}, "11 axles, 20 m from first to last, 11 kN"),
+        (
+            {"kind": "oscillator", "mass": 80.0, "wheel_mass": 20.0, "stiffness": 1e4, "spacing": [1.0]}
+            | {"load_scale": 2.0, "spacing_scale": 3.0},
+            "2 axles, 3 m from first to last, 400 kg",
+        ),
+    ],
+)
+def test_a_train_is_told_with_its_axles_length_and_load(own: dict[str, Any], words: str) -> None:
+    """One number too many in a list of spacings is seen before anything is run."""
+    assert told_trains(train({"on": "bed", "motion": WAY} | own)) == [("train tram", words)]
+
+
+def test_check_and_draw_tell_the_trains() -> None:
+    given = train(force(1e4, WAY) | REGULAR, solver={"steps": 200, "audit": 0})
+    (told,) = told_trains(given)
+    assert told in preview(kind_of(given).parts(given), 1).tables[0].rows
+    assert told in [(row.name, row.value) for row in page_of(given, ()).facts]
