@@ -191,14 +191,19 @@ def compare(first: Path, second: Path) -> int:
 @commands.command()
 @click.argument("archive", type=_FILE)
 @click.argument("file", type=_FILE)
-def export(archive: Path, file: Path) -> None:
-    """Write ARCHIVE as a table, FILE.csv or FILE.parquet: one row per variant (and position)."""
+@click.option("--results", "names", metavar="NAME,NAME", default="", help="These results alone; default: all.")
+def export(archive: Path, file: Path, names: str) -> None:
+    """Write ARCHIVE as a table, FILE.csv or FILE.parquet: one row per variant (and position).
+
+    Swept numbers stand in the units of the study file, results in SI units.
+    """
     from results_schema.store.archive import open_archive
     from studies.commands import console
     from studies.reporting.tabulated import write_table
     from studies.runs.archived import results_of
 
-    left_out = write_table(results_of(open_archive(archive)), file)
+    chosen = [name.strip() for name in names.split(",") if name.strip()]
+    left_out = write_table(results_of(open_archive(archive)), file, chosen)
     console.say(f"wrote {file}", *([f"without {', '.join(left_out)}"] if left_out else []))
 
 

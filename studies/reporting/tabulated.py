@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import partial
 from itertools import product
 from math import prod
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
 from results_schema.store import files
-from studies.results.results import Results
+from studies.results.results import Axis, Results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,10 +25,11 @@ MOST_COLUMNS = 64  # of one result
 WRITERS = {".csv": "to_csv", ".parquet": "to_parquet"}
 
 
-def write_table(results: Results, path: Path) -> list[str]:
+def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> list[str]:
     """Write the table of an archive as the path's ending asks; the results that have no place in it.
 
-    Raises BadInput (unknown ending, no such place, a file is there, pyarrow is not installed) and OutputFailed.
+    chosen: as of `table_of`. Raises BadInput (unknown ending, no such place, a file is there, no such result, pyarrow is
+    not installed) and OutputFailed.
     """
     if path.suffix not in WRITERS:
         expected = f"a name that ends in {' or '.join(WRITERS)}"
@@ -35,7 +37,7 @@ def write_table(results: Results, path: Path) -> list[str]:
     files.check_output_place(path)
     if path.exists():
         raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
-    table, left_out = table_of(results)
+    table, left_out = table_of(results, chosen)
     try:
         files.write_whole(path, partial(getattr(table, WRITERS[path.suffix]), index=False))
     except ImportError:
@@ -44,28 +46,64 @@ def write_table(results: Results, path: Path) -> list[str]:
     return left_out
 
 
-def table_of(results: Results) -> tuple[pd.DataFrame, list[str]]:
+def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame, list[str]]:
     """The table, and the results that have no place in it: histories, shapes, and what belongs to no variant.
 
-    Swept numbers and results in the archive's units, which stand in the headings; flags as words.
+    Swept numbers in the units of the study file, results in those of the archive; units stand in the headings, flags as
+    words. chosen: results that it has beside the swept numbers and the status; all where none is named, but for contact
+    forces of carriages that are forces. Raises BadInput for a name that is none.
     """
     import pandas as pd
     import xarray as xr
 
-    dataset = results.dataset
+    dataset = _chosen(results, chosen) if chosen else _without_constants(results)
     rows = (*results.dims, *(("position",) if "position" in dataset.dims else ()))
     like = xr.zeros_like(dataset["status"], dtype=float)
     if len(rows) > len(results.dims):
         like = like.expand_dims(position=dataset["position"]).transpose(*rows)
-    columns, left_out = {}, []
+    columns, left_out, swept = {}, [], {axis.name: axis for axis in results.axes}
     for name, array in [*((n, dataset[n]) for n in (*dataset.coords, "status")), *dataset.data_vars.items()]:
         own = tuple(dim for dim in array.dims if dim not in rows)
         if prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS or (own and not set(array.dims) & set(rows)):
             left_out += [str(name)] if name in dataset.data_vars else []
             continue
-        for heading, one in _columns(str(name), array, own):
+        parts = [_as_typed(swept[str(name)], array)] if name in swept else _columns(str(name), array, own)
+        for heading, one in parts:
             columns[heading] = _words(xr.broadcast(one, like)[0].transpose(*rows).values.reshape(-1), array.attrs)
     return pd.DataFrame(columns), left_out
+
+
+def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
+    """The dataset with these results alone, the swept numbers and the status."""
+    dataset = results.dataset
+    known = [str(name) for name in (*dataset.data_vars, *dataset.coords) if name not in dataset.dims]
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            remedy = f'did you mean "{near[0]}"?' if near else ""
+            raise BadInput("no such result", where="--results", expected=", ".join(known), received=name, remedy=remedy)
+    kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}
+    return dataset.drop_vars([name for name in dataset.variables if name not in kept])
+
+
+def _without_constants(results: Results) -> xr.Dataset:
+    """The dataset without contact forces of carriages that are forces, which press as they are written."""
+    forces = tuple(f"{name}_contact_force_" for name, one in results.study.carriage.items() if not one.inertial)
+    lost = {f"{name}_separation_position" for name, one in results.study.carriage.items() if not one.inertial}
+    dataset = results.dataset.drop_vars(
+        [name for name in results.dataset.data_vars if str(name).startswith(forces) or name in lost]
+    )
+    if "result" not in dataset.dims:
+        return dataset
+    return dataset.sel(result=[name for name in dataset["result"].values if not str(name).startswith(forces)])
+
+
+def _as_typed(axis: Axis, array: xr.DataArray) -> tuple[str, xr.DataArray]:
+    """A swept number in the unit of the study file, with its heading; without the last digits of the conversion."""
+    if axis.typed is None:
+        return _columns(axis.name, array, ())[0]
+    values = [float(f"{value:.12g}") for value in axis.shown]
+    return f"{axis.name} ({axis.typed.unit})", array.copy(data=values)
 
 
 def _words(values: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:

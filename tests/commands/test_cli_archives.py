@@ -75,6 +75,34 @@ def test_export_writes_one_row_per_variant(here: Path, capsys: Captured) -> None
     assert main(["export", "small.nc", "small.xls"]) == 2
 
 
+def exported(archive: str, *arguments: str) -> list[dict[str, str]]:
+    Path("own.csv").unlink(missing_ok=True)
+    assert main(["export", archive, "own.csv", *arguments]) == 0
+    return list(csv.DictReader(Path("own.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def test_an_exported_table_has_swept_numbers_as_typed_and_the_chosen_results(here: Path, capsys: Captured) -> None:
+    typed = SMALL.replace("from = 0.5, to = 10.0", 'from = "10 km/h", to = "45 km/h"').replace(', spacing = "log"', "")
+    write(here, typed)
+    assert main(["run", "small.toml"]) == 0
+    rows = exported("small.nc", "--results", "midspan_max, dynamic_amplification")
+    assert list(rows[0]) == [
+        *("speed (km/h)", "mass (kg)", "status", "midspan_max (m)", "dynamic_amplification midspan"),
+    ]
+    assert [row["speed (km/h)"] for row in rows[::2]] == [f"{speed}.0" for speed in range(10, 46, 5)]
+    assert main(["export", "small.nc", "other.csv", "--results", "midspan_mux"]) == 2
+    assert 'did you mean "midspan_max"' in capsys.readouterr().err
+
+
+def test_an_exported_table_has_no_contact_forces_of_forces(here: Path) -> None:
+    write(here, SMALL.replace('kind = "mass"\nmass = 1.0', 'kind = "force"\nforce = 1.0').replace("mass", "force"))
+    assert main(["run", "small.toml"]) == 0
+    headings = list(exported("small.nc")[0])
+    assert "midspan_max (m)" in headings and "estimated_error midspan_max" in headings
+    assert not [name for name in headings if "contact_force" in name or "separation" in name]
+    assert "trolley_contact_force_min (N)" in exported("small.nc", "--results", "trolley_contact_force_min")[0]
+
+
 def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     write(here)
     write(here, SMALL.replace("damping_ratio = 0.02", "damping_ratio = 0.03"), "damped.toml")
