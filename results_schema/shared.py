@@ -129,7 +129,8 @@ def _extreme(which: str, word: str) -> tuple[Variable, Variable]:
             f"{{sensor}}_{which}_position",
             units="m",
             long_name=f"position of the first carriage at the {word} value of {{sensor}}",
-            meaning="of the first one also where the sensor is under another; NaN where it was off its body",
+            meaning="of the first one also where the sensor is under another; NaN where it was off its body, as the "
+            "first axle of a train often is by then",
             nan_allowed=True,
         ),
     )

@@ -28,8 +28,8 @@ WRITERS = {".csv": "to_csv", ".parquet": "to_parquet"}
 def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> list[str]:
     """Write the table of an archive as the path's ending asks; the results that have no place in it.
 
-    chosen: as of `table_of`. Raises BadInput (unknown ending, no such place, a file is there, no such result, pyarrow is
-    not installed) and OutputFailed.
+    chosen: as of `table_of`. Raises BadInput (unknown ending, no such place or result, a file is there, pyarrow is not
+    installed) and OutputFailed.
     """
     if path.suffix not in WRITERS:
         expected = f"a name that ends in {' or '.join(WRITERS)}"
