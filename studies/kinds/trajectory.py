@@ -89,11 +89,9 @@ def _span(results: Results, sensor: str) -> str:
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
     over = " over all variants" if results.size > 1 else ""
-    places = np.nanargmin(low), np.nanargmax(high)
-    ends = low.flat[places[0]], high.flat[places[1]]
-    span = " to ".join(
-        f"{quantity(float(end), units, beside=max(map(abs, ends)))}"
-        f"{uncertainty(results, f'{sensor}_{side}', results.index_of(int(place)))}"
-        for end, side, place in zip(ends, ("min", "max"), places, strict=True)
-    )
-    return f"{sensor}: from {span}{over}."
+    ends = float(np.nanmin(low)), float(np.nanmax(high))
+    span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
+    places = (results.index_of(int(flat)) for flat in (np.nanargmin(low), np.nanargmax(high)))
+    named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
+    looser = max(named, key=lambda end: float(np.nan_to_num(results.estimated_error(end[0])[end[1]])))
+    return f"{sensor}: from {span}{over}{uncertainty(results, *looser)}."
