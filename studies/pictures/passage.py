@@ -15,7 +15,6 @@ from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_of_all, shades, zero_line
 from studies.pictures.common.sweep_view import (
     DAMPING,
-    MASSES,
     SPEEDS,
     Curve,
     View,
@@ -33,6 +32,7 @@ from studies.results.results import Index, Results, chosen, extreme
 
 MOST_SENSORS = 4
 MOST_HISTORIES = 4
+CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor
 MANY = 6  # values of the second axis from which on a map says more than curves
 FLAT = 0.1  # a map of ratios that vary less shows nothing
 LEFT = 0.02  # of the way: what is recorded beyond it is free vibration
@@ -46,7 +46,7 @@ def pictures(results: Results) -> list[Figure]:
         return []
     top = largest(results, sizes(results, sensors[0]))
     assert top is not None
-    seen, found = view(results, SPEEDS, (*MASSES, *DAMPING), top), []
+    seen, found = view(results, SPEEDS, CURVES, top), []
     if seen.x is not None:
         found.append(_largest(seen, sensors, top))
         if seen.y is not None and len(seen.y.values) > MANY and _varies(seen, _gain(results, sensors[0])):
@@ -222,11 +222,14 @@ def _response(results: Results, sensors: list[str], shown: list[Index], top: Ind
     where = quantity(float(way.position[at]), "m")
     title = f"{first.replace('_', ' ')} reaches {value} when {results.carriage_name} has come to {where}"
     whose = "the variant of the answer" if own == top else "the kept history with the largest value"
+    errors = {sensor: float(results.estimated_error(sensor)[own]) for sensor in sensors}
+    loose = [f" {name.replace('_', ' ')}: estimated to within {percent(e)}." for name, e in errors.items() if e > LOOSE]
     hang = f" {DOWN}" if "m" in map(results.sensors.get, sensors) else ""
     caption = (
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")
         + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
         + hang
+        + "".join(loose)
     )
     height = 0.8 + 1.9 * len(sensors)
     return draw("response", title, caption, height, partial(_draw_response, results, sensors, shown))

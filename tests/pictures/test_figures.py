@@ -9,6 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import engine
+import studies
 from studies.pictures.common import figures
 from studies.pictures.common import sweep_view as views
 from studies.reporting import answers
@@ -105,6 +107,16 @@ def test_the_lowest_panel_of_each_column_has_the_speeds() -> None:
     assert not midspan.get_xlabel() and not gain.get_xlabel() and shaken is lowest[1]
 
 
+def test_curves_of_a_moving_force_are_of_damping_and_not_of_what_multiplies_all() -> None:
+    force = 'load = { of = "carriage.table.force", values = [1e3, 1.2e3] }'
+    text = scenes.text_of("passage", f"{force}\n{scenes.pace('passage')}\n{DAMPING}")
+    text = text.replace('kind = "mass"\nmass = 100.0', 'kind = "force"\nforce = 1e3')
+    largest = answers.figures(studies.run(engine.load(text)))[0]
+    legends = [legend for axes in largest.drawing.axes if (legend := axes.get_legend()) is not None]
+    assert [legend.get_title().get_text() for legend in legends] == ["zeta"]
+    assert "Held at load 1.2 kN (in the study file 1 kN)." in largest.caption
+
+
 def test_curves_that_are_known_loosely_are_dashed_and_the_caption_says_which() -> None:
     dataset = scenes.run("passage", f"{scenes.pace('passage', count=20)}\n{DAMPING}")
     one = dataset["estimated_error"].sel(result="midspan_max").copy()
@@ -117,6 +129,12 @@ def test_curves_that_are_known_loosely_are_dashed_and_the_caption_says_which() -
     assert "Dashed: midspan estimated to within more than 5 %." in largest.caption
     solid = next(line for line in panels[0].lines if line.get_linestyle() == "-")
     assert np.isnan(np.asarray(solid.get_ydata(), dtype=float)).nonzero()[0].tolist() == [5, 6, 7, 8]
+
+
+def test_a_history_that_is_known_loosely_is_told_in_its_caption() -> None:
+    found = answers.figures(scenes.with_errors(scenes.run("passage", scenes.pace("passage")), 0.4, "moment"))
+    response = next(figure for figure in found if figure.name == "response")
+    assert response.caption.endswith(" moment: estimated to within 40 %.")
 
 
 def test_a_caption_tells_what_is_held_beside_what_the_study_file_has() -> None:
