@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import studies
 from engine.batch.plan import make_plan
 from engine.scene.study import load
 from studies.commands import catalogue
@@ -71,8 +72,11 @@ def test_the_readme_is_two_screens() -> None:
 
 def test_study_files_run() -> None:
     whole = [load(block) for _, block in examples("toml") if "schema_version" in block]
-    sizes = [make_plan(s, reduction=kind_of(s).reduction(s), results=s.kind).size for s in whole]
+    marched = [study for study in whole if not study.frame]
+    sizes = [make_plan(s, reduction=kind_of(s).reduction(s), results=s.kind).size for s in marched]
     assert sizes == [160, 1, 5, 156]
+    (moving,) = (study for study in whole if study.frame)
+    assert studies.run(moving)["status"].size == 1
 
 
 def test_pieces_of_study_files_are_toml() -> None:

@@ -166,10 +166,10 @@ def converge(
         now, spent = march(own, level)
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
-        left_over = _left_over(apart, change[:, active])
-        found = _updated(found, active, now, spent, left_over)
+        remaining = left_over(apart, change[:, active])
+        found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
-        off = worst_held(left_over, decisive, own.tighter)
+        off = worst_held(remaining, decisive, own.tighter)
         too_dear = _is_dear(grid, own, levels, level + 1, beyond.dear)
         settled = (off <= part) | ((off <= DOUBTED) & too_dear)
         found.settled[active] = settled
@@ -187,7 +187,7 @@ def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int,
     return _units(grid) * level_work(grid, values, levels, level) > dear
 
 
-def _left_over(change: Array, before: Array) -> Array:
+def left_over(change: Array, before: Array) -> Array:
     """(R, V) the error of a level from the change that led to it, and the one before that (NaN where there is none)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.clip(change / before, 0.0, 0.99)

@@ -109,6 +109,12 @@ def piece(function: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], numba.njit(inline="always", **_POLICY)(function))
 
 
+def called(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function that kernels alone call, without what calls from Python need; the cache has it in theirs."""
+    bare: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return cast(Callable[..., Any], numba.njit(**bare, **_POLICY)(function))
+
+
 def chosen_for(stub: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorate what picks, by the types of a call's arguments, the piece that stands for ``stub`` inside kernels."""
     return cast(Callable[[Callable[..., Any]], Callable[..., Any]], overload(stub, inline="always"))

@@ -248,8 +248,18 @@ def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
     return build_model(model.study, *model.timing, model.swept, numerics)
 
 
+def check_stands(study: Study) -> None:
+    """Refuse bodies whose frames move and carriages that slide by themselves. Raises BadInput."""
+    movers = [f"frame.{name}" for name in study.frame]
+    movers += [f"carriage.{name}.motion" for name, carriage in study.carriage.items() if carriage.motion.slides]
+    if movers:
+        what = f"in studies of the kind {study.kind} bodies stand, and carriages go where they are told"
+        raise study.source.fault(movers[0], what, expected='kind = "moving-frames"')
+
+
 def check_moves(study: Study) -> None:
-    """Refuse a study without a carriage. Raises BadInput."""
+    """Refuse a study without a carriage, or in which bodies do not stand. Raises BadInput."""
+    check_stands(study)
     if not study.carriage:
         raise study.source.fault("carriage", "nothing moves", expected="at least one table [carriage.name]")
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
 from engine.scene.motions import AnyMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, form_of_amount, kinds
-from engine.study_file.units import Damping, Force, Length, Mass, Stiffness, Time, fault
+from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
 
@@ -145,7 +145,8 @@ class ForceCarriage(Carriage):
 
 class MassCarriage(Carriage):
     """A rigid mass in kg that stays in contact; its weight acts. inertia_along: the mass also pushes along its track,
-    by -m (s'' + u''), u the motion of the track along itself."""
+    by -m (s'' + u''), u the motion of the track along itself. In frames that move: inertia (kg m2) about its centre of
+    mass, along x, y, z of its track, with which it turns; height: m of that centre below the track (or above: < 0)."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass",)
     touching: ClassVar[tuple[str, ...]] = ("mass",)
@@ -153,6 +154,8 @@ class MassCarriage(Carriage):
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
     inertia_along: bool = False
+    inertia: Annotated[tuple[Inertia, Inertia, Inertia], Strict(False)] = (0.0, 0.0, 0.0)
+    height: Length = 0.0
 
     @property
     def pushes_along(self) -> bool:

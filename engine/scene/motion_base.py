@@ -53,6 +53,7 @@ class Motion(Spec):
     period: ClassVar[float | None] = None  # tau after which the path repeats
     pace: ClassVar[Literal["speed", "frequency"] | None] = None  # the key of a number that all its speeds grow with
     passes: ClassVar[bool] = False  # whether the carriage is on the body while it moves only
+    slides: ClassVar[bool] = False  # whether its place is an unknown of the equations of motion
     is_harmonic: ClassVar[bool] = False  # whether it swings as a sine about the middle of its range
     if TYPE_CHECKING:
 

@@ -13,7 +13,7 @@ from pydantic import Field, Strict, model_validator
 from engine.scene.motion_base import Array, Legs, Motion, Path, Reversal, Side
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
-from engine.study_file.units import Dimensionless, Frequency, Length, Speed, Time, fault
+from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
 
 
 class Cruise(Motion):
@@ -245,8 +245,47 @@ class Waypoints(Motion):
         return knots, *self.path(knots)[1:]
 
 
-MOTIONS = kinds("motion", "wanderlast.motions", Motion, Cruise, OutAndBack, Sinusoidal, Waypoints)
-AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS, planned=("free",))]
+class Sliding(Motion):
+    """Slides on its own from a place, with a speed: its place is unknown (mechanics.md, section 12).
+
+    friction: viscous, N s/m. coulomb: coefficient of dry friction, which sets in over the speed slip_speed (tanh).
+    drive: force along the track, N.
+    """
+
+    slides = True
+    kind: Literal["free"]
+    start: Length
+    speed: Speed = 0.0
+    friction: Damping = Field(default=0.0, ge=0)
+    coulomb: Dimensionless = Field(default=0.0, ge=0)
+    slip_speed: Speed = Field(default=1e-3, gt=0)
+    drive: Force = 0.0
+
+    @property
+    def time_scale(self) -> float:
+        return 1.0
+
+    @property
+    def duration(self) -> float:
+        return 1.0
+
+    @property
+    def max_speed(self) -> float:
+        return abs(self.speed)
+
+    def range(self) -> tuple[float, float]:
+        return self.start, self.start
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        return [on_body(f"{here}.start", (f"{here}.start", length), "a carriage that slides starts on its body")]
+
+    def law(self, tau: Array, side: Side) -> Path:
+        """Where it starts: nothing else is known beforehand."""
+        return Path(np.full_like(tau, self.start), np.zeros_like(tau), np.zeros_like(tau))
+
+
+MOTIONS = kinds("motion", "wanderlast.motions", Motion, Cruise, OutAndBack, Sinusoidal, Waypoints, Sliding)
+AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 
 _NO_TOUCH = "the path never touches its body"
 _TOUCHING = "a path with a part between 0 and the body's length"

@@ -16,6 +16,7 @@ from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
 from engine.bodies.modal.section_doubts import Doubt
 from engine.scene.carriages import AnyCarriage, Carriage
+from engine.scene.frames import GROUND, Frame
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
@@ -63,6 +64,7 @@ class Scene(Trains):
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
     initial: Literal["rest", "equilibrium"] | None = None
     body: dict[str, AnyBody] = Field(default_factory=dict)
+    frame: dict[str, Frame] = Field(default_factory=dict)
     carriage: dict[str, AnyCarriage] = Field(default_factory=dict)
     sensor: dict[str, Sensor] = Field(default_factory=dict)
     envelope: dict[str, Envelope] = Field(default_factory=dict)
@@ -125,9 +127,12 @@ class Study(Scene):
 
     @property
     def start(self) -> Literal["rest", "equilibrium"]:
-        """How the march starts: as given, else from rest if every carriage cruises, else from equilibrium."""
+        """How the march starts: as given, else from rest if every carriage cruises or frames move, else from
+        equilibrium."""
         if self.initial is not None:
             return self.initial
+        if self.frame or any(c.motion.slides for c in self.carriage.values()):
+            return "rest"
         return "rest" if all(c.motion.passes for c in self.carriage.values()) else "equilibrium"
 
     @property
@@ -278,6 +283,8 @@ def checks(study: Study) -> Iterator[Check]:
     """All conditions between numbers of a study, in the order in which they make sense."""
     for name, body in study.body.items():
         yield from body.checks(f"body.{name}")
+    for name, frame in study.frame.items():
+        yield from frame.checks(name)
     for name, carriage in study.carriage.items():
         yield from carriage.checks(f"carriage.{name}")
     for name, sensor in study.sensor.items():
@@ -368,6 +375,10 @@ def _check_names(study: Study) -> None:
 
 def _check_references(study: Study) -> None:
     """Every name that is mentioned exists, and sensors suit their bodies."""
+    for name, frame in study.frame.items():
+        _must_exist(study, f"frame.{name}", name, "body")
+        if frame.on != GROUND:
+            _must_exist(study, f"frame.{name}.on", frame.on, "body")
     for name, carriage in study.carriage.items():
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():

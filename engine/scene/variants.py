@@ -159,7 +159,7 @@ class VariantValues:
     @property
     def scene_time_scale(self) -> Array:
         """(V,) seconds per unit of scene time."""
-        return self.time_scale(self.study.clock)
+        return self.time_scale(self.study.clock) if self.study.carriage else np.ones(self.size)
 
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""

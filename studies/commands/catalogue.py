@@ -94,14 +94,15 @@ def as_typed(study: str) -> str:
 
 
 def start_text(kind: str) -> str:
-    """A study file to start from: what is special about the kind, then every key that all kinds share; or a built-in
-    study, by its name where no kind has it.
+    """A study file to start from: what is special about the kind, then every key that the kinds share whose bodies
+    stand; or a built-in study, by its name where no kind has it.
 
     Raises BadInput for an unknown name.
     """
     known, shared = starts(), EVERY_STUDY.read_text(encoding="utf-8")
     if kind in known:
-        return known[kind].read_text(encoding="utf-8") + shared
+        own = known[kind].read_text(encoding="utf-8")
+        return own if "[frame." in own else own + shared
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:

@@ -42,8 +42,9 @@ class Kind:
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
     settings: the class of its table [question], None where it has none. sweeps: whether it takes a [sweep], whose grid
     is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
-    failure of the run. drawn_by: the module whose `pictures` makes its figures of the results. start: a study file to
-    start from, of a kind of another package.
+    failure of the run. moves_frames: whether frames of bodies may move, and carriages slide by themselves. drawn_by:
+    the module whose `pictures` makes its figures of the results. start: a study file to start from, of a kind of
+    another package.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Kind:
     settings: type[Spec] | None = None
     sweeps = True
     drawn_by = ""
+    moves_frames = False
     start: str
 
     def check(self, study: Study) -> None:
@@ -222,7 +224,11 @@ def kind_named(name: str, where: str = "kind") -> Kind:
 
 def kind_of(study: Study) -> Kind:
     """The kind of a study, after its check. Raises BadInput."""
+    from engine.model.scene_model import check_stands
+
     kind = kind_named(study.kind, study.source.where("kind"))
+    if not kind.moves_frames:
+        check_stands(study)
     kind.check_tables(study)
     kind.check(study)
     return kind

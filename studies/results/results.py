@@ -316,7 +316,8 @@ class Results:
 
     def traced(self) -> list[Index]:
         """The variants whose values and histories are kept, in the order of their flat numbers."""
-        names = [name for name in self.sensors if name in self.dataset]
+        traces = (*self.sensors, *(f"{name}_position" for name in self.study.carriage), "end_place")
+        names = [name for name in traces if name in self.dataset]
         if not names:
             return []
         stored = self.dataset[names[0]]

@@ -109,7 +109,7 @@ def _model_findings(root: xr.Dataset, study: Study, groups: Mapping[str, xr.Data
     for path in groups:
         if path.removeprefix(MODELS) not in study.body:
             yield f"{path}: expected a body of the study"
-    if not is_marched(root):
+    if not is_marched(root) or not study.carriage:
         return
     name = next(iter(study.carriage.values())).on
     if study.body[name].recorded is None:

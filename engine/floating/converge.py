@@ -1,0 +1,174 @@
+"""Marches with more and more steps, and modes where these are open, until what they report stays where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.reference import left_over
+from engine.floating.march import march
+from engine.floating.model import build
+from engine.floating.results import Outcome, Result, differences, outcome, results_of
+from engine.kernels.floating.layout import Weights
+from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
+from engine.march.stepper import Halted
+from results_schema.arrays import Array, Counts
+from results_schema.errors import BadInput
+from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.floating.model import FloatingModel
+    from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
+
+#: Steps per first elastic period of the coarsest level, and its modes of bending where these are open; both double.
+#: A sliding mass at 1e-3 ends at the third level, 100 steps.
+FIRST_STEPS, FIRST_MODES = 25, 2
+MOST_STEPS, MOST_MODES = 4_000_000, 32
+LEVELS = 12
+HOPELESS = 32  # times the coarsest steps, at which a march that fails is given up
+STATIONS = 800  # at which histories are compared and kept
+#: Of its limit: joints and masses shift the frequencies of bodies; where too far, measured errors show it.
+FAR_WITHIN = 0.8
+ENOUGH = 0.5  # of the tolerance by which an answer may be told to be off, as in a march of bodies that stand
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A model, and steps over the whole time by a scheme."""
+
+    model: FloatingModel
+    steps: int
+    scheme: NewmarkScheme | AlphaScheme
+
+
+@dataclass(frozen=True, eq=False)
+class Converged:
+    """What V variants report: error (R, V) of every result, NaN where no estimate exists; modes, steps (V,) that each
+    took; unresolved and missed (V,): whether what is held has no estimate, or one beyond its tolerance."""
+
+    outcome: Outcome
+    error: Array
+    modes: Counts
+    steps: Counts
+    scheme: NewmarkScheme | AlphaScheme
+    status: NDArray[np.int8]
+
+
+def levels(study: Study, duration: float) -> Iterator[Level]:
+    """Coarse to fine, for a time (s) that the longest of the variants takes."""
+    fixed = study.solver.steps
+    is_open = any(body.modes == "auto" and hasattr(body, "modes_are_open") for body in study.body.values())
+    model = build(study, FIRST_MODES)
+    least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
+    first = STATIONS * max(1, int(np.ceil(least / STATIONS)))
+    scheme = scheme_of(study, duration / first * model.highest_omega)
+    for level in range(LEVELS):
+        steps = first * 2**level if fixed == "auto" else int(fixed) * 2**level
+        modes = FIRST_MODES * 2**level
+        if steps > MOST_STEPS or (fixed != "auto" and level > 1) or (is_open and modes > MOST_MODES):
+            return
+        yield Level(build(study, modes) if is_open and level else model, steps, scheme)
+
+
+def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:
+    """The scheme that a study asks for; else Fox-Goodwin, whose phase is of fourth order, unless its limit would ask
+    for more steps than the coarsest march has, of which omega h is given. Raises BadInput for one that does not march
+    frames."""
+    if study.solver.scheme == "auto":
+        name = "fox-goodwin" if coarsest < FAR_WITHIN * SCHEMES["fox-goodwin"]({}).stability_limit else ""
+        found = SCHEMES[name or "average-acceleration"]({})
+        assert isinstance(found, NewmarkScheme)
+        return found
+    scheme = study.solver.integration
+    if isinstance(scheme, NewmarkScheme | AlphaScheme) and scheme.stride == 1:
+        return scheme
+    raise BadInput(
+        "this scheme does not march frames that move",
+        where=study.source.where("solver.scheme"),
+        expected="auto, average-acceleration, fox-goodwin, newmark, hht-alpha or generalized-alpha",
+        received=study.solver.scheme,
+    )
+
+
+def weights(scheme: NewmarkScheme | AlphaScheme) -> Weights:
+    """A scheme as kernels take it."""
+    if isinstance(scheme, AlphaScheme):
+        return Weights(scheme.beta, scheme.gamma, scheme.m, scheme.f)
+    return Weights(scheme.beta, scheme.gamma, 0.0, 0.0)
+
+
+def converge(
+    study: Study,
+    values: VariantValues,
+    duration: Array,
+    halted: Callable[[], bool] = lambda: False,
+) -> Converged:
+    """March variants of one scene level by level; duration (V,) s. Where the study fixes the steps, these are marched,
+    and twice as many to tell the error. Raises Halted."""
+    V = values.size
+    found: Outcome | None = None
+    active = np.arange(V)
+    for level in levels(study, float(duration.max())):
+        if halted():
+            raise Halted
+        model, own = level.model, values.part(active)
+        now = outcome(model, march(model, own, duration[active], level.steps, _stations(level), weights(level.scheme)))
+        if found is None:
+            found, results, scheme = now, results_of(model), level.scheme
+            error = np.full((len(results), V), np.nan)
+            change, held = error.copy(), np.full(V, np.nan)
+            modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
+            continue
+        apart = differences(model, _part(found, active), now)
+        told = left_over(apart, change[:, active])
+        error[:, active], change[:, active] = told, apart
+        modes[active], steps[active] = model.modes, level.steps
+        found = _replaced(found, active, now)
+        held[active] = _worst(told, results, own)
+        failed = now.status >= Status.NOT_CONVERGED
+        hopeless = failed & (level.steps >= HOPELESS * coarsest)
+        active = active[~(held[active] <= ENOUGH) & ~hopeless]
+        if not active.size:
+            break
+    assert found is not None
+    none_held = ~np.any(np.isfinite([result.tolerance for result in results]))
+    unresolved = np.isnan(held) & ~none_held
+    status = np.where(unresolved, Status.UNRESOLVED, np.where(held > 1.0, Status.TOLERANCE_MISSED, Status.OK))
+    lost = found.status >= Status.NOT_CONVERGED
+    error[:, lost] = np.nan
+    return Converged(found, error, modes, steps, scheme, np.maximum(status, found.status).astype(np.int8))
+
+
+def _stations(level: Level) -> Counts:
+    """Stations at the same times on every level."""
+    every = max(1, level.steps // STATIONS)
+    return np.arange(0, level.steps + 1, every, dtype=np.int64)[: STATIONS + 1]
+
+
+def _worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> Array:
+    """(V,) the largest error of what is held over its tolerance; 0 where nothing is."""
+    found = np.zeros(error.shape[1])
+    for result, own in zip(results, error, strict=True):
+        if np.isfinite(result.tolerance):
+            found = np.maximum(found, own / (result.tolerance * (values.tighter if result.follows else 1.0)))
+    return found
+
+
+def _part(found: Outcome, lanes: Counts) -> Outcome:
+    numbers = {name: array[lanes] for name, array in found.numbers.items()}
+    return Outcome(numbers, found.history[lanes], found.times[lanes], found.status[lanes])
+
+
+def _replaced(found: Outcome, lanes: Counts, other: Outcome) -> Outcome:
+    """The same with the outcome of other marches for some of the variants."""
+    if lanes.size == found.status.size:
+        return other
+    for name, array in found.numbers.items():
+        array[lanes] = other.numbers[name]
+    found.history[lanes], found.times[lanes], found.status[lanes] = other.history, other.times, other.status
+    return found

@@ -1,0 +1,150 @@
+"""What differs from variant to variant of a scene with frames that move: numbers by their keys, as kernels take
+them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.kernels.floating import layout as columns
+from engine.kernels.floating.layout import Lane
+from engine.scene.frames import AxisJoint, Free, Spherical
+from engine.scene.motions import Cruise, Sinusoidal
+from engine.scene.time_motions import AMPLITUDE, CONSTANT, RATE, START, spline_pieces
+from engine.scene.variants import VariantValues
+from results_schema.arrays import Array
+
+if TYPE_CHECKING:
+    from engine.floating.model import FloatingModel, OneJoint
+
+#: Keys of numbers that a variant may have to itself within one scene.
+OWN_KEYS = re.compile(
+    r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?"
+    r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|inertia\.\d|height)|carriage\.\w+\.motion\..+"
+    r"|frame\.\w+\.joints\.\d+\.(start|rate(\.\d)?|velocity\.\d|stiffness|damping|motion\..+)"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Numbers (V,) of a scene's variants by dotted key."""
+
+    model: FloatingModel
+    values: VariantValues
+
+    def of(self, key: str) -> Array:
+        """(V,) of a key; 0 where it is not set."""
+        column = self.values.columns.get(key)
+        if column is not None:
+            return np.asarray(column, dtype=np.float64)
+        value = self.model.study.value(key)
+        return np.full(self.values.size, 0.0 if value is None else float(value))
+
+
+def lanes(model: FloatingModel, values: VariantValues) -> Lane:
+    """The table of some variants."""
+    numbers, V = Numbers(model, values), values.size
+    gravity = np.zeros((V, 3))
+    gravity[:, 2] = numbers.of("gravity")
+    start = np.zeros((V, 2, model.size))
+    joints = np.zeros((V, len(model.joints), 2))
+    for j, joint in enumerate(model.joints):
+        _start_joint(joint, numbers, start, joints[:, j])
+    carriages = np.zeros((V, len(model.study.carriage), columns.CARRIAGE))
+    for c, name in enumerate(model.study.carriage):
+        _carriage(model, numbers, name, start, carriages[:, c])
+    motions = _motions(model, numbers)
+    return Lane(gravity, _damping(model, values), joints, carriages, motions, _events(motions), start)
+
+
+def _start_joint(joint: OneJoint, numbers: Numbers, start: Array, springs: Array) -> None:
+    """Coordinates and rates of a joint at time 0, its spring and its damper."""
+    key, k, spec = f"frame.{joint.body}.joints.{joint.number}", joint.coordinate, joint.spec
+    if isinstance(spec, AxisJoint):
+        springs[:, 0], springs[:, 1] = numbers.of(f"{key}.stiffness"), numbers.of(f"{key}.damping")
+        if k >= 0:
+            start[:, 0, k], start[:, 1, k] = numbers.of(f"{key}.start"), numbers.of(f"{key}.rate")
+    elif isinstance(spec, Free) and joint.kind == columns.PRISMATIC:
+        start[:, 1, k] = numbers.of(f"{key}.velocity.{int(np.argmax(joint.axis))}")
+    else:
+        for axis in range(3):
+            start[:, 1, k + axis] = numbers.of(f"{key}.rate.{axis}")
+        if isinstance(spec, Spherical):
+            springs[:, 1] = numbers.of(f"{key}.damping")
+
+
+def _carriage(model: FloatingModel, numbers: Numbers, name: str, start: Array, own: Array) -> None:
+    """A carriage's masses, its spring, its friction and where it starts."""
+    spec, key = model.study.carriage[name], f"carriage.{name}"
+    own[:, columns.OWN_MASS] = sum((numbers.of(f"{key}.{part}") for part in spec.touching), np.zeros(len(own)))
+    own[:, columns.SLIP] = 1.0
+    if spec.suspension is not None:
+        for column, part in ((columns.SPRUNG_MASS, "mass"), (columns.SPRING, "stiffness"), (columns.DAMPER, "damping")):
+            own[:, column] = numbers.of(f"{key}.{part}")
+    else:
+        for axis in range(3):
+            own[:, columns.INERTIA + axis] = numbers.of(f"{key}.inertia.{axis}")
+        own[:, columns.HEIGHT] = numbers.of(f"{key}.height")
+    if name in model.places:
+        k = model.places[name]
+        start[:, 0, k], start[:, 1, k] = numbers.of(f"{key}.motion.start"), numbers.of(f"{key}.motion.speed")
+        keys = {"drive": columns.DRIVE, "friction": columns.VISCOUS, "coulomb": columns.COULOMB}
+        for word, column in (keys | {"slip_speed": columns.SLIP}).items():
+            own[:, column] = numbers.of(f"{key}.motion.{word}")
+
+
+def _damping(model: FloatingModel, values: VariantValues) -> Array:
+    """(V, B n): 2 zeta omega."""
+    n = max(1, *(body.omega.size for body in model.bodies.values()))
+    found = np.zeros((values.size, len(model.bodies), n))
+    for b, (name, body) in enumerate(model.bodies.items()):
+        if body.omega.size:
+            found[:, b, : body.omega.size] = values.damping_rates(name, body.omega).T
+    return found.reshape(values.size, -1)
+
+
+def _motions(model: FloatingModel, numbers: Numbers) -> Array:
+    """(V, M, pieces, 10); those with fewer pieces have others that never begin."""
+    found = [_pieces(model, numbers, key) for key in model.motions]
+    most = max((one.shape[1] for one in found), default=1)
+    table = np.zeros((numbers.values.size, len(found), most, columns.PIECE))
+    table[:, :, :, START] = np.inf
+    for m, one in enumerate(found):
+        table[:, m, : one.shape[1]] = one
+    return table
+
+
+def _events(motions: Array) -> Array:
+    """(V, E) times at which a motion goes on as another piece."""
+    starts = np.sort(motions[:, :, 1:, START].reshape(len(motions), -1), axis=1)
+    again = np.concatenate([np.zeros((len(motions), 1), dtype=bool), np.diff(starts, axis=1) == 0.0], axis=1)
+    return np.sort(np.where(again[:, : starts.shape[1]], np.inf, starts), axis=1)
+
+
+def _pieces(model: FloatingModel, numbers: Numbers, key: str) -> Array:
+    """(V, pieces, 10) of what is given in time at a key."""
+    table, name, *rest = key.split(".")
+    if table == "frame":
+        joint = model.frame(name).joints[int(rest[1])]
+        assert isinstance(joint, AxisJoint) and joint.motion is not None
+        return joint.motion.pieces(lambda word: numbers.of(f"{key}.{word}"))
+    motion = model.study.carriage[name].motion
+    if isinstance(motion, Cruise):
+        start, end, speed = (numbers.of(f"{key}.{word}") for word in ("start", "end", "speed"))
+        found = np.zeros((start.size, 2, columns.PIECE))
+        found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = start, np.sign(end - start) * speed
+        found[:, 1, START], found[:, 1, CONSTANT] = np.abs(end - start) / speed, end
+        return found
+    if isinstance(motion, Sinusoidal):
+        found = np.zeros((numbers.values.size, 1, columns.PIECE))
+        found[:, 0, CONSTANT], found[:, 0, AMPLITUDE] = numbers.of(f"{key}.centre"), numbers.of(f"{key}.amplitude")
+        found[:, 0, RATE] = 2.0 * np.pi * numbers.of(f"{key}.frequency")
+        return found
+    count = len(model.study.value(f"{key}.times"))
+    times, places = (
+        np.stack([numbers.of(f"{key}.{word}.{k}") for k in range(count)], axis=1) for word in ("times", "positions")
+    )
+    return np.stack([spline_pieces(*pair) for pair in zip(times, places, strict=True)])

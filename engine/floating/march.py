@@ -1,0 +1,59 @@
+"""Variants of one scene with frames that move, marched, and what is observed of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.floating.lanes import lanes
+from engine.kernels.floating import layout
+from engine.kernels.floating.layout import Record, Weights
+from engine.kernels.floating.march import march as march_lanes
+from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
+from results_schema.arrays import Array, Counts
+from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.floating.model import FloatingModel
+    from engine.scene.variants import VariantValues
+
+STATUS = np.array([Status.OK, Status.NOT_CONVERGED, Status.DIVERGED, Status.SEPARATED], dtype=np.int8)
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """What a march of V variants leaves: statistics (V, signals, STATISTICS), history (V, stations, signals) with its
+    times (V, stations) s, statuses (V,), the step (V,) s, and the last station that each has reached (V,)."""
+
+    statistics: Array
+    history: Array
+    times: Array
+    status: NDArray[np.int8]
+    step: Array
+    last: Counts
+
+
+def march(
+    model: FloatingModel, values: VariantValues, duration: Array, steps: int, stations: Counts, scheme: Weights
+) -> Marched:
+    """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending)."""
+    V, signals = values.size, model.signals
+    statistics = np.zeros((V, signals, layout.STATISTICS))
+    statistics[:, :, layout.LARGEST], statistics[:, :, layout.SMALLEST] = -np.inf, np.inf
+    history = np.full((V, stations.size, signals), np.nan)
+    codes, last = np.zeros(V, dtype=np.int64), np.zeros(V, dtype=np.int64)
+    h = duration / steps
+    first = model.signal_of("carriages") + CONTACT_FORCE
+    table = lanes(model, values)
+    record = Record(np.asarray(stations), statistics, history, codes, last)
+    march_lanes(model.system, table, scheme, steps, h, record)
+    # without gravity nothing lies on a track: it holds what moves on it
+    heavy = table.gravity[:, 2] > 0.0
+    lifts = heavy & (
+        statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST].min(axis=1, initial=0.0) < 0.0
+    )
+    status = np.maximum(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
+    return Marched(statistics, history, stations * h[:, None], status, h, last)

@@ -1,0 +1,380 @@
+"""A study's bodies, frames and carriages as the tables that kernels march, and the names of all coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from engine.floating.elastic import CELLS, ElasticBody, Z, elastic_body
+from engine.kernels.floating import layout as columns
+from engine.kernels.floating.layout import System
+from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
+from engine.scene.frames import GROUND, AxisJoint, Frame, Free, Joint, Prismatic, Spherical
+from results_schema.arrays import Array, Counts
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.scene.carriages import Carriage
+    from engine.scene.sensors import Sensor
+    from engine.scene.study import Study
+
+HELD = 1e-9  # of the largest: a shape below is zero
+
+
+@dataclass(frozen=True)
+class OneJoint:
+    """A joint as kernels have it: free ones of a study are three that slide and one that turns."""
+
+    body: str
+    number: int
+    spec: Joint
+    kind: int
+    axis: tuple[float, float, float]
+    coordinate: int
+    motion: int
+
+
+@dataclass(frozen=True, eq=False)
+class FloatingModel:
+    """One scene with frames that move. bodies: in the order of the tree, by name; modes: of bending, where left open.
+
+    motions: dotted keys of what is given in time, in order; size: number of coordinates; places, springs: coordinates
+    of carriages that slide and of sprung masses, by carriage.
+    """
+
+    study: Study
+    bodies: dict[str, ElasticBody]
+    joints: tuple[OneJoint, ...]
+    first: dict[str, int]
+    places: dict[str, int]
+    springs: dict[str, int]
+    motions: tuple[str, ...]
+    size: int
+
+    def frame(self, name: str) -> Frame:
+        """How a body's frame moves."""
+        return self.study.frame.get(name) or Frame()
+
+    @property
+    def modes(self) -> int:
+        """Elastic coordinates of all bodies."""
+        return sum(body.omega.size for body in self.bodies.values())
+
+    @property
+    def first_omega(self) -> float:
+        """The lowest elastic frequency, rad/s; that of one period in a second where nothing bends."""
+        found = [body.omega.min() for body in self.bodies.values() if body.omega.size]
+        return float(min(found)) if found else 2.0 * np.pi
+
+    @property
+    def highest_omega(self) -> float:
+        """The highest elastic frequency of a body, rad/s."""
+        return float(max((body.omega.max() for body in self.bodies.values() if body.omega.size), default=0.0))
+
+    @cached_property
+    def system(self) -> System:
+        """The tables."""
+        return _system(self)
+
+    @property
+    def signals(self) -> int:
+        """How many signals kernels observe."""
+        bodies = len(self.bodies)
+        carriages = OF_CARRIAGE * len(self.study.carriage)
+        return len(self.study.sensor) + carriages + (OF_POINT + OF_BODY) * bodies + OF_WHOLE
+
+    def signal_of(self, group: str) -> int:
+        """Number of the first signal of the sensors, carriages, ends, frames, or of the whole."""
+        counts = {
+            "sensors": len(self.study.sensor),
+            "carriages": OF_CARRIAGE * len(self.study.carriage),
+            "ends": OF_POINT * len(self.bodies),
+            "frames": OF_BODY * len(self.bodies),
+            "whole": OF_WHOLE,
+        }
+        names = list(counts)
+        return sum(counts[name] for name in names[: names.index(group)])
+
+
+def build(study: Study, modes: int | None = None) -> FloatingModel:
+    """The model of a study without its sweep. Raises BadInput for what is not built or cannot be."""
+    _check(study)
+    names = list(_in_order(study))
+    bodies = {
+        name: elastic_body(study.body[name], study.frame.get(name) or Frame(), modes, f"body.{name}") for name in names
+    }
+    joints: list[OneJoint] = []
+    motions: list[str] = []
+    first: dict[str, int] = {}
+    size = 0
+    for name in names:
+        for joint in _joints(study, name, size, motions):
+            joints.append(joint)
+            size += 0 if joint.coordinate < 0 else 3 if joint.kind == columns.SPHERICAL else 1
+        first[name] = size
+        size += bodies[name].omega.size
+    places, springs = {}, {}
+    for name, carriage in study.carriage.items():
+        if carriage.motion.slides:
+            places[name], size = size, size + 1
+        else:
+            motions.append(f"carriage.{name}.motion")
+        if carriage.suspension is not None:
+            springs[name], size = size, size + 1
+    if size == 0:
+        raise BadInput("nothing here can move by itself", where=study.source.where("frame"), expected="a joint, a mode")
+    found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size)
+    _check_held(found)
+    return found
+
+
+def _check(study: Study) -> None:
+    """Refuse what frames that move do not know."""
+    where = study.source.where
+    if study.initial == "equilibrium":
+        raise BadInput("bodies in frames that move start undeformed", where=where("initial"), expected='"rest"')
+    for name, body in study.body.items():
+        if not body.own_weight and study.gravity > 0.0:
+            raise BadInput(
+                "bodies in frames that move carry their own weight",
+                where=where(f"body.{name}.own_weight"),
+                expected="own_weight = true",
+            )
+    for name, carriage in study.carriage.items():
+        _check_carriage(study, name, carriage)
+    for name, sensor in study.sensor.items():
+        _check_sensor(study, name, sensor)
+
+
+def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
+    """Refuse a carriage of another kind, with another motion, or that starts later."""
+    where = study.source.where
+    if carriage.kind not in ("mass", "oscillator"):
+        raise BadInput(
+            "carriages of this kind on bodies in frames that move are not built yet",
+            where=where(f"carriage.{name}.kind"),
+            expected="mass or oscillator",
+            received=carriage.kind,
+        )
+    if not carriage.motion.slides and carriage.motion.kind not in ("cruise", "sinusoidal", "waypoints"):
+        raise BadInput(
+            "this motion on bodies in frames that move is not built yet",
+            where=where(f"carriage.{name}.motion.kind"),
+            expected="free, cruise, sinusoidal or waypoints",
+            received=carriage.motion.kind,
+        )
+    if carriage.start_time > 0.0:
+        raise BadInput("carriages here set off at time 0", where=where(f"carriage.{name}.delay"), expected="0")
+
+
+def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
+    """Refuse a sensor of another place or quantity."""
+    where, where_quantity = study.source.where(f"sensor.{name}"), study.source.where(f"sensor.{name}.quantity")
+    if sensor.spot is not None or sensor.carriage is not None:
+        raise BadInput("this place is not read in frames that move", where=where, expected="at, or under")
+    if sensor.under is not None and sensor.quantity != "displacement":
+        raise BadInput(
+            "under a carriage only the displacement is read here", where=where_quantity, expected="displacement"
+        )
+    if sensor.quantity == "axial_force":
+        raise BadInput(
+            "axial_force is not available here", where=where_quantity, expected="displacement, bending_moment, …"
+        )
+
+
+def _in_order(study: Study) -> Iterator[str]:
+    """Bodies, each after the one that it hangs on. Raises BadInput for a closed loop."""
+    left = list(study.body)
+    done: set[str] = {GROUND}
+    while left:
+        ready = [name for name in left if (study.frame.get(name) or Frame()).on in done]
+        if not ready:
+            raise BadInput(
+                "closed loops of bodies are not built: bodies stand in a tree",
+                where=study.source.where(f"frame.{left[0]}.on"),
+                expected='"ground" at one of them',
+                received=", ".join(left),
+            )
+        for name in ready:
+            yield name
+            left.remove(name)
+            done.add(name)
+
+
+def _joints(study: Study, name: str, size: int, motions: list[str]) -> Iterator[OneJoint]:
+    """The joints of a body from outside in; motions takes up what is given."""
+    for number, joint in enumerate((study.frame.get(name) or Frame()).joints):
+        if isinstance(joint, Free):
+            for axis in np.eye(3):
+                yield OneJoint(name, number, joint, columns.PRISMATIC, tuple(axis), size, -1)
+                size += 1
+            yield OneJoint(name, number, joint, columns.SPHERICAL, (0.0, 0.0, 0.0), size, -1)
+            size += 3
+        elif isinstance(joint, Spherical):
+            yield OneJoint(name, number, joint, columns.SPHERICAL, (0.0, 0.0, 0.0), size, -1)
+            size += 3
+        else:
+            assert isinstance(joint, AxisJoint)
+            motion = -1
+            if joint.motion is not None:
+                motion = len(motions)
+                motions.append(f"frame.{name}.joints.{number}.motion")
+            axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+            kind = columns.PRISMATIC if isinstance(joint, Prismatic) else columns.REVOLUTE
+            yield OneJoint(name, number, joint, kind, tuple(axis), -1 if joint.is_driven else size, motion)
+            size += 0 if joint.is_driven else 1
+
+
+def _check_held(model: FloatingModel) -> None:
+    """A frame sits where the shapes of its body vanish, unless that moves freely or has rotations that joints leave
+    free."""
+    for name, body in model.bodies.items():
+        joints = model.frame(name).joints
+        if not body.omega.size or any(isinstance(joint, Free) for joint in joints):
+            continue
+        at = body.fields(np.zeros(1), (0,))[0, 0]
+        far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0]).max(axis=(0, 2))
+        moved = np.abs(at).max(axis=1) > HELD * np.maximum(far, 1e-300)
+        where = model.study.source.where(f"body.{name}.supports")
+        if moved[: Z + 1].any():
+            raise BadInput(
+                "the track begins where its joint holds it: its shapes must vanish there",
+                where=where,
+                expected="pinned or clamped at its beginning",
+            )
+
+
+def _system(model: FloatingModel) -> System:
+    """The tables of a model, see `engine.kernels.floating.layout`."""
+    names = list(model.bodies)
+    n = max(1, *(body.omega.size for body in model.bodies.values()))
+    B = len(names)
+    tree = np.zeros((B, columns.TREE), dtype=np.int64)
+    numbers = np.zeros((B, columns.BODY))
+    modes, pairs = np.zeros((B, n, columns.MODE)), np.zeros((B, n, n, columns.PAIR))
+    track, shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, CELLS, 6, n, n))
+    joint = 0
+    for b, (name, body) in enumerate(model.bodies.items()):
+        own = sum(one.body == name for one in model.joints)
+        N = body.omega.size
+        parent = -1 if model.frame(name).on == GROUND else names.index(model.frame(name).on)
+        tree[b] = parent, model.first[name], N, joint, joint + own, int(parent < 0 and own == 0)
+        joint += own
+        _fill_integrals(body, numbers[b], modes[b, :N], pairs[b, :N, :N])
+        _hang(model, name, numbers[b], modes[b])
+        if N:
+            track[b, ..., :N] = body.track()
+            shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
+    loads = _loads(model, names, n)
+    return System(
+        tree,
+        numbers,
+        modes.reshape(B * n, -1),
+        pairs.reshape(B * n * n, -1),
+        np.array([[j.kind, j.coordinate, j.motion] for j in model.joints], dtype=np.int64).reshape(-1, 3),
+        np.array([j.axis for j in model.joints], dtype=np.float64).reshape(-1, 3),
+        track,
+        shorter.reshape(B, CELLS, 6, n * n),
+        _riders(model, names),
+        *loads,
+        np.arange(B, dtype=np.int64),
+        _ends(model, n),
+        *_readings(model),
+    )
+
+
+def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Array) -> None:
+    """Shape integrals, (9), by the places of a body's mass."""
+    dm, c, phi = body.weights, body.places, body.shapes
+    numbers[columns.MASS] = dm.sum()
+    numbers[columns.MOMENT : columns.MOMENT + 3] = dm @ c
+    second = np.einsum("g,ga,gb->ab", dm, c, c)
+    # J = tr P - P is to be larger by the body's own inertia
+    second += 0.5 * body.own_inertia.sum() * np.eye(3) - np.diag(body.own_inertia)
+    numbers[columns.SECOND : columns.SECOND + 9] = second.reshape(9)
+    numbers[columns.LENGTH], numbers[columns.STIFFENS] = body.length, float(body.stiffens)
+    modes[:, columns.TRANSLATION : columns.TRANSLATION + 3] = np.einsum("g,gan->na", dm, phi)
+    first = np.einsum("g,ga,gbn->nab", dm, c, phi)
+    modes[:, columns.FIRST_ORDER : columns.FIRST_ORDER + 9] = first.reshape(-1, 9)
+    both = np.einsum("g,gai,gbj->ijab", dm, phi, phi)
+    pairs[:, :, columns.SECOND_ORDER : columns.SECOND_ORDER + 9] = both.reshape(*both.shape[:2], 9)
+    pairs[:, :, columns.MODAL_MASS] = np.einsum("ijaa->ij", both)
+    pairs[:, :, columns.STIFFNESS] = np.diag(body.omega**2)
+    whole, along = body.stiffening()
+    pairs[:, :, columns.STIFFENING], pairs[:, :, columns.STIFFENING + 1] = whole, along
+
+
+def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array) -> None:
+    """Where a body hangs."""
+    from scipy.spatial.transform import Rotation
+
+    frame = model.frame(name)
+    numbers[columns.TURNED : columns.TURNED + 9] = Rotation.from_rotvec(frame.turned).as_matrix().reshape(9)
+    if frame.on == GROUND:
+        numbers[columns.PLACE : columns.PLACE + 3] = frame.position
+        return
+    parent = model.bodies[frame.on]
+    at = parent.length if frame.at is None else frame.at
+    numbers[columns.PLACE] = at
+    if parent.omega.size:
+        fields = parent.fields(np.array([at]), (0,))[0, 0]
+        N = parent.omega.size
+        modes[:N, columns.HANGING_SHAPE : columns.HANGING_SHAPE + 3] = fields[:3].T
+        modes[:N, columns.HANGING_TURN : columns.HANGING_TURN + 3] = fields[3:].T
+
+
+def _riders(model: FloatingModel, names: list[str]) -> Counts:
+    """One row per carriage."""
+    rows = [
+        (
+            names.index(carriage.on),
+            model.places.get(name, -1),
+            model.motions.index(f"carriage.{name}.motion") if name not in model.places else -1,
+            model.springs.get(name, -1),
+        )
+        for name, carriage in model.study.carriage.items()
+    ]
+    return np.array(rows, dtype=np.int64).reshape(-1, 4)
+
+
+def _loads(model: FloatingModel, names: list[str], n: int) -> tuple[Counts, Array]:
+    """Forces at fixed places: none yet."""
+    return np.zeros((0, 3), dtype=np.int64), np.zeros((0, columns.LOAD_SHAPE + 3 * n))
+
+
+def _ends(model: FloatingModel, n: int) -> Array:
+    """The far ends of all tracks."""
+    found = np.zeros((len(model.bodies), 3 + 3 * n))
+    for b, body in enumerate(model.bodies.values()):
+        found[b, 0] = body.length
+        if body.omega.size:
+            fields = body.fields(np.array([body.length]), (0,))[0, 0, :3]
+            found[b, 3 : 3 + 3 * body.omega.size] = fields.T.reshape(-1)
+    return found
+
+
+def _readings(model: FloatingModel) -> tuple[Array, Counts]:
+    """Rows of the sensors, and under which carriage they read, in which direction, by which rate."""
+    carriages = list(model.study.carriage)
+    rows, under = np.zeros((len(model.study.sensor), model.size)), []
+    for row, sensor in zip(rows, model.study.sensor.values(), strict=True):
+        if sensor.under is not None:
+            under.append((carriages.index(sensor.under), Z, 0))
+            continue
+        name = str(sensor.body)
+        body, quantity = model.bodies[name], sensor.reads
+        under.append((-1, Z, quantity.rate))
+        if body.omega.size:
+            fields = body.fields(np.array([sensor.at]), (quantity.derivative,))[0, 0, Z]
+            first = model.first[name]
+            row[first : first + body.omega.size] = quantity.factor(_section(model.study.body[name])) * fields
+    return rows, np.array(under, dtype=np.int64).reshape(-1, 3)
+
+
+def _section(body: Any) -> Any:
+    """The section of a beam, as quantities ask for it."""
+    return body.build()

@@ -1,0 +1,153 @@
+"""The numbers that a march of bodies in moving frames reports of a variant, and how far two marches differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
+from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
+from results_schema.arrays import Array
+from results_schema.quantities import QUANTITIES
+from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.floating.march import Marched
+    from engine.floating.model import FloatingModel
+
+#: Signals of a carriage that are reported, by the ends of their names, and what comes of each: its error is held
+#: to the tolerance, or only told, as forces that enter excite every mode.
+OF_CARRIAGES = (
+    ("position", 0, "held"),
+    ("speed", 1, "told"),
+    ("acceleration_along", 2, "told"),
+    ("acceleration_x", 3, "told"),
+    ("acceleration_y", 4, "told"),
+    ("acceleration_z", 5, "told"),
+    ("contact_force", 6, "told"),
+)
+ENDS = ("max", "min")
+KINETIC, POTENTIAL = 0, 1  # signals of the whole
+
+
+class Signal(NamedTuple):
+    """A signal that is reported: name, its number, the tolerance that it is held to (NaN: told), and whether it is
+    measured by the length of a track, in place of its own largest value."""
+
+    name: str
+    number: int
+    tolerance: float
+    follows: bool
+    along: float
+
+
+class Result(NamedTuple):
+    """A reported number: its name, and the tolerance that it is held to, NaN where its error is only told; follows:
+    whether it is `solver.tolerance`."""
+
+    name: str
+    tolerance: float
+    follows: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What V variants report by one march: numbers (V,) and (V, B, 3) by name, histories (V, stations, signals) of all
+    signals with their times (V, stations), and statuses (V,)."""
+
+    numbers: dict[str, Array]
+    history: Array
+    times: Array
+    status: np.ndarray[tuple[int], np.dtype[np.int8]]
+
+
+def signals(model: FloatingModel) -> Iterator[Signal]:
+    """The signals of sensors and carriages that are reported."""
+    tolerance = model.study.solver.tolerance
+    for number, (name, sensor) in enumerate(model.study.sensor.items()):
+        own = sensor.tolerance
+        told = own == "told" or (own is None and QUANTITIES[sensor.quantity].told)
+        held = tolerance if own is None else np.nan if told else float(own)
+        yield Signal(name, number, np.nan if told else held, own is None and not told, np.nan)
+    first = model.signal_of("carriages")
+    for c, (name, carriage) in enumerate(model.study.carriage.items()):
+        length = model.bodies[carriage.on].length
+        for end, offset, how in OF_CARRIAGES:
+            held = how == "held" and name in model.places
+            along = length if end == "position" else np.nan
+            number = first + OF_CARRIAGE * c + offset
+            yield Signal(f"{name}_{end}", number, tolerance if held else np.nan, held, along)
+
+
+def ends(model: FloatingModel) -> slice:
+    """Signals of the places of all tracks' ends."""
+    first = model.signal_of("ends")
+    return slice(first, first + OF_POINT * len(model.bodies))
+
+
+def results_of(model: FloatingModel) -> tuple[Result, ...]:
+    """All results whose error is measured, in the order of `differences`."""
+    found = []
+    for signal in signals(model):
+        found += [Result(f"{signal.name}_{end}", signal.tolerance, signal.follows) for end in ENDS]
+    tolerance = model.study.solver.tolerance
+    moves = any(model.frame(name).joints for name in model.bodies)
+    return (*found, *(Result(f"end {name}", tolerance if moves else np.nan, moves) for name in model.bodies))
+
+
+def outcome(model: FloatingModel, marched: Marched) -> Outcome:
+    """The numbers of a march."""
+    found: dict[str, Array] = {}
+    statistics, step = marched.statistics, marched.step
+    duration = np.maximum(marched.last * step, np.finfo(np.float64).tiny)
+    for signal in signals(model):
+        own = statistics[:, signal.number]
+        found[f"{signal.name}_max"], found[f"{signal.name}_min"] = own[:, LARGEST], own[:, SMALLEST]
+        found[f"{signal.name}_max_time"] = own[:, LARGEST_AT] * step
+        found[f"{signal.name}_min_time"] = own[:, SMALLEST_AT] * step
+        if signal.number < len(model.study.sensor):
+            found[f"{signal.name}_rms"] = np.sqrt(own[:, SQUARES] * step / duration)
+    shape = (len(step), len(model.bodies), 3)
+    found["end_max"] = statistics[:, ends(model), LARGEST].reshape(shape)
+    found["end_min"] = statistics[:, ends(model), SMALLEST].reshape(shape)
+    whole = model.signal_of("whole")
+    energy = marched.history[:, :, whole + KINETIC] + marched.history[:, :, whole + POTENTIAL]
+    found["energy_change"] = np.nanmax(np.abs(energy - energy[:, :1]), axis=1)
+    found["duration"] = marched.last * step
+    lost = marched.status >= Status.NOT_CONVERGED
+    for array in found.values():
+        array[lost] = np.nan
+    return Outcome(found, marched.history, marched.times, marched.status)
+
+
+def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
+    """(R, V) how far two outcomes of the same variants are apart, over the largest of each signal that ``other`` has:
+    extremes no less than histories at common times. Infinite where only ``one`` has no numbers, NaN where the other."""
+    gaps = np.abs(one.history - other.history)
+    gaps = np.where(np.isnan(gaps), 0.0, gaps).max(axis=1)
+    found = []
+    for signal in signals(model):
+        largest = np.maximum(*(np.abs(other.numbers[f"{signal.name}_{end}"]) for end in ENDS))
+        scale = np.full_like(largest, signal.along) if signal.along > 0.0 else largest
+        for end in ENDS:
+            name = f"{signal.name}_{end}"
+            gap = np.maximum(np.abs(one.numbers[name] - other.numbers[name]), gaps[:, signal.number])
+            found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
+    of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
+    found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]
+    apart = np.stack(found)
+    ended = np.abs(one.numbers["duration"] - other.numbers["duration"]) / other.numbers["duration"]
+    left = one.status == Status.SEPARATED
+    apart[:, left] = np.maximum(apart[:, left], ended[left])
+    apart[:, one.status >= Status.NOT_CONVERGED] = np.inf
+    apart[:, other.status >= Status.NOT_CONVERGED] = np.nan
+    return apart
+
+
+def frame_signals(model: FloatingModel) -> slice:
+    """Signals of all frames."""
+    first = model.signal_of("frames")
+    return slice(first, first + OF_BODY * len(model.bodies))

@@ -1,0 +1,122 @@
+"""What travels into the kernels of bodies whose frames move: tables of numbers by named columns, few arrays in all, as
+every call hands them on.
+
+Vectors of a body are resolved in its floating frame. Coordinates of the whole system, N of them: those of all joints
+that are free to move, the elastic ones of all bodies, the places of carriages that slide freely, and the deflections of
+what is sprung. n is the largest number of modes of a body.
+"""
+
+from typing import NamedTuple
+
+from engine.kernels.layout import FloatArray, IntArray
+
+#: Kinds of joints. A spherical joint has three coordinates, a rotation vector within each step.
+REVOLUTE, PRISMATIC, SPHERICAL = 0, 1, 2
+#: What happened to a lane: the last, a carriage slid over an end of its track, where the lane's march ends.
+SOUND, NOT_CONVERGED, DIVERGED, OVER_THE_END = 0, 1, 2, 3
+#: Rows of the statistics of a signal.
+LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES, STATISTICS = 0, 1, 2, 3, 4, 5
+
+# columns of System.tree: the parent, -1 for the ground; first elastic coordinate and their number; first joint, and the
+# one behind the last; 1 where nothing moves the frame
+PARENT, FIRST, MODES, FIRST_JOINT, END_JOINT, RESTS, TREE = 0, 1, 2, 3, 4, 5, 6
+# columns of System.bodies: integrals of dm, c dm, c c^T dm; where it hangs on the parent's undeformed body, and the
+# axes there; length of the track and where that begins; whether the track grows shorter as it bends
+MASS, MOMENT, SECOND, PLACE, TURNED, LENGTH, ORIGIN, STIFFENS, BODY = 0, 1, 4, 13, 16, 25, 26, 29, 30
+# columns of System.modes, row b n + i: integrals of phi_i dm and c phi_i^T dm; displacement and rotation, by mode i of
+# the parent, of the place where body b hangs
+TRANSLATION, FIRST_ORDER, HANGING_SHAPE, HANGING_TURN, MODE = 0, 3, 12, 15, 18
+# columns of System.pairs, row (b n + i) n + j: integral of phi_i phi_j^T dm; stiffness; int G dm and int x G dm with
+# G(x) = int_0^x (v_i' v_j' + w_i' w_j'); modal mass
+SECOND_ORDER, STIFFNESS, STIFFENING, MODAL_MASS, PAIR = 0, 9, 10, 12, 13
+# columns of System.joint_table: kind, first coordinate or -1 where its motion is given, the number of that motion or
+# -1; a joint with both is controlled towards the motion
+KIND, COORDINATE, MOTION = 0, 1, 2
+# columns of System.riders: body; coordinate of its place and motion as of a joint; coordinate of its sprung mass or -1
+RIDDEN, PLACE_COORDINATE, PLACE_MOTION, SPRUNG_COORDINATE = 0, 1, 2, 3
+# columns of System.load_table: body; 1 where the direction turns with the frame; the motion that gives its size.
+# Of System.loads: place, direction, and (3 n) the displacement of the place by each mode
+LOADED, FOLLOWS, SIZE = 0, 1, 2
+LOAD_PLACE, DIRECTION, LOAD_SHAPE = 0, 3, 6
+# columns of Lane.carriages: mass, inertia about its centre, height of that below the track; sprung mass, stiffness and
+# damping; drive force along the track, viscous friction, Coulomb's coefficient, the speed over which that sets in
+OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB, SLIP, CARRIAGE = (
+    0, 1, 4, 5, 6, 7, 8, 9, 10, 11, 12,
+)  # fmt: skip
+# columns of a piece of a motion: its start (s), a polynomial of degree 5, and amplitude, rate and phase of a sine
+PIECE = 10
+
+
+class System(NamedTuple):
+    """All that lanes share; the columns are those above.
+
+    tree (B, TREE), bodies (B, BODY), modes (B n, MODE), pairs (B n n, PAIR): bodies, each after its parent.
+    joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
+    track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
+    5 in equal cells; foreshortening (B, cells, 6, n n): G likewise.
+    riders (C, 4). load_table (F, 3), loads (F, 6 + 3 n). points (P, 3 + 3 n), pointed (P): places whose position over
+    the ground is observed, and their bodies.
+    readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
+    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations.
+    """
+
+    tree: IntArray
+    bodies: FloatArray
+    modes: FloatArray
+    pairs: FloatArray
+    joint_table: IntArray
+    axes: FloatArray
+    track: FloatArray
+    foreshortening: FloatArray
+    riders: IntArray
+    load_table: IntArray
+    loads: FloatArray
+    pointed: IntArray
+    points: FloatArray
+    readings: FloatArray
+    read_under: IntArray
+
+
+class Coordinates(NamedTuple):
+    """Coordinates, velocities and accelerations of one lane, (N) each."""
+
+    y: FloatArray
+    u: FloatArray
+    a: FloatArray
+
+
+class Lane(NamedTuple):
+    """Numbers of one variant, or with a first axis of all.
+
+    gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or about
+    the given motion. carriages (C, CARRIAGE). motions (M, pieces, PIECE). events (E): ascending times (s) at which a
+    motion goes on as another piece, infinite where there are fewer. start (2, N): coordinates and velocities.
+    """
+
+    gravity: FloatArray
+    damping: FloatArray
+    joints: FloatArray
+    carriages: FloatArray
+    motions: FloatArray
+    events: FloatArray
+    start: FloatArray
+
+
+class Weights(NamedTuple):
+    """A scheme: Newmark's beta and gamma, and generalized-alpha's alpha_m and alpha_f (0 of Newmark's family)."""
+
+    beta: float
+    gamma: float
+    alpha_m: float
+    alpha_f: float
+
+
+class Record(NamedTuple):
+    """What a march leaves of L lanes: stations (S): ascending numbers of those whose signals are kept; statistics
+    (L, signals, STATISTICS) of all stations, history (L, S, signals); codes and last stations (L)."""
+
+    stations: IntArray
+    statistics: FloatArray
+    history: FloatArray
+    codes: IntArray
+    last: IntArray

@@ -1,0 +1,137 @@
+"""How the floating frame of a body moves: where it hangs, and the joints between it and what it hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from engine.scene.time_motions import AnyTimeMotion
+from engine.study_file.checks import Check, on_body
+from engine.study_file.spec import KindOf, Noun, Spec, kinds
+from engine.study_file.units import Dimensionless, Inertia, Length, Rate, SecondMoment, fault
+
+GROUND = "ground"
+MOST_JOINTS = 6
+
+Direction = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False)]
+Place = Annotated[tuple[Length, Length, Length], Strict(False)]
+Inertias = Annotated[
+    tuple[Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)]],
+    Strict(False),
+]
+
+
+class Joint(Spec):
+    """Base of all joints. freedoms: how many coordinates it has."""
+
+    freedoms: ClassVar[int] = 1
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
+
+
+class AxisJoint(Joint):
+    """A joint about or along one axis, a vector of any length in the axes of what stands before it.
+
+    start, rate: coordinate and its rate at time 0, where nothing drives it. stiffness, damping: of a spring and a
+    damper towards 0. motion: drives the coordinate; with a stiffness it is what a controller steers towards instead,
+    with that stiffness and that damping (PD).
+    """
+
+    axis: Direction
+    start: Dimensionless | None = None
+    rate: Rate | None = None
+    stiffness: Dimensionless = Field(default=0.0, ge=0)
+    damping: Dimensionless = Field(default=0.0, ge=0)
+    motion: AnyTimeMotion | None = None
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether its motion is given, whatever force that takes."""
+        return self.motion is not None and self.stiffness == 0.0 and self.damping == 0.0
+
+    @model_validator(mode="after")
+    def _axis_and_start(self) -> AxisJoint:
+        if not any(self.axis):
+            raise fault("an axis needs a direction", expected="three numbers, not all zero, such as [0, 1, 0]")
+        if self.is_driven and (self.start is not None or self.rate is not None):
+            raise fault("a driven joint starts where its motion does", expected="start and rate left out")
+        return self
+
+
+class Revolute(AxisJoint):
+    """Turns about an axis; rad, rad/s, N m/rad, N m s/rad."""
+
+    kind: Literal["revolute"]
+
+
+class Prismatic(AxisJoint):
+    """Slides along an axis; m, m/s, N/m, N s/m."""
+
+    kind: Literal["prismatic"]
+
+
+class Spherical(Joint):
+    """Turns freely. rate: rad/s, in the frame of its body, at time 0. damping: N m s/rad."""
+
+    freedoms: ClassVar[int] = 3
+    kind: Literal["spherical"]
+    rate: Annotated[tuple[Rate, Rate, Rate], Strict(False)] = (0.0, 0.0, 0.0)
+    damping: Dimensionless = Field(default=0.0, ge=0)
+
+
+class Free(Joint):
+    """Moves freely in space. velocity: m/s over the ground, at time 0; rate: rad/s, in the frame of its body."""
+
+    freedoms: ClassVar[int] = 6
+    kind: Literal["free"]
+    velocity: Direction = (0.0, 0.0, 0.0)
+    rate: Annotated[tuple[Rate, Rate, Rate], Strict(False)] = (0.0, 0.0, 0.0)
+
+
+JOINTS = kinds("joint", "wanderlast.joints", Joint, Revolute, Prismatic, Spherical, Free)
+AnyJoint = Annotated[Joint, KindOf("joint", JOINTS)]
+
+
+class Frame(Spec):
+    """The floating frame of the body of that name: at the beginning of its track, x along it, z the way it bends
+    under its loads (down, where nothing turns it).
+
+    on: "ground" or the body that it hangs on. at: m along the track of that body, its end if not given. position: m
+    over the ground, of a body that hangs there. turned: rotation vector (rad) of the frame before its joints. joints:
+    from what it hangs on outward; none: it is fixed. inertia: of a rigid body about its centre of mass (kg m2), about
+    its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track;
+    its supports are those of bending. axial_modes: stretching, held where the track begins. stiffening: the track grows
+    shorter as it bends, so that what pulls at it stiffens it (first order).
+    """
+
+    on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND
+    at: Length | None = Field(default=None, ge=0)
+    position: Place = (0.0, 0.0, 0.0)
+    turned: Direction = (0.0, 0.0, 0.0)
+    joints: Annotated[tuple[AnyJoint, ...], Strict(False), Field(max_length=MOST_JOINTS)] = ()
+    inertia: Inertias | None = None
+    lateral_second_moment: SecondMoment | None = Field(default=None, gt=0)
+    lateral_modes: int = Field(default=0, ge=0, le=32)
+    axial_modes: int = Field(default=0, ge=0, le=32)
+    stiffening: bool = False
+
+    @model_validator(mode="after")
+    def _fitting_keys(self) -> Frame:
+        if self.on == GROUND and self.at is not None:
+            raise fault("the ground has no track", expected="position = [x, y, z], m")
+        if self.on != GROUND and any(self.position):
+            raise fault("a body that hangs on another one is there where `at` says", expected="at = metres")
+        if self.lateral_modes and self.lateral_second_moment is None:
+            raise fault("bending across the track needs its second moment", expected="lateral_second_moment")
+        return self
+
+    def checks(self, name: str) -> Iterator[Check]:
+        """Conditions between its numbers and those of bodies; ``name``: of its body."""
+        if self.at is not None:
+            here = f"frame.{name}.at"
+            yield on_body(here, (here, f"body.{self.on}.length"), "a place off the track of the body that holds it")

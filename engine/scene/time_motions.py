@@ -1,0 +1,121 @@
+"""Motions of joints that are given in time, as pieces of polynomials and sines."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from math import pi
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field, Strict, model_validator
+
+from engine.study_file.spec import KindOf, Spec, kinds
+from engine.study_file.units import Dimensionless, Frequency, Rate, Time, fault
+from results_schema.arrays import Array
+
+#: Columns of a piece: start (s); coefficients of a polynomial of degree 5 in the time since then, constant first;
+#: amplitude, rate (rad/s) and phase of a sine.
+START, CONSTANT, AMPLITUDE, RATE, PHASE, COLUMNS = 0, 1, 7, 8, 9, 10
+
+Number = Callable[[str], Array]  # (V,) of a key of the motion, for every variant
+
+
+class TimeMotion(Spec):
+    """Base of the motions of joints: rad or m, by the joint."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
+
+    @abstractmethod
+    def pieces(self, number: Number) -> Array:
+        """(V, pieces, 10): the columns above."""
+
+
+def _blank(like: Array, count: int) -> Array:
+    return np.zeros((like.size, count, COLUMNS))
+
+
+class Steady(TimeMotion):
+    """start + rate t."""
+
+    kind: Literal["steady"]
+    start: Dimensionless = 0.0
+    rate: Rate
+
+    def pieces(self, number: Number) -> Array:
+        found = _blank(number("rate"), 1)
+        found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = number("start"), number("rate")
+        return found
+
+
+class Swing(TimeMotion):
+    """centre + amplitude sin(2 pi f t)."""
+
+    kind: Literal["swing"]
+    centre: Dimensionless = 0.0
+    amplitude: Dimensionless
+    frequency: Frequency = Field(gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        found = _blank(number("frequency"), 1)
+        found[:, 0, CONSTANT], found[:, 0, AMPLITUDE] = number("centre"), number("amplitude")
+        found[:, 0, RATE] = 2.0 * pi * number("frequency")
+        return found
+
+
+class SpinUp(TimeMotion):
+    """From rest to a rate in some time, smoothly: its rate is (rate/T) t - (rate/2 pi) sin(2 pi t/T), then constant
+    (Kane, Ryan and Banerjee 1987)."""
+
+    kind: Literal["spin-up"]
+    rate: Rate
+    time: Time = Field(gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        rate, time = number("rate"), number("time")
+        found = _blank(rate, 2)
+        bow = rate * time / (4.0 * pi**2)
+        found[:, 0, CONSTANT], found[:, 0, CONSTANT + 2] = -bow, 0.5 * rate / time
+        found[:, 0, AMPLITUDE], found[:, 0, RATE], found[:, 0, PHASE] = bow, 2.0 * pi / time, 0.5 * pi
+        found[:, 1, START], found[:, 1, CONSTANT], found[:, 1, CONSTANT + 1] = time, 0.5 * rate * time, rate
+        return found
+
+
+class Points(TimeMotion):
+    """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
+
+    kind: Literal["waypoints"]
+    times: Annotated[tuple[Time, ...], Strict(False), Field(min_length=2, max_length=1000)]
+    values: Annotated[tuple[Dimensionless, ...], Strict(False), Field(min_length=2, max_length=1000)]
+
+    @model_validator(mode="after")
+    def _ascending(self) -> Points:
+        if len(self.times) != len(self.values):
+            lengths = f"{len(self.times)} times, {len(self.values)} values"
+            raise fault("times and values must be equally many", received=lengths)
+        if self.times[0] != 0.0 or not np.all(np.diff(self.times) > 0.0):
+            raise fault("times must start at 0 and ascend", received=", ".join(f"{t:g}" for t in self.times[:6]))
+        return self
+
+    def pieces(self, number: Number) -> Array:
+        columns = (np.stack([number(f"{key}.{k}") for k in range(len(self.times))]) for key in ("times", "values"))
+        return np.stack([spline_pieces(t, v) for t, v in zip(*(column.T for column in columns), strict=True)])
+
+
+TIME_MOTIONS = kinds("motion of a joint", "wanderlast.joint_motions", TimeMotion, Steady, Swing, SpinUp, Points)
+AnyTimeMotion = Annotated[TimeMotion, KindOf("motion of a joint", TIME_MOTIONS)]
+
+
+def spline_pieces(times: Array, values: Array) -> Array:
+    """(pieces, 10) of the cubic spline at rest at both ends, and the last value from then on."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(times, values, bc_type="clamped")
+    found = np.zeros((times.size, COLUMNS))
+    found[:, START], found[-1, CONSTANT] = times, values[-1]
+    found[:-1, CONSTANT : CONSTANT + 4] = spline.c[::-1].T
+    return found

@@ -1,0 +1,73 @@
+"""What do bodies do whose frames move, and carriages that slide on them by themselves?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from engine.study_file.spec import Spec
+from engine.study_file.units import Time
+from results_schema.arrays import Array
+from results_schema.errors import BadInput
+from results_schema.variables import declare
+from studies.moving import findings
+from studies.moving.variables import RESULTS
+from studies.protocol.study import PiecedKind, question_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.study import Study
+    from studies.protocol.parts import Piece
+    from studies.results.results import Results
+
+declare("moving-frames", *RESULTS)
+
+
+class Question(Spec):
+    """The table [question]. duration: s, of the march."""
+
+    duration: Time = Field(gt=0)
+
+
+class MovingFrames(PiecedKind):
+    """The kind "moving-frames"."""
+
+    name = "moving-frames"
+    summary = "bodies on joints or free in space, and carriages that slide by themselves: motions, forces, energies"
+    question = "How do the bodies and their carriages move, and what do they feel?"
+    settings = Question
+    sweeps = True
+    moves_frames = True
+    drawn_by = "studies.pictures.moving_frames"
+
+    def check(self, study: Study) -> None:
+        if not study.body:
+            raise BadInput("there is no body", where=study.source.where("body"), expected="a table [body.NAME]")
+        if study.solver.fidelity not in ("auto", "full"):
+            where = study.source.where("solver.fidelity")
+            raise BadInput("frames that move have one model", where=where, expected='"auto"')
+
+    def pieces(self, study: Study) -> Sequence[Piece]:
+        from studies.moving.parts import pieces
+
+        seconds = question_of(study, Question).duration
+
+        def duration(columns: Mapping[str, Array], size: int) -> Array:
+            return np.full(size, seconds)
+
+        return pieces(study, duration)
+
+    def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
+        from studies.moving.parts import gather
+
+        return gather(pieces, study, self.name)
+
+    def findings(self, results: Results) -> list[str]:
+        return findings.answer(results)
+
+
+KIND = MovingFrames()

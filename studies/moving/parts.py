@@ -1,0 +1,258 @@
+"""The work of a study of bodies in moving frames: pieces of some variants each, and their dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from results_schema.arrays import Array, Counts
+from results_schema.status import Fidelity
+from studies.protocol.parts import Piece, Work, usual
+from studies.results.results import sensor_units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.floating.converge import Converged
+    from engine.floating.model import FloatingModel
+    from engine.scene.study import Study
+    from engine.scene.sweep import Cases
+
+SHOWN = 64  # variants whose histories are kept by default
+PIECE_SECONDS = 8.0  # of one piece, about
+STEP_SECONDS, MODE_SECONDS = 4e-6, 8e-7  # of a step, and for each coordinate besides, about; for sizes of pieces only
+LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
+AT_ONCE = 32  # variants of one job
+COMPONENTS, QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Variants (flat numbers) that share a model; study: with the numbers of the first of them."""
+
+    study: Study
+    variants: Counts
+
+
+def scenes(study: Study, cases: Cases) -> list[Scene]:
+    """The distinct scenes of a sweep: those whose numbers are not all numbers that a variant may have to itself."""
+    from engine.floating.lanes import OWN_KEYS
+
+    shared = [axis.dim for axis in cases.axes if not all(OWN_KEYS.fullmatch(path) for path in axis.paths)]
+    everything = np.arange(cases.size, dtype=np.int64)
+    if not shared:
+        return [Scene(study.without_sweep(), everything)]
+    positions = cases.positions(everything)
+    codes = np.unique(np.stack([positions[dim] for dim in dict.fromkeys(shared)]), axis=1, return_inverse=True)[1]
+    codes = codes.reshape(-1)
+    groups = [everything[codes == code] for code in range(codes.max() + 1)]
+    return [Scene(cases.study_of(study, int(own[0])), own) for own in groups]
+
+
+def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) -> list[Piece]:
+    """The work; duration: (V,) s of variants by their columns. Raises BadInput for what cannot be marched."""
+    from engine.batch.plan import check_memory
+    from engine.floating.converge import levels
+    from engine.floating.model import build
+    from engine.scene.sweep import expand
+
+    cases = expand(study)
+    model = build(study.without_sweep(), 2)
+    check_memory(study, cases.size, 8 * cases.size * (len(results_names(model)) + 40))
+    found: list[Piece] = []
+    for scene in scenes(study, cases):
+        longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
+        coarsest = next(iter(levels(scene.study, longest)))
+        each = coarsest.steps * LEVELS_TAKEN * (STEP_SECONDS + MODE_SECONDS * coarsest.model.size**2)
+        size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
+        for first in range(0, scene.variants.size, size):
+            own = scene.variants[first : first + size]
+            words = f"{own.size:,} variants over {longest:.4g} s"
+            compute = partial(_march, scene.study, cases, own, duration)
+            found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
+    return found
+
+
+def results_names(model: FloatingModel) -> list[str]:
+    """Names of the results whose errors are told."""
+    from engine.floating.results import results_of
+
+    return [result.name for result in results_of(model)]
+
+
+def shown(study: Study, size: int) -> Counts:
+    """Variants whose histories are kept: all, none, or some spread over the sweep."""
+    wanted = study.output.histories
+    if wanted == "none":
+        return np.zeros(0, dtype=np.int64)
+    if wanted != "auto" or size <= SHOWN:
+        return np.arange(size, dtype=np.int64)
+    return np.unique(np.rint(np.linspace(0, size - 1, SHOWN)).astype(np.int64))
+
+
+def _march(
+    study: Study, cases: Cases, variants: Counts, duration: Callable[[Mapping[str, Array], int], Array], work: Work
+) -> xr.Dataset:
+    """The results of some variants of one scene, on threads."""
+    from engine.batch.execution import run_jobs
+    from engine.floating.converge import converge
+    from engine.floating.model import build
+    from engine.scene.variants import VariantValues
+
+    model = build(study, 2)
+    kept = shown(study, cases.size)
+    found: dict[int, dict[str, NDArray[Any]]] = {}
+
+    def job(first: int) -> None:
+        own = variants[first : first + AT_ONCE]
+        columns = cases.columns_of(own)
+        values = VariantValues(study, columns, own.size)
+        converged = converge(study, values, duration(columns, own.size), work.halted)
+        found[first] = _arrays(model, converged, np.flatnonzero(np.isin(own, kept)), own)
+
+    run_jobs([partial(job, first) for first in range(0, variants.size, AT_ONCE)], work.threads)
+    parts = [found[first] for first in sorted(found)]
+    return _plain({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Counts) -> dict[str, NDArray[Any]]:
+    """Results of V variants by name, and the histories of some of them ("history:" before their names)."""
+    from engine.floating.results import ends, frame_signals, signals
+    from engine.march.outcome import number_of
+
+    outcome = converged.outcome
+    found: dict[str, NDArray[Any]] = {
+        "number": own,
+        **outcome.numbers,
+        "status": converged.status,
+        "modes_used": converged.modes,
+        "steps_used": converged.steps,
+        "scheme_used": np.full(own.size, int(number_of(converged.scheme)), dtype=np.int8),
+        "estimated_error": np.ascontiguousarray(converged.error.T, dtype=np.float32),
+    }
+    history, times = outcome.history[kept], outcome.times[kept]
+    for name in model.places:
+        number = next(signal.number for signal in signals(model) if signal.name == f"{name}_position")
+        found[f"{name}_period"] = np.array(
+            [period(*pair) for pair in zip(outcome.times, outcome.history[:, :, number], strict=True)]
+        )
+    stations, bodies, whole = history.shape[1], len(model.bodies), model.signal_of("whole")
+    frames = history[:, :, frame_signals(model)].reshape(kept.size, stations, bodies, -1)
+    traces = {
+        "elapsed": times,
+        **{signal.name: history[:, :, signal.number] for signal in signals(model)},
+        "end_place": history[:, :, ends(model)].reshape(kept.size, stations, bodies, 3),
+        "frame_place": frames[..., 0:3],
+        "frame_attitude": frames[..., 3:7],
+        "frame_velocity": frames[..., 7:10],
+        "frame_rate": frames[..., 10:13],
+        "kinetic_energy": history[:, :, whole],
+        "potential_energy": history[:, :, whole + 1],
+        "momentum": history[:, :, whole + 2 : whole + 5],
+        "angular_momentum": history[:, :, whole + 5 : whole + 8],
+    }
+    return found | {"kept": own[kept]} | {f"history:{name}": array for name, array in traces.items()}
+
+
+def period(times: Array, places: Array) -> float:
+    """Mean time of two passes of the middle of a way, s; NaN where there are less than three."""
+    from scipy.interpolate import CubicSpline
+
+    known = np.isfinite(places)
+    if known.sum() < 4 or np.ptp(places[known]) == 0.0:
+        return np.nan
+    middle = 0.5 * (places[known].max() + places[known].min())
+    passes = CubicSpline(times[known], places[known] - middle).roots(extrapolate=False)
+    return float(2.0 * (passes[-1] - passes[0]) / (passes.size - 1)) if passes.size > 2 else np.nan
+
+
+def _plain(arrays: dict[str, NDArray[Any]]) -> xr.Dataset:
+    """Arrays as a dataset without labels."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {name: ([f"{name}:{axis}" for axis in range(array.ndim)], array) for name, array in arrays.items()}
+    )
+
+
+def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
+    """Everything, labelled."""
+    import xarray as xr
+
+    from engine.batch.dataset import coordinates
+    from engine.floating.model import build
+    from engine.floating.results import results_of
+    from engine.scene.sweep import expand
+    from results_schema.variables import axes
+    from results_schema.variables import expand as declared_for
+
+    cases, model = expand(study), build(study.without_sweep(), 2)
+    declared = declared_for(kind, sensor_units(study), tuple(study.carriage))
+    labels = {"frame": list(model.bodies), "component": COMPONENTS, "quaternion": QUATERNION}
+    own = list(parts.values())
+    whole = {str(name): np.concatenate([part[name].values for part in own]) for name in own[0].data_vars}
+    order, kept = np.argsort(whole.pop("number")), np.argsort(whole["kept"])
+    dataset = xr.Dataset(coords=coordinates(cases))
+    results = results_of(model)
+    everything = [result.name for result in results]
+    dataset = dataset.assign_coords(result=("result", everything, axes()["result"].attributes()))
+    if study.sensor:
+        dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
+    tolerance = np.array([result.tolerance for result in results])
+    dataset["tolerance"] = declared["tolerance"].holding(tolerance, ("result",))
+    for label, names in labels.items():
+        dataset = dataset.assign_coords({label: declared[label].holding(np.array(names), (label,))})
+    grid = {name: array[order] for name, array in whole.items() if not name.startswith("history:") and name != "kept"}
+    shape = cases.shape
+    used = {
+        "status": grid.pop("status"),
+        "fidelity": np.full(cases.size, int(Fidelity.FRAME)),
+        "modes": grid.pop("modes_used"),
+        "steps": grid.pop("steps_used"),
+    }
+    for name, entry in usual(cases.dims, **{key: array.reshape(shape) for key, array in used.items()}).items():
+        dataset[name] = entry
+    dataset["scheme_used"] = declared["scheme_used"].holding(grid.pop("scheme_used").reshape(shape), cases.dims)
+    error = grid["estimated_error"]
+    held = np.isfinite(tolerance)
+    worst = error[:, held].max(axis=1) if held.any() else np.full(cases.size, np.nan)
+    dataset["error_estimate"] = declared["error_estimate"].holding(worst.reshape(shape), cases.dims)
+    for name, array in grid.items():
+        inner = ("result",) if name == "estimated_error" else declared[name].dims
+        dataset[name] = declared[name].holding(array.reshape((*shape, *array.shape[1:])), (*cases.dims, *inner))
+    return _with_histories(dataset, whole, kept, cases, declared)
+
+
+def _with_histories(
+    dataset: xr.Dataset, whole: dict[str, NDArray[Any]], kept: Counts, cases: Cases, declared: Mapping[str, Any]
+) -> xr.Dataset:
+    """Histories on the whole grid where every variant has one, else along ``history``."""
+    from results_schema.variables import axes
+
+    variants = whole["kept"][kept]
+    if not variants.size:
+        return dataset
+    everyone = variants.size == cases.size
+    lead: Sequence[str] = cases.dims if everyone else ("history",)
+    shape = cases.shape if everyone else (variants.size,)
+    stations = whole["history:elapsed"].shape[1]
+    dataset = dataset.assign_coords(station=axes()["station"].holding(np.arange(stations), ("station",)))
+    if not everyone:
+        dataset = dataset.assign_coords(history=axes()["history"].holding(variants, ("history",)))
+    for name, array in whole.items():
+        if not name.startswith("history:"):
+            continue
+        own = name.removeprefix("history:")
+        variable = axes()[own] if own == "elapsed" else declared[own]
+        inner = ("station", *variable.dims[1:])
+        entry = variable.holding(array[kept].reshape((*shape, *array.shape[1:])), (*lead, *inner))
+        if own == "elapsed":
+            dataset = dataset.assign_coords(elapsed=entry)
+        else:
+            dataset[own] = entry
+    return dataset

@@ -1,0 +1,100 @@
+"""What studies of bodies in moving frames report, declared once."""
+
+from __future__ import annotations
+
+from engine.floating.results import ENDS, OF_CARRIAGES
+from results_schema.variable import axis
+from results_schema.variables import Variable
+
+UNITS = {"position": "m", "speed": "m s-1", "contact_force": "N"}
+WORDS = {
+    "position": "place along its track",
+    "speed": "speed along its track",
+    "acceleration_along": "acceleration along its track",
+    "acceleration_x": "acceleration of the point that it touches, along x of the frame of its body",
+    "acceleration_y": "acceleration of the point that it touches, along y of the frame of its body",
+    "acceleration_z": "acceleration of the point that it touches, along z of the frame of its body",
+    "contact_force": "contact force, positive where it presses",
+}
+WORD_OF = {"max": "largest", "min": "smallest"}
+
+
+def _ends(name: str, units: str, words: str) -> list[Variable]:
+    found = []
+    for end in ENDS:
+        word = WORD_OF[end]
+        found.append(Variable(f"{name}_{end}", units=units, long_name=f"{word} {words}", meaning="over all stations"))
+        when = f"time of the {word} {words}"
+        found.append(Variable(f"{name}_{end}_time", units="s", long_name=when, required=False))
+    return found
+
+
+def _history(name: str, dims: tuple[str, ...], units: str, words: str) -> Variable:
+    return Variable(
+        name,
+        ("station", *dims),
+        units=units,
+        long_name=words,
+        meaning="NaN from the moment on at which a carriage has slid over an end of its track",
+        required=False,
+        lead="history",
+        gaps_allowed=True,
+    )
+
+
+def _of_carriages() -> list[Variable]:
+    found = []
+    for end, _, _ in OF_CARRIAGES:
+        units = UNITS.get(end, "m s-2")
+        words = f"{WORDS[end]} of {{carriage}}"
+        found += [*_ends(f"{{carriage}}_{end}", units, words), _history(f"{{carriage}}_{end}", (), units, words)]
+    return [
+        *found,
+        Variable(
+            "{carriage}_period",
+            units="s",
+            long_name="period of the motion of {carriage} along its track",
+            meaning="mean over the recorded time, between passes of the middle of its way; NaN where it passes that "
+            "less than three times",
+            required=False,
+            nan_allowed=True,
+        ),
+    ]
+
+
+RESULTS = (
+    *_ends("{sensor}", "{sensor}", "value of {sensor}"),
+    Variable("{sensor}_rms", units="{sensor}", long_name="root mean square of {sensor}", meaning="over the whole time"),
+    _history("{sensor}", (), "{sensor}", "history of {sensor}"),
+    *_of_carriages(),
+    *(
+        Variable(
+            f"end_{end}",
+            ("frame", "component"),
+            units="m",
+            long_name=f"{WORD_OF[end]} coordinate over the ground of the far end of a track",
+        )
+        for end in ENDS
+    ),
+    Variable(
+        "energy_change",
+        units="J",
+        long_name="largest change of the energy of everything",
+        meaning="kinetic, elastic, of springs and height; by damping, friction and what is driven, else by the steps",
+    ),
+    Variable(
+        "duration", units="s", long_name="time that was marched", meaning="less where a carriage slid over an end"
+    ),
+    _history("end_place", ("frame", "component"), "m", "place over the ground of the far end of a track"),
+    _history("frame_place", ("frame", "component"), "m", "place over the ground of the frame of a body"),
+    _history("frame_attitude", ("frame", "quaternion"), "", "attitude of the frame of a body, as a unit quaternion"),
+    _history("frame_velocity", ("frame", "component"), "m s-1", "velocity over the ground of the frame of a body"),
+    _history("frame_rate", ("frame", "component"), "rad s-1", "angular velocity of a body's frame, in its own axes"),
+    _history("kinetic_energy", (), "J", "kinetic energy of everything"),
+    _history("potential_energy", (), "J", "elastic energy, that of springs and of height"),
+    _history("momentum", ("component",), "kg m s-1", "momentum of everything over the ground"),
+    _history("angular_momentum", ("component",), "kg m2 s-1", "angular momentum about the ground's origin"),
+    axis("frame", "body whose frame it is", dtype="str"),
+    axis("component", "component of the vector", dtype="str"),
+    axis("quaternion", "part of the quaternion", dtype="str", meaning="w is the scalar one"),
+)

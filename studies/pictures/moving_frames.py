@@ -1,0 +1,101 @@
+"""Figures of bodies in moving frames: histories, where carriages slide, energies."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
+from studies.results.formatting import quantity, scale_for
+from studies.results.results import Index, Results, chosen
+
+MOST_ROWS, MOST_CURVES = 5, 4
+
+
+def pictures(results: Results) -> list[Figure]:
+    """Sensors and carriages over time, the phase portrait of what slides, the energy."""
+    traced = results.traced()
+    if not traced:
+        return []
+    shown, own = list(chosen(traced, MOST_CURVES)), [_own(results, traced)]
+    rows = _rows(results)
+    found = []
+    if rows:
+        name = next(iter(rows))
+        found.append(_histories(results, "histories", _title(results, name, rows[name], own), rows, own))
+    found += [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
+    energies = {"kinetic_energy": "J", "potential_energy": "J"}
+    change = float(np.nanmax(results.dataset["energy_change"].values))
+    title = f"The energy of everything changes by at most {quantity(change, 'J')}"
+    return [*found, on_method(_histories(results, "energy", title, energies, own))]
+
+
+def _own(results: Results, traced: list[Index]) -> Index:
+    """The kept variant that is nearest to the numbers of the study itself."""
+    spans = {
+        path: factor * float(np.ptp(axis.values)) for axis in results.axes for path, factor in axis.targets.items()
+    }
+
+    def distance(index: Index) -> float:
+        values = results.values_at(index)
+        return float(sum(abs(values[path] - results.study.value(path)) / (span or 1.0) for path, span in spans.items()))
+
+    return min(traced, key=distance)
+
+
+def _rows(results: Results) -> dict[str, str]:
+    """Histories that are drawn, with their units."""
+    rows = dict(results.sensors)
+    for name, carriage in results.study.carriage.items():
+        ends = ("position", "acceleration_x", "acceleration_z") if carriage.motion.slides else ("acceleration_z",)
+        rows |= {f"{name}_{end}": str(results.dataset[f"{name}_{end}"].attrs["units"]) for end in ends}
+    return dict(list(rows.items())[:MOST_ROWS])
+
+
+def _title(results: Results, name: str, unit: str, shown: list[Index]) -> str:
+    values = np.concatenate([results.trace(name, index).values for index in shown])
+    ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+    return f"{name.replace('_', ' ').capitalize()} goes from {ends[0]} to {ends[1]}"
+
+
+def _histories(results: Results, name: str, title: str, rows: dict[str, str], shown: list[Index]) -> Figure:
+    traced = len(results.traced())
+    caption = f"At {results.at(shown[0])}; one of {traced} kept histories." if traced > 1 else ""
+    return draw(name, title, caption, 0.6 + 1.6 * len(rows), partial(_draw, results, rows, shown))
+
+
+def _draw(results: Results, rows: dict[str, str], shown: list[Index], drawing: Drawing) -> None:
+    plots = drawing.subplots(len(rows), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, (name, unit) in zip(plots, rows.items(), strict=True):
+        traces = [results.trace(name, index) for index in shown]
+        largest = max(float(np.nanmax(np.abs(trace.values), initial=0.0)) for trace in traces)
+        scale = scale_for(largest, unit)
+        for index, trace, colour in zip(shown, traces, shades(len(shown)), strict=True):
+            label = results.at(index).replace(", ", "\n")
+            axes.plot(trace.times, trace.values * scale.factor, color=colour, label=label, linewidth=1.2)
+        words = name.replace("_", " ")
+        axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
+        if name in results.sensors and unit == "m":
+            axes.invert_yaxis()
+    plots[-1].set_xlabel("time (s)")
+    drawing.align_ylabels()
+    if len(shown) > 1:
+        legend_of_all(drawing, plots[0])
+
+
+def _portrait(results: Results, name: str, shown: list[Index]) -> Figure:
+    """Speed over place of a carriage that slides."""
+
+    def fill(drawing: Drawing) -> None:
+        axes = drawing.subplots()
+        for index, colour in zip(shown, shades(len(shown)), strict=True):
+            place, speed = (results.trace(f"{name}_{end}", index).values for end in ("position", "speed"))
+            axes.plot(place, speed, color=colour, linewidth=1.0, label=results.at(index).replace(", ", "\n"))
+        axes.set_xlabel(f"place of {name} on its track (m)")
+        axes.set_ylabel("speed (m/s)")
+        if len(shown) > 1:
+            legend_of_all(drawing, axes)
+
+    return draw(f"{name} portrait", f"How {name} slides: its speed over its place", "", 3.2, fill)

@@ -1,0 +1,63 @@
+"""Small scenes with frames that move, and their marches with fixed steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.floating.march import Marched, march
+from engine.floating.model import FloatingModel, build
+from engine.kernels.floating.layout import Weights
+from engine.scene.study import Study
+from engine.scene.variants import VariantValues
+
+AVERAGE_ACCELERATION = Weights(0.25, 0.5, 0.0, 0.0)
+FOX_GOODWIN = Weights(1.0 / 12.0, 0.5, 0.0, 0.0)
+
+PAPER_BEAM = {
+    "kind": "beam",
+    "length": 15.0,
+    "area": 0.01,
+    "second_moment": 8.33e-6,
+    "youngs_modulus": 2.1e11,
+    "density": 7850.0,
+    "supports": "pinned-pinned",
+    "damping_ratio": 0.02,
+    "modes": 1,
+    "own_weight": True,
+}
+ARM = {
+    "kind": "beam",
+    "length": 10.0,
+    "area": 4e-4,
+    "second_moment": 2e-7,
+    "youngs_modulus": 7e10,
+    "density": 3000.0,
+    "supports": "clamped-free",
+    "modes": 6,
+}
+
+
+def sliding_mass(**beam: object) -> Study:
+    """Section 2.3 of Hartweg and Heckmann (2012)."""
+    return Study(
+        kind="moving-frames",
+        gravity=9.81,
+        body={"beam": PAPER_BEAM | beam},
+        carriage={"load": {"kind": "mass", "on": "beam", "mass": 100.0, "motion": {"kind": "free", "start": 2.0}}},
+        question={"duration": 60.0},
+    )
+
+
+def steps(
+    study: Study, duration: float, count: int, every: int = 1, scheme: Weights = AVERAGE_ACCELERATION
+) -> tuple[FloatingModel, Marched]:
+    """The march of a study of one variant."""
+    model = build(study)
+    stations = np.arange(0, count + 1, every)
+    return model, march(model, VariantValues(study, {}, 1), np.array([duration]), count, stations, scheme)
+
+
+def history(model: FloatingModel, marched: Marched, group: str, first: int = 0, count: int = 1) -> np.ndarray:
+    """(stations, count) signals of a group."""
+    start = model.signal_of(group) + first
+    return marched.history[0, :, start : start + count]

@@ -1,0 +1,201 @@
+"""Frames that are driven, hinged and free: closed forms, conserved quantities, published numbers, another
+formulation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from engine.floating.model import build
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from tests.floating.scenes import ARM, FOX_GOODWIN, history, steps
+from tests.naive.particles_in_frames import Particles, beam_in_plane
+
+SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
+
+
+def arm(frame: dict[str, object], **body: object) -> Study:
+    sensor = {"tip": {"body": "arm", "at": 10.0}}
+    return Study(kind="moving-frames", gravity=0.0, body={"arm": ARM | body}, frame={"arm": frame}, sensor=sensor)
+
+
+def test_spin_up_of_kane_ryan_and_banerjee() -> None:
+    """Largest lag of the tip and its time, ringing after 15 s, steady extension with axial modes: within 0.2 %."""
+    model, marched = steps(arm({"stiffening": True, "axial_modes": 3, "joints": [SPIN_UP]}), 20.0, 8000)
+    times, tip = marched.times[0], history(model, marched, "sensors")[:, 0]
+    k = int(np.argmax(tip))
+    assert (tip[k], times[k]) == pytest.approx((0.57437, 6.76), rel=2e-3)
+    assert np.abs(tip[times > 15.0]).max() == pytest.approx(3.65e-3, rel=5e-3)
+    end = history(model, marched, "ends", 0, 3)[times > 15.0]
+    assert (np.hypot(end[:, 0], end[:, 2]) - 10.0).mean() == pytest.approx(5.143e-4, rel=2e-3)
+
+
+def test_spin_up_without_stiffening_diverges() -> None:
+    """Above its first frequency, 3.8 rad/s, a spinning arm without stiffening has none left."""
+    _, marched = steps(arm({"joints": [SPIN_UP]}), 20.0, 4000)
+    assert marched.status[0] == Status.DIVERGED
+    assert marched.times[0][marched.last[0]] > 8.0  # s: the rate passes 3.8 rad/s at 8.9 s
+
+
+@pytest.mark.parametrize(
+    ("eta", "out_of_plane"),
+    [(2.0, (4.1373, 22.6149, 62.2732)), (6.0, (7.3604, 26.8091, 66.6839)), (12.0, (13.1702, 37.6031, 79.6145))],
+)
+def test_frequencies_of_a_rotating_cantilever(eta: float, out_of_plane: tuple[float, ...]) -> None:
+    """Wright et al. (1982), out of the plane of rotation and in it (mu^2 - eta^2), by the model's matrices; 0.1 %."""
+    model = build(arm({"stiffening": True, "joints": [SPIN_UP]}, modes=10))
+    body = model.bodies["arm"]
+    unit = np.sqrt(7e10 * 2e-7 / 1.2) / 100.0
+    _, along = body.stiffening()
+    stiffness = np.diag(body.omega**2) + (eta * unit) ** 2 * along
+    found = np.sqrt(np.linalg.eigvalsh(stiffness)[:3]) / unit
+    assert found == pytest.approx(out_of_plane, rel=1e-3)
+    in_plane = np.sqrt(np.linalg.eigvalsh(stiffness - (eta * unit) ** 2 * np.eye(10))[:3]) / unit
+    assert in_plane**2 == pytest.approx(np.array(out_of_plane) ** 2 - eta**2, rel=2e-3)
+
+
+def test_a_steadily_turning_beam_stretches_as_in_statics() -> None:
+    """u(L) = rho w^2 L^3/(3 E) of a rod, within what its axial modes leave."""
+    steady = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 5.0, "time": 2.0}}
+    model, marched = steps(
+        arm({"stiffening": True, "axial_modes": 12, "joints": [steady]}, damping_ratio=0.2), 30.0, 60000, 60000
+    )
+    end = history(model, marched, "ends", 0, 3)[-1]
+    assert np.hypot(end[0], end[2]) - 10.0 == pytest.approx(3000.0 * 25.0 * 1000.0 / (3.0 * 7e10), rel=2e-3)
+
+
+def test_torque_free_tumbling() -> None:
+    """A rigid body in space against Euler's equations by SciPy; order 2."""
+    body = {"kind": "rigid", "length": 2.0, "mass": 5.0, "inertia": 1.0}
+    frame = {"inertia": [1.0, 2.0, 3.0], "joints": [{"kind": "free", "rate": [0.1, 1.5, 0.2]}]}
+    study = Study(kind="moving-frames", gravity=0.0, body={"hull": body}, frame={"hull": frame})
+    inertia = np.array([1.0, 2.0, 3.0])
+    # the frame sits at an end of the body, whose centre moves on evenly
+    found = solve_ivp(
+        lambda t, w: -np.cross(w, inertia * w) / inertia, (0, 10), [0.1, 1.5, 0.2], rtol=1e-11, atol=1e-12
+    )
+    errors = []
+    for count in (1000, 2000, 4000):
+        model, marched = steps(study, 10.0, count, count)
+        rate = history(model, marched, "frames", 10, 3)[-1]
+        errors.append(np.abs(rate - found.y[:, -1]).max())
+        momentum = history(model, marched, "whole", 5, 3)
+        assert momentum[-1] == pytest.approx(momentum[0], rel=1e-3)
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] < 1e-5
+
+
+FLYER = {
+    "kind": "beam",
+    "length": 10.0,
+    "area": 4e-3,
+    "second_moment": 2e-5,
+    "youngs_modulus": 7e9,
+    "density": 3000.0,
+    "supports": "free-free",
+    "modes": 3,
+}
+
+
+def test_a_free_body_with_a_carriage_keeps_its_momentum() -> None:
+    """Linear and angular momentum over 10 s to 1e-4 with 350 steps per first period; order 2."""
+    frame = {
+        "lateral_second_moment": 3e-5,
+        "lateral_modes": 2,
+        "turned": [0.1, -0.2, 0.3],
+        "joints": [{"kind": "free", "rate": [0.5, 0.3, -0.4], "velocity": [0.1, 0.0, 0.2]}],
+    }
+    motion = {"kind": "waypoints", "times": [0, 4, 10], "positions": [1, 8, 2]}
+    cart = {"kind": "mass", "on": "hull", "mass": 20.0, "inertia": [1.0, 2.0, 1.5], "height": 0.3, "motion": motion}
+    study = Study(
+        kind="moving-frames", gravity=0.0, body={"hull": FLYER}, frame={"hull": frame}, carriage={"cart": cart}
+    )
+    period = 2.0 * np.pi / build(study).first_omega
+    drifts = []
+    for per_period in (350, 700):
+        count = int(10.0 / period * per_period)
+        model, marched = steps(study, 10.0, count, 5)
+        whole = history(model, marched, "whole", 2, 6)
+        gone = np.abs(whole - whole[0])
+        drifts.append([gone[:, :3].max() / np.abs(whole[0, :3]).max(), gone[:, 3:].max() / np.abs(whole[0, 3:]).max()])
+    assert np.max(drifts[0]) < 1e-4
+    assert np.log2(np.array(drifts[0]) / drifts[1]) == pytest.approx(2.0, abs=0.2)
+
+
+def sines(x: np.ndarray, modes: int, length: float, mass: float) -> np.ndarray:
+    k = np.arange(1, modes + 1) * np.pi / length
+    return np.sqrt(2.0 / mass) * np.sin(np.multiply.outer(x, k))
+
+
+@pytest.mark.parametrize("held", ["driven", "hinged", "free"])
+def test_another_formulation(held: str) -> None:
+    """A pinned beam in the plane with a mass that slides on it, its frame driven, hinged or free: particles over the
+    ground and SciPy, to 1e-6."""
+    joint: dict[str, object] = {"kind": "revolute", "axis": [0, 1, 0]}
+    given = {}
+    if held == "driven":
+        joint["motion"] = {"kind": "swing", "amplitude": 0.4, "frequency": 0.25}
+        rate = 0.5 * np.pi
+        given = {
+            2: lambda t: (0.4 * np.sin(rate * t), 0.4 * rate * np.cos(rate * t), -0.4 * rate**2 * np.sin(rate * t))
+        }
+    joints = [joint] if held != "free" else [{"kind": "prismatic", "axis": a} for a in ([1, 0, 0], [0, 0, 1])] + [joint]
+    if held != "free":
+        given |= {0: lambda t: (0.0, 0.0, 0.0), 1: lambda t: (0.0, 0.0, 0.0)}
+    beam = FLYER | {"supports": "pinned-pinned", "modes": 2, "second_moment": 4e-6, "own_weight": True}
+    load = {"kind": "mass", "on": "hull", "mass": 40.0, "motion": {"kind": "free", "start": 4.0, "speed": 0.5}}
+    study = Study(
+        kind="moving-frames",
+        gravity=9.81,
+        body={"hull": beam | {"damping_ratio": 0.01}},
+        frame={"hull": {"joints": joints}},
+        carriage={"load": load},
+    )
+    duration, count = 1.2, 4800
+    found = []
+    for scheme in (FOX_GOODWIN,):
+        model, marched = steps(study, duration, count, 48, scheme)
+        found.append(
+            np.column_stack([history(model, marched, "ends", 0, 3)[:, [0, 2]], history(model, marched, "carriages")])
+        )
+    times, mass, modes = marched.times[0], 120.0, 2
+    x, dm = np.polynomial.legendre.leggauss(24)
+    places, masses = beam_in_plane(lambda s: sines(s, modes, 10.0, mass), 5.0 * (x + 1.0), 0.5 * mass * dm, 40.0, modes)
+    omega = (np.arange(1, modes + 1) * np.pi / 10.0) ** 2 * np.sqrt(7e9 * 4e-6 / 12.0)
+    none = np.zeros(3)
+    twin = Particles(
+        places,
+        masses,
+        np.concatenate([none, omega**2, [0.0]]),
+        np.concatenate([none, 0.02 * omega, [0.0]]),
+        9.81,
+        given,
+    )
+    y, u = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 4.0]), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
+    for k, motion in given.items():
+        y[k], u[k], _ = motion(0.0)
+    other = twin.march(y, u, times)
+    angle = other[:, 2]
+    ends = np.column_stack([other[:, 0] + 10.0 * np.cos(angle), other[:, 1] - 10.0 * np.sin(angle)])
+    assert found[0][:, :2] == pytest.approx(ends, abs=1e-5)
+    assert found[0][:, 2] == pytest.approx(other[:, -1], abs=1e-5)
+
+
+def test_a_frame_sits_where_shapes_vanish() -> None:
+    with pytest.raises(BadInput, match=r"body\.arm\.supports"):
+        build(arm({"joints": [SPIN_UP]}, supports="free-clamped"))
+
+
+def test_closed_loops_are_refused() -> None:
+    body = {"kind": "rigid", "length": 1.0, "mass": 1.0, "inertia": 1.0}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"one": body, "two": body},
+        frame={"one": {"on": "two"}, "two": {"on": "one"}},
+    )
+    with pytest.raises(BadInput, match="closed loops"):
+        build(study)

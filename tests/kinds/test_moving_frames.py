@@ -1,0 +1,131 @@
+"""Studies of bodies whose frames move: from the study file to the dataset and its sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import studies
+from engine.scene.study import Study
+from engine.scene.sweep import expand
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from studies.kinds.sliding_mass import KIND
+from studies.protocol.study import kind_of
+from studies.results.results import Results
+from tests.floating.scenes import ARM, sliding_mass
+
+SWEPT = {
+    "mass": {"of": "carriage.load.mass", "values": [50.0, 100.0]},
+    "damping": {"of": "body.beam.damping_ratio", "values": [0.0, 0.02]},
+}
+
+
+def paper(duration: float = 6.0, **more: object) -> Study:
+    """The paper's beam with a sweep."""
+    data = sliding_mass().data | {"kind": "sliding-mass", "question": {"duration": duration}, "sweep": SWEPT}
+    return Study(**{key: value for key, value in (data | more).items() if key != "schema_version"})
+
+
+def test_a_sweep_is_the_same_whatever_shares_it_out() -> None:
+    one, two = (studies.run(paper(), threads=threads) for threads in (1, 2))
+    for name, variable in one.variables.items():
+        assert variable.equals(two[name].variable), name
+    assert one["status"].dims == ("mass", "damping")
+    assert (one["estimated_error"].sel(result="load_position_max") < 1e-3).all()
+    assert one["load_position"].dims == ("mass", "damping", "station")
+    assert one["load_period"].shape == (2, 2)
+
+
+def test_what_is_told_of_errors_holds() -> None:
+    """Against the same at a hundredth of the tolerance."""
+    found = studies.run(paper())
+    better = studies.run(paper(solver={"tolerance": 1e-6}))
+    assert (better["steps_used"] > found["steps_used"]).any()
+    gap = np.abs(found["load_position"] - better["load_position"]).max("station") / 15.0
+    told = found["estimated_error"].sel(result="load_position_max")
+    assert (gap < 1e-3).all()
+    assert (gap <= told + 1e-6).all()
+
+
+def test_the_answer_stands_beside_the_paper() -> None:
+    study = paper()
+    said = KIND.findings(Results.of(studies.run(study)))
+    assert "period" not in said[0]  # six seconds are less than one
+    assert any("reaches 16.75 m/s²" in sentence and "it is 20." in sentence for sentence in said)
+
+
+def test_a_kind_with_figures() -> None:
+    dataset = studies.run(paper())
+    names = [figure.name for figure in studies.figures(dataset)]
+    assert {"histories", "load-portrait"} <= set(names)
+
+
+def test_a_mass_that_lifts_off_is_marked() -> None:
+    study = paper().with_values({"carriage.load.motion.start": 4.0})
+    status = studies.run(study)["status"]
+    assert status.sel(mass=100.0, damping=0.0) == Status.SEPARATED
+    assert status.sel(mass=50.0, damping=0.02) == Status.OK
+
+
+def test_open_modes_are_found() -> None:
+    """With the number of modes left open the carriage's way settles, too."""
+    study = paper(2.0, sweep={}).with_values({"body.beam.modes": "auto", "solver.tolerance": 1e-2})
+    dataset = studies.run(study)
+    assert dataset["modes_used"] >= 4
+    assert dataset["status"] == Status.OK
+
+
+def test_every_kind_that_keeps_bodies_still_refuses_frames() -> None:
+    data = {key: value for key, value in sliding_mass().data.items() if key not in ("schema_version", "question")}
+    with pytest.raises(BadInput, match="carriages go where they are told") as refused:
+        kind_of(Study(**(data | {"kind": "trajectory"})))
+    assert 'kind = "moving-frames"' in str(refused.value)
+
+
+def broken(**tables: object) -> Callable[[], object]:
+    data = {key: value for key, value in sliding_mass().data.items() if key != "schema_version"}
+    return lambda: kind_of(Study(**(data | tables))).parts(Study(**(data | tables)))
+
+
+LOAD = {"kind": "mass", "on": "beam", "mass": 1.0, "motion": {"kind": "free", "start": 2.0}}
+REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ({"initial": "equilibrium"}, "start undeformed"),
+        ({"question": {}}, r"question\.duration"),
+        ({"solver": {"scheme": "central-difference", "fidelity": "force"}}, "have one model"),
+        ({"carriage": {"load": LOAD | {"kind": "force", "force": 1.0, "mass": None}}}, "mass"),
+        ({"carriage": {"load": LOAD | {"delay": 1.0}}}, "set off at time 0"),
+        ({"carriage": {"load": LOAD | {"motion": {"kind": "free", "start": 20.0}}}}, "starts on its body"),
+        ({"frame": {"other": {}}}, "no such body"),
+        ({"frame": {"beam": {"at": 1.0}}}, "the ground has no track"),
+        ({"frame": {"beam": {"joints": [REVOLUTE | {"axis": [0, 0, 0]}]}}}, "an axis needs a direction"),
+        ({"frame": {"beam": {"lateral_modes": 2}}}, "lateral_second_moment"),
+        ({"sensor": {"under": {"under": "load", "quantity": "velocity"}}}, "only the displacement"),
+    ],
+)
+def test_what_cannot_be_is_refused(tables: dict[str, object], words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        broken(**tables)()
+
+
+def test_numbers_of_joints_may_be_swept() -> None:
+    joint = REVOLUTE | {"motion": {"kind": "spin-up", "rate": 1.0, "time": 1.0}}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": ARM | {"modes": 2}},
+        frame={"arm": {"joints": [joint], "stiffening": True}},
+        sensor={"tip": {"body": "arm", "at": 10.0}},
+        sweep={"rate": {"of": "frame.arm.joints.0.motion.rate", "values": [0.5, 1.0]}},
+        question={"duration": 1.5},
+    )
+    assert expand(study).size == 2
+    tip = studies.run(study)["tip_max"]
+    assert tip[1] > 1.5 * tip[0] > 0.0
