@@ -269,7 +269,6 @@ def _system(model: FloatingModel) -> System:
         if N:
             track[b, ..., :N] = body.track()
             shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
-    loads = _loads(model, names, n)
     return System(
         tree,
         numbers,
@@ -280,7 +279,6 @@ def _system(model: FloatingModel) -> System:
         track,
         shorter.reshape(B, CELLS, 6, n * n),
         _riders(model, names),
-        *loads,
         np.arange(B, dtype=np.int64),
         _ends(model, n),
         *_readings(model),
@@ -339,11 +337,6 @@ def _riders(model: FloatingModel, names: list[str]) -> Counts:
         for name, carriage in model.study.carriage.items()
     ]
     return np.array(rows, dtype=np.int64).reshape(-1, 4)
-
-
-def _loads(model: FloatingModel, names: list[str], n: int) -> tuple[Counts, Array]:
-    """Forces at fixed places: none yet."""
-    return np.zeros((0, 3), dtype=np.int64), np.zeros((0, columns.LOAD_SHAPE + 3 * n))
 
 
 def _ends(model: FloatingModel, n: int) -> Array:

@@ -13,21 +13,16 @@ from engine.kernels.floating.layout import (
     COORDINATE,
     COULOMB,
     DAMPER,
-    DIRECTION,
     DRIVE,
     END_JOINT,
     FIRST,
     FIRST_JOINT,
     FIRST_ORDER,
-    FOLLOWS,
     HANGING_SHAPE,
     HANGING_TURN,
     HEIGHT,
     INERTIA,
     KIND,
-    LOAD_PLACE,
-    LOAD_SHAPE,
-    LOADED,
     MASS,
     MODAL_MASS,
     MODES,
@@ -45,7 +40,6 @@ from engine.kernels.floating.layout import (
     RIDDEN,
     SECOND,
     SECOND_ORDER,
-    SIZE,
     SLIP,
     SPHERICAL,
     SPRING,
@@ -151,8 +145,6 @@ def residual(system, lane, x, work, out):
             body_forces(system, lane, b, x, work, out)
     for c in range(system.riders.shape[0]):
         carriage_forces(system, lane, c, x, work, out)
-    for f in range(system.load_table.shape[0]):
-        load_forces(system, f, x, work, out)
     for b in range(bodies - 1, -1, -1):
         if not system.tree[b, RESTS]:
             gather(system, lane, b, x, work, out)
@@ -474,23 +466,6 @@ def along_track(lane, c, ds, f, tangent):
         if normal > 0.0:
             found -= lane.carriages[c, COULOMB] * np.sqrt(normal) * np.tanh(ds * stretch / lane.carriages[c, SLIP])
     return found * stretch
-
-
-@called
-def load_forces(system, f, x, work, out):
-    """A force at a place of a body, (21)."""
-    b = system.load_table[f, LOADED]
-    first, size = system.tree[b, FIRST], -work.motions[system.load_table[f, SIZE], 0]
-    force = times(size, vector(system.loads, f, DIRECTION))
-    if system.load_table[f, FOLLOWS] == 0:
-        force = turned_in(matrix(work.frames, b, ATTITUDE), force)
-    d = vector(system.loads, f, LOAD_PLACE)
-    for i in range(system.tree[b, MODES]):
-        phi = vector(system.loads, f, LOAD_SHAPE + 3 * i)
-        d = add(d, times(x.y[first + i], phi))
-        out[first + i] += dot(phi, force)
-    add_vector(work.frames, b, FORCE, force)
-    add_vector(work.frames, b, TORQUE, cross(d, force))
 
 
 @called

@@ -34,10 +34,6 @@ SECOND_ORDER, STIFFNESS, STIFFENING, MODAL_MASS, PAIR = 0, 9, 10, 12, 13
 KIND, COORDINATE, MOTION = 0, 1, 2
 # columns of System.riders: body; coordinate of its place and motion as of a joint; coordinate of its sprung mass or -1
 RIDDEN, PLACE_COORDINATE, PLACE_MOTION, SPRUNG_COORDINATE = 0, 1, 2, 3
-# columns of System.load_table: body; 1 where the direction turns with the frame; the motion that gives its size.
-# Of System.loads: place, direction, and (3 n) the displacement of the place by each mode
-LOADED, FOLLOWS, SIZE = 0, 1, 2
-LOAD_PLACE, DIRECTION, LOAD_SHAPE = 0, 3, 6
 # columns of Lane.carriages: mass, inertia about its centre, height of that below the track; sprung mass, stiffness and
 # damping; drive force along the track, viscous friction, Coulomb's coefficient, the speed over which that sets in
 OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB, SLIP, CARRIAGE = (
@@ -54,7 +50,7 @@ class System(NamedTuple):
     joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
     track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
     5 in equal cells; foreshortening (B, cells, 6, n n): G likewise.
-    riders (C, 4). load_table (F, 3), loads (F, 6 + 3 n). points (P, 3 + 3 n), pointed (P): places whose position over
+    riders (C, 4). points (P, 3 + 3 n), pointed (P): places whose position over
     the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations.
@@ -69,8 +65,6 @@ class System(NamedTuple):
     track: FloatArray
     foreshortening: FloatArray
     riders: IntArray
-    load_table: IntArray
-    loads: FloatArray
     pointed: IntArray
     points: FloatArray
     readings: FloatArray
