@@ -18,6 +18,7 @@ ASKED = {
     "engine.bodies.files": "what versions of foreign packages have",
     "engine.kernels": "layouts of coefficients, for which compiled code is specialised",
     "engine.methods": "the same",
+    "engine.floating": "sorts of bodies, joints and schemes that its kernels know: they do not answer for it yet",
     "studies.commands.planned_numerics": "which groups were chosen for before anything is marched",
     "studies.reporting.report": "what stands beside a table in a study's data",
 }

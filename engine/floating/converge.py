@@ -62,7 +62,7 @@ class Converged:
 def levels(study: Study, duration: float) -> Iterator[Level]:
     """Coarse to fine, for a time (s) that the longest of the variants takes."""
     fixed = study.solver.steps
-    is_open = any(body.modes == "auto" and hasattr(body, "modes_are_open") for body in study.body.values())
+    is_open = any(body.modes == "auto" for body in study.body.values())
     model = build(study, FIRST_MODES)
     least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
     first = STATIONS * max(1, int(np.ceil(least / STATIONS)))

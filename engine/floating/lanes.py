@@ -85,7 +85,7 @@ def _carriage(model: FloatingModel, numbers: Numbers, name: str, start: Array, o
         for column, part in ((columns.SPRUNG_MASS, "mass"), (columns.SPRING, "stiffness"), (columns.DAMPER, "damping")):
             own[:, column] = numbers.of(f"{key}.{part}")
     else:
-        for axis in range(3):
+        for axis in range(3 if model.study.value(f"{key}.inertia") is not None else 0):
             own[:, columns.INERTIA + axis] = numbers.of(f"{key}.inertia.{axis}")
         own[:, columns.HEIGHT] = numbers.of(f"{key}.height")
     if name in model.places:

@@ -154,7 +154,7 @@ class MassCarriage(Carriage):
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
     inertia_along: bool = False
-    inertia: Annotated[tuple[Inertia, Inertia, Inertia], Strict(False)] = (0.0, 0.0, 0.0)
+    inertia: Annotated[tuple[Inertia, Inertia, Inertia], Strict(False)] | None = None
     height: Length = 0.0
 
     @property

@@ -23,7 +23,7 @@ from tests.studies import scenes
 KINDS = tuple(scenes.MOTIONS)
 
 
-MEASURING = ("eigenfrequencies", "influence", "stability", "work-precision")
+MEASURING = ("eigenfrequencies", "influence", "stability", "work-precision", "moving-frames", "sliding-mass")
 
 
 def test_all_kinds_are_found_by_their_files() -> None:

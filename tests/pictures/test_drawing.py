@@ -56,7 +56,8 @@ def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
             assert f"mode {mode}: {number(omega / (2.0 * np.pi))} Hz" in rest
     for word in (*found.carriage, *found.sensor, found.title):
         assert word in shown
-    assert text.count("<animate ") >= 2
+    modes = sum(part.modal.omega.size for part in base_scene(found).bodies)
+    assert text.count("<animate ") >= min(2, modes)
 
 
 def test_a_hostile_title_stays_text(tmp_path: Path) -> None:

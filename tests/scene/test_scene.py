@@ -118,7 +118,7 @@ def test_numbers_and_units() -> None:
         ('kind = "beam"', 'kind = "matrices"', ["body.bed", "unknown key", "stiffness, mass"]),
         ('kind = "mass"', 'kind = "body"', ["carriage.table", "unknown key", "contacts"]),
         ('kind = "mass"', 'kind = "oscillator"', ["carriage.table.stiffness", "missing"]),
-        ('kind = "cruise"', 'kind = "free"', ["carriage.load.motion.kind", "not built yet"]),
+        ('kind = "cruise"', 'kind = "free"', ["carriage.load.motion.end", "unknown key", '"cruise"']),
         ('on = "bed"', 'on = "bad"', ["carriage.table.on", '"bed"']),
         ('under = "table"', 'under = "tabel"', ["sensor.table_moment.under", '"table"']),
         ('under = "table"', 'under = "table"\nat = 1.0', ["sensor.table_moment", "exactly one"]),
