@@ -223,9 +223,7 @@ def make_plan(
             grids.append(grid)
             members.append(own)
     check_places(study, (grid.scene for grid in grids))
-    plan = Plan(
-        study, cases, asked, tuple(grids), tuple(members), _shown(study, cases.size), base_scene(study), results
-    )
+    plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base_scene(study), results)
     check_memory(study, plan.size, plan.disk_bytes)
     return plan
 
@@ -306,7 +304,7 @@ def check_memory(study: Study, size: int, result_bytes: int) -> None:
         )
 
 
-def _shown(study: Study, size: int) -> Counts:
+def shown(study: Study, size: int) -> Counts:
     """Variants whose histories are kept: all, none, or some spread over the sweep."""
     wanted = study.output.histories
     if wanted == "none":

@@ -39,17 +39,20 @@ ENOUGH = 0.5  # of the tolerance by which an answer may be told to be off, as in
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A model, and steps over the whole time by a scheme."""
+    """A model, and steps over the whole time by a scheme; every: steps between stations, which are at the same times on
+    every level."""
 
     model: FloatingModel
     steps: int
+    every: int
     scheme: NewmarkScheme | AlphaScheme
 
 
 @dataclass(frozen=True, eq=False)
 class Converged:
     """What V variants report: error (R, V) of every result, NaN where no estimate exists; modes, steps (V,) that each
-    took; unresolved and missed (V,): whether what is held has no estimate, or one beyond its tolerance."""
+    took, all by one scheme; status (V,): that of the march, or whether what is held has no estimate or misses its
+    tolerance."""
 
     outcome: Outcome
     error: Array
@@ -67,12 +70,14 @@ def levels(study: Study, duration: float) -> Iterator[Level]:
     least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
     first = STATIONS * max(1, int(np.ceil(least / STATIONS)))
     scheme = scheme_of(study, duration / first * model.highest_omega)
+    coarsest = first if fixed == "auto" else int(fixed)
+    every = int(np.ceil(coarsest / STATIONS))
     for level in range(LEVELS):
-        steps = first * 2**level if fixed == "auto" else int(fixed) * 2**level
+        steps = coarsest * 2**level
         modes = FIRST_MODES * 2**level
         if steps > MOST_STEPS or (fixed != "auto" and level > 1) or (is_open and modes > MOST_MODES):
             return
-        yield Level(build(study, modes) if is_open and level else model, steps, scheme)
+        yield Level(build(study, modes) if is_open and level else model, steps, every * 2**level, scheme)
 
 
 def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:
@@ -146,8 +151,7 @@ def converge(
 
 def _stations(level: Level) -> Counts:
     """Stations at the same times on every level."""
-    every = max(1, level.steps // STATIONS)
-    return np.arange(0, level.steps + 1, every, dtype=np.int64)[: STATIONS + 1]
+    return np.arange(0, level.steps + 1, level.every, dtype=np.int64)
 
 
 def _worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> Array:

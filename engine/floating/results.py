@@ -31,6 +31,7 @@ OF_CARRIAGES = (
 )
 ENDS = ("max", "min")
 KINETIC, POTENTIAL = 0, 1  # signals of the whole
+ROUNDING = 1e-9  # of a time
 
 
 class Signal(NamedTuple):
@@ -127,7 +128,10 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
     """(R, V) how far two outcomes of the same variants are apart, over the largest of each signal that ``other`` has:
     extremes no less than histories at common times. Infinite where only ``one`` has no numbers, NaN where the other."""
     gaps = np.abs(one.history - other.history)
-    gaps = np.where(np.isnan(gaps), 0.0, gaps).max(axis=1)
+    ended = np.minimum(one.numbers["duration"], other.numbers["duration"])[:, None, None]
+    known = np.isnan(one.history) == np.isnan(other.history)
+    gone = known | (other.times[:, :, None] >= ended * (1.0 - ROUNDING))  # one has slid over an end before the other
+    gaps = np.where(np.isnan(gaps), np.where(gone, 0.0, np.inf), gaps).max(axis=1)
     found = []
     for signal in signals(model):
         largest = np.maximum(*(np.abs(other.numbers[f"{signal.name}_{end}"]) for end in ENDS))
@@ -139,9 +143,9 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
     found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]
     apart = np.stack(found)
-    ended = np.abs(one.numbers["duration"] - other.numbers["duration"]) / other.numbers["duration"]
+    sooner = np.abs(one.numbers["duration"] - other.numbers["duration"]) / other.numbers["duration"]
     left = one.status == Status.SEPARATED
-    apart[:, left] = np.maximum(apart[:, left], ended[left])
+    apart[:, left] = np.maximum(apart[:, left], sooner[left])
     apart[:, one.status >= Status.NOT_CONVERGED] = np.inf
     apart[:, other.status >= Status.NOT_CONVERGED] = np.nan
     return apart

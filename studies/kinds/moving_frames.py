@@ -50,6 +50,12 @@ class MovingFrames(PiecedKind):
         if study.solver.fidelity not in ("auto", "full"):
             where = study.source.where("solver.fidelity")
             raise BadInput("frames that move have one model", where=where, expected='"auto"')
+        if study.output.histories not in ("auto", "all", "none"):
+            what, where = (
+                "histories of frames that move are kept at some 800 times",
+                study.source.where("output.histories"),
+            )
+            raise BadInput(what, where=where, expected='"auto", "all" variants or "none"')
 
     def pieces(self, study: Study) -> Sequence[Piece]:
         from studies.moving.parts import pieces

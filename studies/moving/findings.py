@@ -53,8 +53,8 @@ def sliding(results: Results) -> Iterator[str]:
         force = dataset[f"{name}_contact_force_max"]
         index = extreme(force)
         if index is not None:
-            least = _span(dataset[f"{name}_contact_force_min"].values, force.values, "N")
-            yield f"It presses with {least}{in_words(results, index)}."
+            span = _span(dataset[f"{name}_contact_force_min"].values, force.values, "N")
+            yield f"Its contact force goes from {span}, the largest{in_words(results, index)}."
 
 
 def _sensors(results: Results) -> Iterator[str]:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from engine.scene.sweep import Cases
 
-SHOWN = 64  # variants whose histories are kept by default
 PIECE_SECONDS = 8.0  # of one piece, about
 STEP_SECONDS, MODE_SECONDS = 4e-6, 8e-7  # of a step, and for each coordinate besides, about; for sizes of pieces only
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
@@ -85,21 +84,12 @@ def results_names(model: FloatingModel) -> list[str]:
     return [result.name for result in results_of(model)]
 
 
-def shown(study: Study, size: int) -> Counts:
-    """Variants whose histories are kept: all, none, or some spread over the sweep."""
-    wanted = study.output.histories
-    if wanted == "none":
-        return np.zeros(0, dtype=np.int64)
-    if wanted != "auto" or size <= SHOWN:
-        return np.arange(size, dtype=np.int64)
-    return np.unique(np.rint(np.linspace(0, size - 1, SHOWN)).astype(np.int64))
-
-
 def _march(
     study: Study, cases: Cases, variants: Counts, duration: Callable[[Mapping[str, Array], int], Array], work: Work
 ) -> xr.Dataset:
     """The results of some variants of one scene, on threads."""
     from engine.batch.execution import run_jobs
+    from engine.batch.plan import shown
     from engine.floating.converge import converge
     from engine.floating.model import build
     from engine.scene.variants import VariantValues

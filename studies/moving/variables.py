@@ -63,6 +63,17 @@ def _of_carriages() -> list[Variable]:
 
 
 RESULTS = (
+    Variable(
+        "estimated_error",
+        ("result",),
+        "float32",
+        long_name="estimated error of every reported number",
+        meaning="of a signal over its own largest value; of places over the length of the track; NaN where no estimate "
+        "exists",
+        required=False,
+        nan_allowed=True,
+    ),
+    Variable("steps_used", (), "int32", long_name="number of steps used", meaning="over the whole time"),
     *_ends("{sensor}", "{sensor}", "value of {sensor}"),
     Variable("{sensor}_rms", units="{sensor}", long_name="root mean square of {sensor}", meaning="over the whole time"),
     _history("{sensor}", (), "{sensor}", "history of {sensor}"),

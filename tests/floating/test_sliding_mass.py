@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from engine.floating.results import differences, outcome, results_of
 from tests.floating.scenes import FOX_GOODWIN, history, sliding_mass, steps
 
 PERIOD = 2.0 * np.pi / 6.5480886  # of the beam, s
@@ -90,3 +93,14 @@ def test_a_carriage_that_slides_over_an_end_stops_its_variant() -> None:
     assert 0 < marched.last[0] < 4000
     assert history(model, marched, "carriages")[0, 0] == 2.0
     assert np.isnan(history(model, marched, "carriages")[-1, 0])
+
+
+def test_a_missing_part_of_a_history_is_a_difference() -> None:
+    """A number that only one of two marches has counts, unless its variant had ended by then."""
+    model, marched = steps(sliding_mass(), 1.0, 800, 8)
+    whole = outcome(model, marched)
+    holed = outcome(model, replace(marched, history=marched.history.copy()))
+    assert not differences(model, whole, whole).any()
+    holed.history[0, 5, model.signal_of("carriages")] = np.nan
+    named = [result.name for result in results_of(model)]
+    assert differences(model, holed, whole)[named.index("load_position_max"), 0] == np.inf

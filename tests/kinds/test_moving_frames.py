@@ -50,6 +50,15 @@ def test_what_is_told_of_errors_holds() -> None:
     assert (gap <= told + 1e-6).all()
 
 
+@pytest.mark.parametrize("steps", [500, 1001])
+def test_fixed_steps_are_told_of(steps: int) -> None:
+    """Whatever their number, histories go on to the end, and twice as many steps tell the error."""
+    found = studies.run(paper(2.0, solver={"steps": steps}, sweep={}))
+    assert found["steps_used"] == 2 * steps
+    assert float(found["elapsed"].max()) == pytest.approx(2.0, rel=2e-3)
+    assert 0.0 < found["estimated_error"].sel(result="load_position_max") < 1e-2
+
+
 def test_the_answer_stands_beside_the_paper() -> None:
     study = paper()
     said = KIND.findings(Results.of(studies.run(study)))
@@ -99,6 +108,7 @@ REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
     [
         ({"initial": "equilibrium"}, "start undeformed"),
         ({"question": {}}, r"question\.duration"),
+        ({"output": {"histories": {"every": 3}}}, "some 800 times"),
         ({"solver": {"scheme": "central-difference", "fidelity": "force"}}, "have one model"),
         ({"carriage": {"load": LOAD | {"kind": "force", "force": 1.0, "mass": None}}}, "mass"),
         ({"carriage": {"load": LOAD | {"delay": 1.0}}}, "set off at time 0"),
