@@ -52,7 +52,7 @@ declare(
 
 declare(
     EVERY_KIND,
-    Variable("status", (), "int8", None, "status of the variant", "the highest that applies", Status),
+    Variable("status", (), "int8", None, "status of the variant", "the most serious that applies", Status),
     Variable("fidelity_used", (), "int8", None, "model used", "the cheapest that holds the tolerance", Fidelity),
     Variable(
         "modes_used",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import IntEnum
 
 _MESSAGES = (
@@ -13,11 +12,12 @@ _MESSAGES = (
     "an eigenvalue, tie or Newton solution did not converge; no values",
     "the march left the finite numbers; no values",
     "the worker died in this variant; no values",
+    "a body turns too fast without stiffening by its rotation, or bends too far for small deflections; values kept",
 )
 
 
 class Status(IntEnum):
-    """Result code of one variant; where several apply, the highest.
+    """Result code of one variant; where several apply, the one that comes first in `GRAVEST`.
 
     >>> Status.TOLERANCE_MISSED.values_kept, Status.DIVERGED.values_kept
     (True, False)
@@ -30,6 +30,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 4
     DIVERGED = 5
     CRASHED = 6
+    BEYOND_THEORY = 7
 
     @property
     def message(self) -> str:
@@ -39,7 +40,22 @@ class Status(IntEnum):
     @property
     def values_kept(self) -> bool:
         """Whether the variant's results are numbers; otherwise they are NaN."""
-        return self < Status.NOT_CONVERGED
+        return self not in LOST
+
+
+#: All statuses, the most serious first.
+GRAVEST = (
+    Status.CRASHED,
+    Status.DIVERGED,
+    Status.NOT_CONVERGED,
+    Status.TOLERANCE_MISSED,
+    Status.UNRESOLVED,
+    Status.SEPARATED,
+    Status.BEYOND_THEORY,
+    Status.OK,
+)
+#: Those of variants whose results are NaN.
+LOST = GRAVEST[:3]
 
 
 class Fidelity(IntEnum):
@@ -92,12 +108,3 @@ def label(flag: IntEnum) -> str:
     'tolerance-missed'
     """
     return flag.name.lower().replace("_", "-")
-
-
-def highest(flags: Sequence[Status]) -> Status:
-    """The status that counts where several apply (ok where none does).
-
-    >>> highest([Status.SEPARATED, Status.TOLERANCE_MISSED]).name
-    'TOLERANCE_MISSED'
-    """
-    return max(flags, default=Status.OK)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.errors import ArchiveError
-from results_schema.status import Status
+from results_schema.statuses import lost
 from results_schema.variables import Variable, axes, expand
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _failed(dataset: xr.Dataset, array: xr.DataArray) -> np.ndarray | None:
     if "status" not in dataset:
         return np.zeros(array.shape, bool)
     status = dataset["status"]
-    failed = status.values >= Status.NOT_CONVERGED
+    failed = lost(status.values)
     if "history" in array.dims and "history" in dataset.coords:
         chosen = dataset["history"].values
         if chosen.min() < 0 or chosen.max() >= failed.size:

@@ -18,7 +18,7 @@ from engine.observation.contact_forces import contact_forces
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
-from results_schema.status import Status
+from results_schema.statuses import lost
 
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome
@@ -159,8 +159,8 @@ def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Out
     with np.errstate(invalid="ignore", over="ignore"):  # of those that have diverged
         pair = Pair(asked, model, values, one, other, _apart(one, other))
         found = np.stack([apart(pair) for family in FAMILIES for _, apart in family(asked)])
-    found[:, one.status >= Status.NOT_CONVERGED] = np.inf
-    found[:, other.status >= Status.NOT_CONVERGED] = np.nan
+    found[:, lost(one.status)] = np.inf
+    found[:, lost(other.status)] = np.nan
     return found
 
 

@@ -32,7 +32,7 @@ from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
-from results_schema.status import Status
+from results_schema.statuses import lost
 
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred
@@ -119,7 +119,7 @@ def _compared(plan: Plan, group: Group, variants: Counts, truth: Converged, halt
     own, true = variants[lanes], truth.outcome.of(lanes)
     values = plan.values(group, own)
     archived = group.found(values, own, plan.choice, halted, "histories")
-    known = (true.status < Status.NOT_CONVERGED) & (archived.outcome.status < Status.NOT_CONVERGED)
+    known = ~lost(true.status) & ~lost(archived.outcome.status)
     same = [truth.used[name][lanes] == archived.used[name] for name in USED]
     known &= ~np.all(same, axis=0)  # a march is no second source of itself
     observed = differences(plan.asked, group.scene, values, archived.outcome, true)

@@ -18,6 +18,7 @@ from engine.observation.histories import counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
+from results_schema.statuses import gravest, lost
 from results_schema.store.rows import Rows, joined
 
 
@@ -30,7 +31,7 @@ def run_chunk(
     found = group.found(values, variants, plan.choice, halted)
     results = results_of(plan.asked)
     error, status = told_errors(found, results), _status(plan, group, found)
-    missing = status >= Status.NOT_CONVERGED
+    missing = lost(status)
     error[:, missing] = np.nan
     flat = dict(found.outcome.numbers) | {
         "status": status,
@@ -66,7 +67,7 @@ def _status(plan: Plan, group: Group, found: Found) -> NDArray[np.int8]:
     known = worst_held(found.error, results_of(plan.asked))
     unknown = np.isnan(held) | (np.isnan(known) & ~_all_is_fixed(group))
     missed = np.where(unknown, np.int8(Status.UNRESOLVED), missed)
-    return np.maximum(found.outcome.status, missed).astype(np.int8)
+    return gravest(found.outcome.status, missed)
 
 
 def _all_is_fixed(group: Group) -> bool:

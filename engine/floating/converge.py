@@ -19,6 +19,7 @@ from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -135,7 +136,7 @@ def converge(
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
         held[active] = _worst(told, results, own)
-        failed = now.status >= Status.NOT_CONVERGED
+        failed = lost(now.status)
         hopeless = failed & (level.steps >= HOPELESS * coarsest)
         active = active[~(held[active] <= ENOUGH) & ~hopeless]
         if not active.size:
@@ -143,10 +144,10 @@ def converge(
     assert found is not None
     none_held = ~np.any(np.isfinite([result.tolerance for result in results]))
     unresolved = np.isnan(held) & ~none_held
-    status = np.where(unresolved, Status.UNRESOLVED, np.where(held > 1.0, Status.TOLERANCE_MISSED, Status.OK))
-    lost = found.status >= Status.NOT_CONVERGED
-    error[:, lost] = np.nan
-    return Converged(found, error, modes, steps, scheme, np.maximum(status, found.status).astype(np.int8))
+    missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
+    status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
+    error[:, lost(found.status)] = np.nan
+    return Converged(found, error, modes, steps, scheme, gravest(status, found.status))
 
 
 def _stations(level: Level) -> Counts:

@@ -15,6 +15,7 @@ from engine.kernels.floating.march import march as march_lanes
 from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
+from results_schema.statuses import gravest
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -55,5 +56,5 @@ def march(
     lifts = heavy & (
         statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST].min(axis=1, initial=0.0) < 0.0
     )
-    status = np.maximum(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
+    status = gravest(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
     return Marched(statistics, history, stations * h[:, None], status, h, last)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.floating.elastic import CELLS, ElasticBody, Z, elastic_body
+from engine.floating.elastic import CELLS, ElasticBody, Y, Z, elastic_body
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from engine.scene.sensors import Sensor
     from engine.scene.study import Study
 
+OF_DEPTH = 4  # signals of a body
 HELD = 1e-9  # of the largest: a shape below is zero
 
 
@@ -85,12 +86,13 @@ class FloatingModel:
         """How many signals kernels observe."""
         bodies = len(self.bodies)
         carriages = OF_CARRIAGE * len(self.study.carriage)
-        return len(self.study.sensor) + carriages + (OF_POINT + OF_BODY) * bodies + OF_WHOLE
+        return len(self.study.sensor) + OF_DEPTH * bodies + carriages + (OF_POINT + OF_BODY) * bodies + OF_WHOLE
 
     def signal_of(self, group: str) -> int:
-        """Number of the first signal of the sensors, carriages, ends, frames, or of the whole."""
+        """Number of the first signal of the sensors, depths, carriages, ends, frames, or of the whole."""
         counts = {
             "sensors": len(self.study.sensor),
+            "depths": OF_DEPTH * len(self.bodies),
             "carriages": OF_CARRIAGE * len(self.study.carriage),
             "ends": OF_POINT * len(self.bodies),
             "frames": OF_BODY * len(self.bodies),
@@ -98,6 +100,12 @@ class FloatingModel:
         }
         names = list(counts)
         return sum(counts[name] for name in names[: names.index(group)])
+
+    @property
+    def depths(self) -> dict[str, slice]:
+        """Signals that tell how far each body bends: across the track, along y and z, at its middle and its end."""
+        first = self.signal_of("depths")
+        return {name: slice(first + OF_DEPTH * b, first + OF_DEPTH * (b + 1)) for b, name in enumerate(self.bodies)}
 
 
 def build(study: Study, modes: int | None = None) -> FloatingModel:
@@ -351,7 +359,8 @@ def _ends(model: FloatingModel, n: int) -> Array:
 
 
 def _readings(model: FloatingModel) -> tuple[Array, Counts]:
-    """Rows of the sensors, and under which carriage they read, in which direction, by which rate."""
+    """Rows of the sensors and of what tells how far bodies bend, and under which carriage they read, in which
+    direction, by which rate."""
     carriages = list(model.study.carriage)
     rows, under = np.zeros((len(model.study.sensor), model.size)), []
     for row, sensor in zip(rows, model.study.sensor.values(), strict=True):
@@ -365,7 +374,20 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
             fields = body.fields(np.array([sensor.at]), (quantity.derivative,))[0, 0, Z]
             first = model.first[name]
             row[first : first + body.omega.size] = quantity.factor(_section(model.study.body[name])) * fields
-    return rows, np.array(under, dtype=np.int64).reshape(-1, 3)
+    depths = _depths(model)
+    under += [(-1, Z, 0)] * len(depths)
+    return np.concatenate([rows, depths]), np.array(under, dtype=np.int64).reshape(-1, 3)
+
+
+def _depths(model: FloatingModel) -> Array:
+    """(B OF_DEPTH, N): see `FloatingModel.depths`."""
+    rows = np.zeros((len(model.bodies), OF_DEPTH, model.size))
+    for (name, body), own in zip(model.bodies.items(), rows, strict=True):
+        if body.omega.size:
+            fields = body.fields(np.array([0.5, 1.0]) * body.length, (0,))[0, :, Y : Z + 1]
+            first = model.first[name]
+            own[:, first : first + body.omega.size] = fields.reshape(OF_DEPTH, -1)
+    return rows.reshape(-1, model.size)
 
 
 def _section(body: Any) -> Any:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.floating.theory import bent_times, unstiffened_times
 from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Status
+from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.march import Marched
@@ -118,10 +120,12 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
     energy = marched.history[:, :, whole + KINETIC] + marched.history[:, :, whole + POTENTIAL]
     found["energy_change"] = np.nanmax(np.abs(energy - energy[:, :1]), axis=1)
     found["duration"] = marched.last * step
-    lost = marched.status >= Status.NOT_CONVERGED
-    for array in found.values():
-        array[lost] = np.nan
-    return Outcome(found, marched.history, marched.times, marched.status)
+    limits = {"unstiffened_time": unstiffened_times(model, marched), "bent_time": bent_times(model, marched)}
+    for array in (*found.values(), marched.history):
+        array[lost(marched.status)] = np.nan
+    left = np.isfinite(np.concatenate(list(limits.values()), axis=1)).any(axis=1)
+    status = gravest(marched.status, np.where(left, np.int8(Status.BEYOND_THEORY), np.int8(Status.OK)))
+    return Outcome(found | limits, marched.history, marched.times, status)
 
 
 def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
@@ -146,8 +150,8 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
     sooner = np.abs(one.numbers["duration"] - other.numbers["duration"]) / other.numbers["duration"]
     left = one.status == Status.SEPARATED
     apart[:, left] = np.maximum(apart[:, left], sooner[left])
-    apart[:, one.status >= Status.NOT_CONVERGED] = np.inf
-    apart[:, other.status >= Status.NOT_CONVERGED] = np.nan
+    apart[:, lost(one.status)] = np.inf
+    apart[:, lost(other.status)] = np.nan
     return apart
 
 

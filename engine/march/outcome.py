@@ -24,6 +24,7 @@ from engine.observation.histories import counts_reduced
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity, SchemeUsed, Status
+from results_schema.statuses import lost
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -116,7 +117,7 @@ def outcome(
     status, diverged_step = _status(tables.model, marched)
     for array in numbers.values():
         if array.dtype == np.float64:
-            array[status >= Status.NOT_CONVERGED] = np.nan
+            array[lost(status)] = np.nan
     return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
 
 
@@ -305,7 +306,7 @@ def histories(
     status, _ = _status(tables.model, marched)
     for name, array in arrays.items():
         if name != "elapsed":
-            array[status >= Status.NOT_CONVERGED] = np.nan
+            array[lost(status)] = np.nan
     return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
 

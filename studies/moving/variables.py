@@ -96,6 +96,21 @@ RESULTS = (
     Variable(
         "duration", units="s", long_name="time that was marched", meaning="less where a carriage slid over an end"
     ),
+    *(
+        Variable(
+            name,
+            ("frame",),
+            units="s",
+            long_name=f"time at which a body begins to {words}",
+            meaning="the first of the recorded ones, also of variants that diverge later; NaN where none is",
+            required=False,
+            nan_allowed=True,
+        )
+        for name, words in (
+            ("unstiffened_time", "lack 5 % of its stiffness, as it turns fast without `stiffening`"),
+            ("bent_time", "bend by more than a tenth of its length"),
+        )
+    ),
     _history("end_place", ("frame", "component"), "m", "place over the ground of the far end of a track"),
     _history("frame_place", ("frame", "component"), "m", "place over the ground of the frame of a body"),
     _history("frame_attitude", ("frame", "quaternion"), "", "attitude of the frame of a body, as a unit quaternion"),

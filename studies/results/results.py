@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.status import Status, label
+from results_schema.status import LOST, Status, label
 from results_schema.variables import sensor_unit
 from studies.results.formatting import Scale, axis_title, number, quantity
 
@@ -216,7 +216,7 @@ class Results:
     @cached_property
     def kept(self) -> xr.DataArray:
         """Where the status keeps values."""
-        return self.dataset["status"] < int(Status.NOT_CONVERGED)
+        return ~self.dataset["status"].isin(LOST)
 
     @cached_property
     def held(self) -> Mask:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
+from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
@@ -42,7 +43,7 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
 
     choose(plan, work.threads, work.stop.event)
     variants = sampled(plan)
-    kept = _flat(plan, dataset["status"])[variants] < int(Status.NOT_CONVERGED)
+    kept = ~lost(_flat(plan, dataset["status"])[variants])
     found = _on_threads(plan, variants[kept], work)
     work.check()
     if not found.variants.size:

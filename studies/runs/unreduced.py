@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array
-from results_schema.status import Status
+from results_schema.statuses import lost
 from results_schema.variables import axes, declarations, sensor_unit
 from studies.results.formatting import counted, listed, percent
 from studies.results.results import Results, spread
@@ -50,7 +50,7 @@ def _used(dataset: xr.Dataset, variant: int) -> dict[str, NDArray[Any]]:
 
 def _chosen(plan: Plan, dataset: xr.Dataset) -> list[int]:
     """Flat numbers of variants with values, spread over the sweep."""
-    kept = np.flatnonzero(dataset["status"].values.ravel() < int(Status.NOT_CONVERGED))
+    kept = np.flatnonzero(~lost(dataset["status"].values.ravel()))
     wanted = plan.study.output.unreduced
     return [int(kept[place]) for place in spread(len(kept), wanted)] if wanted and len(kept) else []
 

@@ -1,11 +1,13 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from results_schema import variables
 from results_schema.errors import BadInput
-from results_schema.status import Fidelity, Status, flag_meanings, flag_values, highest, label
+from results_schema.status import GRAVEST, Fidelity, Status, flag_meanings, flag_values, label
+from results_schema.statuses import gravest, lost
 from results_schema.variables import RESERVED, Variable, axes, declarations, declare, expand, registered, sensor_unit
 from tests.readme import reference_table
 
@@ -19,15 +21,25 @@ def test_status_and_fidelity_are_the_contract():
         (4, "not-converged"),
         (5, "diverged"),
         (6, "crashed"),
+        (7, "beyond-theory"),
     ]
-    assert [s for s in Status if s.values_kept] == list(Status)[:4]
+    assert [s for s in Status if s.values_kept] == [*list(Status)[:4], Status.BEYOND_THEORY]
     assert [label(f) for f in Fidelity] == ["static", "force", "mass-without-convective", "mass", "tied", "frame"]
     assert len({s.message for s in Status}) == len(Status)
-    assert highest([]) is Status.OK
+
+
+def test_of_several_statuses_the_most_serious_counts():
+    """In the contract's order: what is beyond the theory comes last."""
+    of_values = ["tolerance-missed", "unresolved", "separated", "beyond-theory", "ok"]
+    assert [label(status) for status in GRAVEST] == ["crashed", "diverged", "not-converged", *of_values]
+    for place, status in enumerate(GRAVEST):
+        for other in GRAVEST[place:]:
+            assert gravest(np.array([status]), np.array([other])) == gravest(np.array([other]), status) == status
+    assert lost(np.array(Status)).tolist() == [not status.values_kept for status in Status]
 
 
 def test_flags_are_cf():
-    assert flag_values(Status) == list(range(7))
+    assert flag_values(Status) == list(range(8))
     assert flag_meanings(Status).split()[3] == "tolerance_missed"
     assert len(flag_meanings(Fidelity).split()) == len(flag_values(Fidelity))
 
@@ -43,7 +55,7 @@ def test_expand_fills_names_units_and_texts():
 
 def test_attributes_are_cf():
     found = expand("march", {"midspan": "m"}, ["table"])
-    assert found["status"].attributes()["flag_values"] == [0, 1, 2, 3, 4, 5, 6]
+    assert found["status"].attributes()["flag_values"] == [0, 1, 2, 3, 4, 5, 6, 7]
     assert "units" not in found["status"].attributes()
     assert found["error_estimate"].attributes()["units"] == "1"
 

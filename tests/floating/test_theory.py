@@ -1,0 +1,85 @@
+"""Where the theory of frames that move ends: statuses, and the times from which they hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import studies
+from engine.floating.model import build
+from engine.floating.results import outcome
+from engine.floating.theory import MISSING, lacking
+from engine.scene.study import Study
+from results_schema.status import Status
+from studies.kinds.moving_frames import KIND
+from studies.results.results import Results
+from tests.floating.scenes import ARM, steps
+
+RATES = [0.4, 0.9, 6.0]  # rad/s; the arm's lowest frequency is 3.8 rad/s
+SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
+
+
+def spin_up(duration: float, frame: dict[str, object], **more: object) -> Study:
+    """The arm of Kane, Ryan and Banerjee (1987)."""
+    tables: dict[str, object] = {
+        "body": {"arm": ARM | {"modes": 2}},
+        "frame": {"arm": {"joints": [SPIN_UP]} | frame},
+        "sensor": {"tip": {"body": "arm", "at": 10.0}},
+        "question": {"duration": duration},
+    }
+    return Study(kind="moving-frames", gravity=0.0, **(tables | more))
+
+
+def test_what_a_body_lacks_is_what_stiffening_gives() -> None:
+    """Of a cantilever's first mode 1.193 of the squared rate over its squared frequency (Wright et al. 1982)."""
+    body = build(spin_up(1.0, {})).bodies["arm"]
+    one = lacking(build(spin_up(1.0, {}, body={"arm": ARM | {"modes": 1}})).bodies["arm"])
+    assert one * body.omega[0] ** 2 == pytest.approx(1.193, rel=1e-3)
+    assert one < lacking(body) < 1.05 * one
+    assert lacking(replace(body, stiffens=True)) == 0.0
+
+
+def test_the_warning_comes_before_the_march_diverges() -> None:
+    """The rate at which 5 % of the stiffness lack is passed seconds before that of the arm's own frequency."""
+    study = spin_up(20.0, {})
+    model, marched = steps(study, 20.0, 4000, 5)
+    found = outcome(model, marched)
+    assert found.status[0] == Status.DIVERGED
+    (told,) = found.numbers["unstiffened_time"][0]
+    rate = 6.0 / 15.0 * told - 6.0 / (2.0 * np.pi) * np.sin(2.0 * np.pi * told / 15.0)
+    assert rate == pytest.approx(np.sqrt(MISSING / lacking(model.bodies["arm"])), rel=0.02)
+    (bent,) = found.numbers["bent_time"][0]
+    assert told + 2.0 < bent < found.numbers["duration"][0] or np.isnan(found.numbers["duration"][0])
+    assert bent < marched.times[0, -1]
+
+
+def test_variants_beyond_the_theory_keep_their_values() -> None:
+    """A slow rate is fine, a middle one is marked, a fast one diverges; stiffened all are fine."""
+    sweep = {"rate": {"of": "frame.arm.joints.0.motion.rate", "values": RATES}}
+    expected = spin_up(16.0, {}, sweep=sweep, expected=["beyond-theory", "diverged"])
+    found = studies.run(expected)
+    assert found["status"].values.tolist() == [Status.OK, Status.BEYOND_THEORY, Status.DIVERGED]
+    assert np.isfinite(found["tip_max"]).values.tolist() == [True, True, False]
+    assert np.isfinite(found["unstiffened_time"].sel(frame="arm")).values.tolist() == [False, True, True]
+    said = [line for line in KIND.findings(Results.of(found)) if "beyond the theory" in line]
+    assert "in 2 variants of 3" in said[0]
+    assert "in 1 variant of 3" in said[1]
+    stiff = studies.run(spin_up(16.0, {"stiffening": True}, sweep=sweep))
+    assert (stiff["status"] == Status.OK).all()
+    assert np.isnan(stiff["unstiffened_time"]).all()
+
+
+def test_what_bends_far_is_marked() -> None:
+    """A cantilever under its own weight alone, which bends by 2 w L^4/(8 E I) when it is let go: whatever turns."""
+    for density, status in ((1300.0, Status.OK), (1600.0, Status.BEYOND_THEORY)):
+        body = ARM | {"density": density, "own_weight": True, "modes": 2}
+        study = spin_up(12.0, {"joints": []}, body={"arm": body}, solver={"tolerance": 1e-2}).with_values(
+            {"gravity": 9.81}
+        )
+        tip = 2.0 * density * 4e-4 * 9.81 * 1e4 / (8.0 * 7e10 * 2e-7)
+        found = studies.run(study)
+        assert found["tip_max"] == pytest.approx(tip, rel=0.05)
+        assert found["status"] == status
+        assert np.isfinite(found["bent_time"]).all() == (status == Status.BEYOND_THEORY)
