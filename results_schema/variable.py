@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from textwrap import dedent
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from results_schema.status import flag_meanings, flag_values
@@ -66,16 +68,46 @@ class Variable:
         return own, array if self.dtype == "str" else array.astype(self.dtype), self.attributes()
 
 
-def axis(name: str, long_name: str, units: str = "", dtype: str = "float64", meaning: str = "") -> Variable:
-    """A coordinate along a dimension of its own, where a dataset has that."""
-    return Variable(name, (name,), dtype, units, long_name, meaning, required=False, lead="none")
+#: Words of a row of `outputs` and what they stand for; any other word is a type.
+WORDS: Mapping[str, Mapping[str, Any]] = {
+    "optional": {"required": False},
+    "axis": {"required": False, "lead": "none"},
+    "alone": {"lead": "none"},
+    "some": {"lead": "some"},
+    "history": {"lead": "history"},
+    "nan": {"nan_allowed": True},
+    "gaps": {"gaps_allowed": True},
+    "planned": {"planned": True},
+}
 
 
-def beside(
-    name: str, dims: tuple[str, ...], long_name: str, meaning: str = "", units: str = "", *, nan_allowed: bool = True
-) -> Variable:
-    """A number that some studies have, over dimensions of its own beside the sweep."""
-    return Variable(name, dims, "float64", units, long_name, meaning, None, False, nan_allowed, lead="none")
+def outputs(text: str, flags: Mapping[str, type[IntEnum]] = MappingProxyType({})) -> tuple[Variable, ...]:
+    """Outputs out of a table: a row of name, dimensions, unit ("-": None), words of `WORDS` or a type, long name; below
+    it, indented, the meaning, after the long name where the row has none. flags: by name.
+
+    The words of a row "*" are those of all rows below it. An axis is a coordinate along a dimension of its own.
+
+    >>> outputs("lag | sensor | m | nan | lag of the response")[0].dims
+    ('sensor',)
+    """
+    found, shared = list[Variable](), list[str]()
+    for line in dedent(text).strip("\n").splitlines():
+        if line.startswith(" "):
+            last, words = found[-1], line.strip()
+            more = {"meaning": f"{last.meaning} {words}".lstrip()} if last.long_name else {"long_name": words}
+            found[-1] = replace(last, **more)  # type: ignore[arg-type]
+            continue
+        name, dims, units, words, long_name = (cell.strip() for cell in line.split("|"))
+        if name == "*":
+            shared = words.split()
+            continue
+        given: dict[str, Any] = {"dims": tuple(dims.replace("/", "|").split()), "flags": flags.get(name)}
+        for word in (*shared, *words.split()):
+            given.update(WORDS.get(word, {"dtype": word}))
+            if word == "axis":
+                given["dims"] = (name,)
+        found.append(Variable(name, units=None if units == "-" else units, long_name=long_name, **given))
+    return tuple(found)
 
 
 REGISTRY: dict[str, dict[str, Variable]] = {}

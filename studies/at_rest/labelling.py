@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.variable import axis
+from results_schema.variable import outputs
 from results_schema.variables import Variable
 from studies.at_rest.positions import Asked, Positions, positions_of
 from studies.protocol.parts import usual
@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 
 BODY_PLACES = 101  # along every body, of its shapes
 
-COORDINATES = (
-    axis("on_body", "body", dtype="str"),
-    axis("body_place", "place along the body over the length of its track"),
-    axis("checked_position", "position at which numbers of modes are compared", units="m"),
-    axis("unreduced_position", "position at which the unreduced model is computed", units="m"),
-    axis("correction", "whether the static correction is on", dtype="int8", meaning="1 with, 0 without"),
-)
+COORDINATES = outputs("""
+    * | | | axis |
+    on_body | | | str | body
+    body_place | | | | place along the body over the length of its track
+    checked_position | | m | | position at which numbers of modes are compared
+    unreduced_position | | m | | position at which the unreduced model is computed
+    correction | | | int8 | whether the static correction is on
+        1 with, 0 without
+""")
 
 
 def asked_coordinates(places: Positions, asked: Asked) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variables import Variable
+from results_schema.variable import outputs
 from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
@@ -16,14 +16,11 @@ if TYPE_CHECKING:
 
     from engine.scene.study import Study
 
-DYNAMIC_AMPLIFICATION = Variable(
-    "dynamic_amplification",
-    ("sensor",),
-    long_name="dynamic amplification",
-    meaning="largest absolute value over the largest absolute static value of the same model; NaN where the static "
-    "value is zero (velocities, accelerations)",
-    nan_allowed=True,
-)
+(DYNAMIC_AMPLIFICATION,) = outputs("""
+    dynamic_amplification | sensor | | nan | dynamic amplification
+        largest absolute value over the largest absolute static value of the same model; NaN where the static value is
+        zero (velocities, accelerations)
+""")
 
 
 def sizes(results: Results, sensor: str) -> Array:

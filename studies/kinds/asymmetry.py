@@ -11,7 +11,8 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
-from results_schema.variables import MARCH, Variable, declare
+from results_schema.variable import outputs
+from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.settled import LEFT_OVER, Asked, odd_parts, thresholds
 from studies.protocol.study import Kind
@@ -30,38 +31,17 @@ CLOSE = 0.05
 MOST_SENSORS = 3
 REMAINDER = "by the damping of the first mode"
 
-RESULTS = (
-    Variable(
-        "lag",
-        ("sensor",),
-        units="m",
-        long_name="lag of the response",
-        meaning="<odd, dw_s/ds> over <dw_s/ds, dw_s/ds> on the cruise part of the last cycle, derivatives along "
-        "forward; negative when the response trails; NaN where the static response does not vary",
-        nan_allowed=True,
-    ),
-    Variable(
-        "loop_area",
-        ("sensor",),
-        long_name="area between forward and backward",
-        meaning="signed integral of forward minus backward over the cruise part's length times the static range R",
-        nan_allowed=True,
-    ),
-    Variable(
-        "odd_rms",
-        ("sensor",),
-        long_name="odd part of the response",
-        meaning="rms of half the difference of forward and backward over the static range R",
-        nan_allowed=True,
-    ),
-    Variable(
-        "even_excess",
-        ("sensor",),
-        long_name="dynamic part common to both ways",
-        meaning="rms of the mean of forward and backward minus the static response over the static range R",
-        nan_allowed=True,
-    ),
-)
+RESULTS = outputs("""
+    lag | sensor | m | nan | lag of the response
+        <odd, dw_s/ds> over <dw_s/ds, dw_s/ds> on the cruise part of the last cycle, derivatives along forward; negative
+        when the response trails; NaN where the static response does not vary
+    loop_area | sensor | | nan | area between forward and backward
+        signed integral of forward minus backward over the cruise part's length times the static range R
+    odd_rms | sensor | | nan | odd part of the response
+        rms of half the difference of forward and backward over the static range R
+    even_excess | sensor | | nan | dynamic part common to both ways
+        rms of the mean of forward and backward minus the static response over the static range R
+""")
 declare("asymmetry", *MARCH, *RESULTS)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from results_schema.arrays import Array, Mask
 from results_schema.status import Fidelity
-from results_schema.variables import AXES, MARCH, Variable, declare
+from results_schema.variable import outputs
+from results_schema.variables import AXES, MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.findings.peaks import PEAKS, peaks
@@ -36,58 +37,28 @@ SLOW = 0.1  # frequency ratio up to which the rule of thumb holds
 SYMMETRIC = 0.05  # odd over even harmonics below which the two halves of a cycle are alike
 UNLIKE = 0.1  # odd over even harmonics from which the two halves of a cycle look different
 
-RESULTS = (
-    Variable(
-        "peaks_per_cycle",
-        ("sensor",),
-        long_name="number of peaks in the last cycle",
-        meaning="maxima with a prominence above 2 % of the cycle's range",
-    ),
-    Variable(
-        "peak_value",
-        ("sensor", "peak"),
-        units="{sensor}",
-        long_name="value of the peak",
-        meaning="refined by a parabola, at a kink by lines; the 8 highest peaks in the order of their phase, NaN "
-        "beyond their number; in the unit of the sensor",
-        nan_allowed=True,
-    ),
-    Variable(
-        "peak_phase",
-        ("sensor", "peak"),
-        long_name="phase of the peak in the cycle",
-        meaning="0 to 1, 0 where the motion's formula starts; NaN beyond the number of peaks",
-        nan_allowed=True,
-    ),
-    Variable(
-        "odd_even_ratio",
-        ("sensor",),
-        long_name="odd over even harmonics",
-        meaning="rms of the odd over rms of the even harmonics (k = 1 to 16) of the last cycle",
-        nan_allowed=True,
-    ),
-    Variable(
-        "harmonic",
-        ("sensor", "harmonic_number"),
-        units="{sensor}",
-        long_name="amplitude of the harmonic",
-        meaning="2 abs(c_k), c_k the mean of w exp(-2 pi i k phase), so twice the mean's size for k = 0; NaN where "
-        "the cycle has too few steps; in the unit of the sensor",
-        nan_allowed=True,
-    ),
-)
+RESULTS = outputs("""
+    peaks_per_cycle | sensor | | | number of peaks in the last cycle
+        maxima with a prominence above 2 % of the cycle's range
+    peak_value | sensor peak | {sensor} | nan | value of the peak
+        refined by a parabola, at a kink by lines; the 8 highest peaks in the order of their phase, NaN beyond their
+        number; in the unit of the sensor
+    peak_phase | sensor peak | | nan | phase of the peak in the cycle
+        0 to 1, 0 where the motion's formula starts; NaN beyond the number of peaks
+    odd_even_ratio | sensor | | nan | odd over even harmonics
+        rms of the odd over rms of the even harmonics (k = 1 to 16) of the last cycle
+    harmonic | sensor harmonic_number | {sensor} | nan | amplitude of the harmonic
+        2 abs(c_k), c_k the mean of w exp(-2 pi i k phase), so twice the mean's size for k = 0; NaN where the cycle has
+        too few steps; in the unit of the sensor
+""")
 declare("double-peak", *MARCH, *RESULTS, DYNAMIC_AMPLIFICATION)
 declare(
     AXES,
-    Variable(
-        "harmonic_number", ("harmonic_number",), "int64", "", "number of the harmonic", required=False, lead="none"
-    ),
-    Variable(
-        "frequency_ratio",
-        long_name="frequency ratio",
-        meaning="cycles per second over the first natural frequency of the first carriage's body",
-        required=False,
-    ),
+    *outputs("""
+        harmonic_number | | | axis int64 | number of the harmonic
+        frequency_ratio | | | optional | frequency ratio
+            cycles per second over the first natural frequency of the first carriage's body
+    """),
 )
 
 

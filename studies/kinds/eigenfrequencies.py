@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from results_schema.arrays import Array
-from results_schema.variable import beside
-from results_schema.variables import Variable, declare
+from results_schema.variable import outputs
+from results_schema.variables import declare
 from studies.at_rest.at_rest import AtRestKind
 from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors
 from studies.at_rest.labelling import BODY_PLACES, COORDINATES
@@ -42,53 +42,24 @@ class Question(Asked):
 
 
 _COUPLED = "bodies and carriages together, undamped, the carriages at rest"
-RESULTS = (
-    Variable(
-        "frequency",
-        ("position", "mode"),
-        units="Hz",
-        long_name="natural frequency of the coupled system",
-        meaning=f"{_COUPLED}; motions that nothing resists are left out; NaN where there is none, or a contact is off "
-        "the body",
-        nan_allowed=True,
-    ),
-    Variable(
-        "base_frequency",
-        ("position", "mode"),
-        units="Hz",
-        long_name="natural frequency of the coupled system, of the scene without sweep",
-        lead="none",
-        nan_allowed=True,
-    ),
-    Variable(
-        "mode_shape",
-        ("on_body", "position", "mode", "body_place"),
-        units="kg-0.5",
-        long_name="coupled mode shape along every body, of the scene without sweep",
-        meaning="unit modal mass of the whole system; of the kept modes",
-        lead="none",
-        nan_allowed=True,
-    ),
-    beside(
-        "frequency_by_mode_count",
-        ("correction", "mode_count", "checked_position", "mode"),
-        "natural frequency with other numbers of modes of every body",
-        "of the scene without sweep",
-        units="Hz",
-    ),
-    beside(
-        "frequency_unreduced",
-        ("unreduced_position", "mode"),
-        "natural frequency of the unreduced finite-element model",
-        "of the scene without sweep",
-        units="Hz",
-    ),
-    beside(
-        "frequency_difference",
-        ("unreduced_position", "mode"),
-        "relative difference of the natural frequency from that of the unreduced model",
-    ),
-)
+RESULTS = outputs("""
+    frequency | position mode | Hz | nan | natural frequency of the coupled system
+        bodies and carriages together, undamped, the carriages at rest; motions that nothing resists are left out; NaN
+        where there is none, or a contact is off the body
+    base_frequency | position mode | Hz | alone nan |
+        natural frequency of the coupled system, of the scene without sweep
+    mode_shape | on_body position mode body_place | kg-0.5 | alone nan |
+        coupled mode shape along every body, of the scene without sweep
+        unit modal mass of the whole system; of the kept modes
+    frequency_by_mode_count | correction mode_count checked_position mode | Hz | optional alone nan |
+        natural frequency with other numbers of modes of every body
+        of the scene without sweep
+    frequency_unreduced | unreduced_position mode | Hz | optional alone nan |
+        natural frequency of the unreduced finite-element model
+        of the scene without sweep
+    frequency_difference | unreduced_position mode | | optional alone nan |
+        relative difference of the natural frequency from that of the unreduced model
+""")
 declare("eigenfrequencies", *RESULTS, *COORDINATES)
 
 

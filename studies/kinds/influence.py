@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
-from results_schema.variable import axis, beside
-from results_schema.variables import Variable, declare
+from results_schema.variable import outputs
+from results_schema.variables import declare
 from studies.at_rest.at_rest import AtRestKind, check_held
 from studies.at_rest.findings import READING_WANTED, ROUNDING, contacts_vary, enough_modes, reading_errors
 from studies.at_rest.labelling import BODY_PLACES, COORDINATES
@@ -31,78 +31,33 @@ MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
 
 _AT_REST = "at rest under gravity and the carriages' weights and forces"
-RESULTS = (
-    Variable(
-        "{sensor}",
-        ("position",),
-        units="{sensor}",
-        long_name="static reading of {sensor}",
-        meaning=f"{_AT_REST}, own weight of bodies included where it acts; NaN where a contact is off the body",
-        nan_allowed=True,
-    ),
-    Variable(
-        "{sensor}_influence",
-        ("position",),
-        units="{sensor} N-1",
-        long_name="influence line of {sensor}",
-        meaning="static reading per newton of the first carriage's weight alone, spread over its contacts as at rest",
-        nan_allowed=True,
-    ),
-    Variable(
-        "contact_force",
-        ("position", "contact"),
-        units="N",
-        long_name="static force at every contact",
-        meaning=f"{_AT_REST}; NaN where a contact of the first carriage is off the body",
-        nan_allowed=True,
-    ),
-    Variable(
-        "deflection",
-        ("on_body", "position", "body_place"),
-        units="m",
-        long_name="static deflection along every body, of the scene without sweep",
-        meaning=f"{_AT_REST}, as displacement sensors count it",
-        lead="none",
-    ),
-    beside(
-        "{sensor}_by_mode_count",
-        ("correction", "mode_count", "checked_position"),
-        "static reading of {sensor} with other numbers of modes of every body",
-        "of the scene without sweep",
-        units="{sensor}",
-        nan_allowed=False,
-    ),
-    beside(
-        "{sensor}_unreduced",
-        ("unreduced_position",),
-        "static reading of {sensor} by the unreduced finite-element model",
-        "of the scene without sweep",
-        units="{sensor}",
-        nan_allowed=False,
-    ),
-    beside(
-        "{sensor}_difference",
-        ("unreduced_position",),
-        "difference of {sensor} from the unreduced model",
-        "over the largest reading at these positions",
-        nan_allowed=False,
-    ),
-    beside(
-        "contact_force_unreduced",
-        ("unreduced_position", "contact"),
-        "static force at every contact by the unreduced finite-element model",
-        units="N",
-        nan_allowed=False,
-    ),
-    beside(
-        "contact_force_difference",
-        ("unreduced_position", "contact"),
-        "difference of contact forces from the unreduced model",
-        "over the largest force at these positions",
-        nan_allowed=False,
-    ),
-    axis("contact", "carriage, or carriage and contact", dtype="str"),
-)
+RESULTS = outputs("""
+    {sensor} | position | {sensor} | nan | static reading of {sensor}
+        at rest under gravity and the carriages' weights and forces, own weight of bodies included where it acts; NaN
+        where a contact is off the body
+    {sensor}_influence | position | {sensor} N-1 | nan | influence line of {sensor}
+        static reading per newton of the first carriage's weight alone, spread over its contacts as at rest
+    contact_force | position contact | N | nan | static force at every contact
+        at rest under gravity and the carriages' weights and forces; NaN where a contact of the first carriage is off
+        the body
+    deflection | on_body position body_place | m | alone |
+        static deflection along every body, of the scene without sweep
+        at rest under gravity and the carriages' weights and forces, as displacement sensors count it
+    {sensor}_by_mode_count | correction mode_count checked_position | {sensor} | optional alone |
+        static reading of {sensor} with other numbers of modes of every body
+        of the scene without sweep
+    {sensor}_unreduced | unreduced_position | {sensor} | optional alone |
+        static reading of {sensor} by the unreduced finite-element model
+        of the scene without sweep
+    {sensor}_difference | unreduced_position | | optional alone | difference of {sensor} from the unreduced model
+        over the largest reading at these positions
+    contact_force_unreduced | unreduced_position contact | N | optional alone |
+        static force at every contact by the unreduced finite-element model
+    contact_force_difference | unreduced_position contact | | optional alone |
+        difference of contact forces from the unreduced model
+        over the largest force at these positions
+    contact | | | axis str | carriage, or carriage and contact
+""")
 declare("influence", *RESULTS, *COORDINATES)
 
 

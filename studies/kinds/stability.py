@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.status import Fidelity, Status
-from results_schema.variables import axes, declare
+from results_schema.variables import declare
 from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked
 from studies.maps.table import MAPS
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from studies.results.results import Results
 
 for _map in MAPS.values():
-    declare("stability", *(axis for axis in _map.axes if axis.name not in axes()))
-    declare("stability", *_map.variables)
+    declare("stability", *_map.outputs)
 
 
 class Stability(PiecedKind):

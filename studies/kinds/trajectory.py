@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.variables import MARCH, Variable, declare
+from results_schema.variable import outputs
+from results_schema.variables import MARCH, declare
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
@@ -18,24 +19,16 @@ if TYPE_CHECKING:
 MOST_SENSORS = 4
 
 
-def _history(name: str, units: str, words: str) -> Variable:
-    return Variable(
-        f"{{carriage}}_{name}",
-        ("position|phase|station",),
-        units=units,
-        long_name=f"{words} of {{carriage}}",
-        meaning="NaN where it is off the body",
-        required=False,
-        lead="history",
-        nan_allowed=True,
-    )
-
-
-RESULTS = (
-    _history("speed", "m s-1", "speed along the track"),
-    _history("acceleration_along", "m s-2", "acceleration along the track"),
-    _history("acceleration_across", "m s-2", "acceleration in the direction of the deflection"),
-)
+RESULTS = outputs("""
+    * | | | optional history nan |
+    {carriage}_speed | position/phase/station | m s-1 | | speed along the track of {carriage}
+        NaN where it is off the body
+    {carriage}_acceleration_along | position/phase/station | m s-2 | | acceleration along the track of {carriage}
+        NaN where it is off the body
+    {carriage}_acceleration_across | position/phase/station | m s-2 | |
+        acceleration in the direction of the deflection of {carriage}
+        NaN where it is off the body
+""")
 declare("trajectory", *MARCH, *RESULTS)
 
 

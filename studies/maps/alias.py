@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import hht
@@ -31,20 +32,18 @@ BANDS = (
     (2.5, 4.0, 3),
 )  # first and last multiple of the rule's steps, and points
 
-AXES = (
-    axis("alias_scheme", "time integration scheme", dtype="str"),
-    axis("alias_mode_count", "number of modes", dtype="int64"),
-    axis("alias_speed_ratio", "speed over omega_1 L / pi"),
-    axis("alias_mass_ratio", "carriage mass over body mass"),
-    axis("step_multiple", "steps over the steps of the alias rule"),
-)
-VARIABLES = (
-    beside("growth", tuple(a.name for a in AXES), "growth per passage",
-           "spectral radius of its transition matrix "
-           "on modal displacements and velocities over omega"),
-    beside("alias_steps", ("alias_mode_count", "alias_speed_ratio"), "steps per passage of the alias rule",
-           "k_N v h = 2 atan(2/(omega_N h))", nan_allowed=False),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    alias_scheme | | | axis str | time integration scheme
+    alias_mode_count | | | axis int64 | number of modes
+    alias_speed_ratio | | | axis | speed over omega_1 L / pi
+    alias_mass_ratio | | | axis | carriage mass over body mass
+    step_multiple | | | axis | steps over the steps of the alias rule
+    growth | alias_scheme alias_mode_count alias_speed_ratio alias_mass_ratio step_multiple | | nan | growth per passage
+        spectral radius of its transition matrix on modal displacements and velocities over omega
+    alias_steps | alias_mode_count alias_speed_ratio | | | steps per passage of the alias rule
+        k_N v h = 2 atan(2/(omega_N h))
+""")
 
 
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
@@ -60,12 +59,17 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
                 work.check()
                 growth.append(passage_growth(scene, mass, float(v), multiples * steps).T)
             rules.append(rule)
-    ways: tuple[Any, ...] = (labels, asked.alias_mode_counts, speed, mass, multiples)
-    along = dict(zip((a.name for a in AXES), ways, strict=True))
-    shape = tuple(len(way) for way in ways)
+    along: dict[str, Sequence[Any] | Array] = {
+        "alias_scheme": labels,
+        "alias_mode_count": asked.alias_mode_counts,
+        "alias_speed_ratio": speed,
+        "alias_mass_ratio": mass,
+        "step_multiple": multiples,
+    }
+    shape = tuple(len(places) for places in along.values())
     values = {"growth": np.reshape(growth, shape), "alias_steps": rules[: len(asked.alias_mode_counts)]}
     marched = max(asked.alias_mode_counts), round(float(np.max(rules) * multiples.max()))
-    return dataset_of((*AXES, *VARIABLES), along, values, marched)
+    return dataset_of(OUTPUTS, along, values, marched)
 
 
 def rule_steps(scene: MapScene, speed: Array) -> Array:
@@ -138,4 +142,4 @@ def _times(growth: float, digits: int = 3) -> str:
     return f"{number(growth, digits)} times" if np.isfinite(growth) else "beyond all numbers"
 
 
-MAP = Map("alias", "growth per passage over steps, speed, mass and modes", 14.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("alias", "growth per passage over steps, speed, mass and modes", 14.0, OUTPUTS, compute, sentences)

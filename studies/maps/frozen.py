@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import counted, number, percent
@@ -26,24 +26,26 @@ LIMIT = 2.0 / math.pi  # of a pinned beam with all modes
 SWINGS = 1e-9  # imaginary part of a multiplier beyond which it is none of a motion that creeps
 SAME = 1.01  # growth up to which a passage is called neutral: what is left of the alias is smaller
 
-AXES = (
-    axis("held_mode_count", "number of modes", dtype="int64"),
-    axis("held_mass_ratio", "carriage mass over body mass"),
-    axis("centrifugal_number", "speed ratio times the square root of the mass ratio"),
-)
-_OVER = tuple(a.name for a in AXES)
-VARIABLES = (
-    beside("frozen_growth", _OVER, "growth during the time of one passage, frozen", "mass held at midspan, with the "
-           "terms of its speed; a property of the frozen station, not of a passage"),
-    beside("frozen_flutter", _OVER, "the same of what swings alone", "0 where nothing swings"),
-    beside("passage_growth", _OVER, "growth per passage", "the mass crosses"),
-    beside("frozen_divergence", ("held_mode_count",), "speed ratio times root of mass ratio where the frozen station "
-           "diverges", "begins to grow without swinging, by bisection on the march itself; NaN where it does not up to "
-           "1.2, or does from 0.3 on"),
-    beside("frozen_divergence_theory", ("held_mode_count",), "the same from the modes' sum",
-           "m v^2 times the sum of phi phi'' / omega^2 is -1; NaN where that cannot be"),
-    beside("frozen_limit", (), "the same with all modes", "2/pi, pinned beams only", nan_allowed=False),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    held_mode_count | | | axis int64 | number of modes
+    held_mass_ratio | | | axis | carriage mass over body mass
+    centrifugal_number | | | axis | speed ratio times the square root of the mass ratio
+    frozen_growth | held_mode_count held_mass_ratio centrifugal_number | | nan |
+        growth during the time of one passage, frozen
+        mass held at midspan, with the terms of its speed; a property of the frozen station, not of a passage
+    frozen_flutter | held_mode_count held_mass_ratio centrifugal_number | | nan | the same of what swings alone
+        0 where nothing swings
+    passage_growth | held_mode_count held_mass_ratio centrifugal_number | | nan | growth per passage
+        the mass crosses
+    frozen_divergence | held_mode_count | | nan | speed ratio times root of mass ratio where the frozen station diverges
+        begins to grow without swinging, by bisection on the march itself; NaN where it does not up to 1.2, or does from
+        0.3 on
+    frozen_divergence_theory | held_mode_count | | nan | the same from the modes' sum
+        m v^2 times the sum of phi phi'' / omega^2 is -1; NaN where that cannot be
+    frozen_limit | | | | the same with all modes
+        2/pi, pinned beams only
+""")
 
 
 class Grown(NamedTuple):
@@ -80,8 +82,12 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
     }
     if ground.is_pinned:
         values["frozen_limit"] = LIMIT
-    along: dict[str, object] = dict(zip(_OVER, (COUNTS, masses, number_of), strict=True))
-    return dataset_of((*AXES, *VARIABLES), along, values, (max(COUNTS), STEPS))
+    along: dict[str, object] = {
+        "held_mode_count": COUNTS,
+        "held_mass_ratio": masses,
+        "centrifugal_number": number_of,
+    }
+    return dataset_of(OUTPUTS, along, values, (max(COUNTS), STEPS))
 
 
 def frozen_growth(scene: MapScene, mass: float, number_of: Array) -> Grown:
@@ -121,7 +127,7 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     if swinging.any():
         share, slowest = (
             float(swinging.mean()),
-            float(dataset["centrifugal_number"].where(swinging.any(_OVER[1])).min()),
+            float(dataset["centrifugal_number"].where(swinging.any("held_mass_ratio")).min()),
         )
         least = ", the slowest tried" if slowest <= float(dataset["centrifugal_number"].min()) else ""
         found.append(
@@ -162,4 +168,4 @@ def _passages(growth: Array) -> str:
     return f"Real passages grow there too: {where}, all do, {low} to {high} times per passage."
 
 
-MAP = Map("frozen", "the frozen station beside the real passage", 4.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("frozen", "the frozen station beside the real passage", 4.0, OUTPUTS, compute, sentences)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, dataset_of, shared
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import listed, number
 
 if TYPE_CHECKING:
@@ -21,19 +21,16 @@ if TYPE_CHECKING:
 LIGHTEST, HEAVIEST = 0.01, 3.0  # mass ratios
 SHOWN = (1, 3, 5, 10, 20)
 
-AXES = (
-    shared("mode_count"),
-    shared("relative_step"),
-    axis("lagged_mass_ratio", "carriage mass over body mass"),
-)
-VARIABLES = (
-    beside("critical_mass_ratio", ("mode_count", "relative_step"), "mass ratio from which on lagged inertia grows",
-           "frozen at midspan, by bisection on the march itself; NaN where there is none up to 3"),
-    beside("critical_mass_ratio_theory", ("mode_count",), "mass ratio where m phi.phi = 1",
-           "for average acceleration, whatever the step", nan_allowed=False),
-    beside("lagged_growth", ("mode_count", "relative_step", "lagged_mass_ratio"), "growth per step of lagged inertia",
-           "frozen at midspan"),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    lagged_mass_ratio | | | axis | carriage mass over body mass
+    critical_mass_ratio | mode_count relative_step | | nan | mass ratio from which on lagged inertia grows
+        frozen at midspan, by bisection on the march itself; NaN where there is none up to 3
+    critical_mass_ratio_theory | mode_count | | | mass ratio where m phi.phi = 1
+        for average acceleration, whatever the step
+    lagged_growth | mode_count relative_step lagged_mass_ratio | | nan | growth per step of lagged inertia
+        frozen at midspan
+""")
 
 
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
@@ -56,7 +53,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
         "lagged_growth": np.reshape(growth, (len(counts), len(steps), mass.size)),
     }
     along = {"mode_count": counts, "relative_step": steps, "lagged_mass_ratio": mass}
-    return dataset_of((*AXES, *VARIABLES), along, values, (max(counts), 1))
+    return dataset_of(OUTPUTS, along, values, (max(counts), 1))
 
 
 def lagged_growth(scene: MapScene, mass: Array, relative: float) -> Array:
@@ -84,4 +81,4 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-MAP = Map("lagged-inertia", "lagged inertia over mass, modes and step", 4.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("lagged-inertia", "lagged inertia over mass, modes and step", 4.0, OUTPUTS, compute, sentences)

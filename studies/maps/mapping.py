@@ -52,22 +52,16 @@ class Asked(Spec):
 class Map:
     """One map.
 
-    name: as in the study file. words: what it does. seconds: expected. axes, variables: what its dataset holds.
-    compute: the dataset. sentences: what it says, from its own dataset.
+    name: as in the study file. words: what it does. seconds: expected. outputs: what its dataset holds, besides the
+    axes that several kinds of study have. compute: the dataset. sentences: what it says, from its own dataset.
     """
 
     name: str
     words: str
     seconds: float
-    axes: tuple[Variable, ...]
-    variables: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
     compute: Callable[[Ground, Asked, Work], xr.Dataset]
     sentences: Callable[[xr.Dataset], list[str]]
-
-
-def shared(name: str) -> Variable:
-    """The declaration of an axis that several kinds of study have."""
-    return axes()[name]
 
 
 def dataset_of(
@@ -80,7 +74,7 @@ def dataset_of(
     """
     import xarray as xr
 
-    known = {variable.name: variable for variable in declared}
+    known = axes() | {variable.name: variable for variable in declared}
     coords = {name: known[name].holding(found, (name,)) for name, found in along.items()}
     data = {name: known[name].holding(_finite(found)) for name, found in values.items()}
     return xr.Dataset(data, coords, dict(zip(("most_modes", "most_steps"), marched, strict=True)))

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of, shared
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import LABELS, METHODS, Method
 from studies.results.formatting import listed, number
 
@@ -24,14 +24,16 @@ FREQUENCY_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # omega h
 NOTABLE = 2.0
 LONG, LONGER = 20.0, 100.0  # omega h of the sentences
 
-AXES = (shared("scheme"), axis("overshoot_step", "omega h: natural frequency times the time step"))
-_MEANING = "of an undamped oscillator released at rest, over its first 20 steps; NaN beyond the scheme's limit"
-VARIABLES = (
-    beside("displacement_overshoot", ("scheme", "overshoot_step"), "overshoot in displacement",
-           "largest over the first, " + _MEANING),
-    beside("velocity_overshoot", ("scheme", "overshoot_step"), "overshoot in velocity",
-           "largest over omega times the first displacement, " + _MEANING),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    overshoot_step | | | axis | omega h: natural frequency times the time step
+    displacement_overshoot | scheme overshoot_step | | nan | overshoot in displacement
+        largest over the first, of an undamped oscillator released at rest, over its first 20 steps; NaN beyond the
+        scheme's limit
+    velocity_overshoot | scheme overshoot_step | | nan | overshoot in velocity
+        largest over omega times the first displacement, of an undamped oscillator released at rest, over its first 20
+        steps; NaN beyond the scheme's limit
+""")
 
 
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
@@ -45,7 +47,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
     displacement, velocity = np.moveaxis(np.array(found), 1, 0)
     values = {"displacement_overshoot": displacement, "velocity_overshoot": velocity}
     along = {"scheme": list(LABELS), "overshoot_step": x}
-    return dataset_of((*AXES, *VARIABLES), along, values, (1, FIRST_STEPS))
+    return dataset_of(OUTPUTS, along, values, (1, FIRST_STEPS))
 
 
 def overshoot(scene: MapScene, method: Method, x: Array) -> Array:
@@ -76,4 +78,4 @@ def _beyond(values: xr.DataArray) -> str:
     return listed(high) if high else f"no scheme goes beyond {number(NOTABLE)} times"
 
 
-MAP = Map("overshoot", "how far schemes overshoot in their first steps", 2.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("overshoot", "how far schemes overshoot in their first steps", 2.0, OUTPUTS, compute, sentences)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import METHODS, Method, generalized, hht
@@ -34,18 +34,18 @@ UNDAMPED = tuple(method.label for method in METHODS[:4])  # they damp no vibrati
 LOST = 1e6  # weights: a force beyond means nothing any more
 CALM = 0.1  # of the weight: ringing below is none to speak of
 
-AXES = (
-    axis("tie", "how the mass is tied, and the scheme", dtype="str"),
-    axis("passage_fraction", "place of the mass over the length"),
-)
-VARIABLES = (
-    beside("contact_force", ("tie", "passage_fraction"), "contact force", "over the weight; NaN "
-           "beyond a million"),
-    beside("contact_ringing", ("tie",), "ringing of the contact force", "over the weight: rms of the part that changes "
-           "its sign from step to step, (F[n+1] - 2 F[n] + F[n-1])/4; NaN where it blows up"),
-    beside("contact_departure", ("tie",), "largest departure of the contact force from that of the mass as inertia",
-           "over the weight; NaN where it blows up"),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    tie | | | axis str | how the mass is tied, and the scheme
+    passage_fraction | | | axis | place of the mass over the length
+    contact_force | tie passage_fraction | | nan | contact force
+        over the weight; NaN beyond a million
+    contact_ringing | tie | | nan | ringing of the contact force
+        over the weight: rms of the part that changes its sign from step to step, (F[n+1] - 2 F[n] + F[n-1])/4; NaN
+        where it blows up
+    contact_departure | tie | | nan | largest departure of the contact force from that of the mass as inertia
+        over the weight; NaN where it blows up
+""")
 
 
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
@@ -65,7 +65,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
         "contact_departure": departure,
     }
     along = {"tie": [INERTIAL, *(method.label for method in TIED)], "passage_fraction": np.arange(counted + 1) / STEPS}
-    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+    return dataset_of(OUTPUTS, along, values, (MODES, STEPS))
 
 
 def _inertial(ground: Ground, work: Work) -> Array:
@@ -118,4 +118,4 @@ def _calms(calm: list[str]) -> str:
     return told + (f"{listed(others)} {'does' if len(others) == 1 else 'do'} not ring either; " if others else "")
 
 
-MAP = Map("rigid-tie", "the contact force of a mass tied by its place", 2.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("rigid-tie", "the contact force of a mass tied by its place", 2.0, OUTPUTS, compute, sentences)

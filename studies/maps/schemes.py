@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, dataset_of, shared
+from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import LABELS, METHODS, Method
 from studies.results.formatting import listed, number
 
@@ -23,24 +23,23 @@ if TYPE_CHECKING:
 STEPS = 50  # marched for the measured growth
 SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to where a limit is looked for
 
-AXES = (shared("scheme"), axis("frequency_step", "omega h: natural frequency times the time step"))
-VARIABLES = (
-    beside("critical_step", ("scheme",), "omega h at which a scheme's amplification leaves 1", "omega h, by bisection "
-           "on the march itself; NaN where there is none up to 1000"),
-    beside("critical_step_theory", ("scheme",), "the same by the closed form", "omega h; NaN without "
-           "limit"),
-    beside("scheme_radius", ("scheme", "frequency_step"), "spectral radius of one step of the march",
-           nan_allowed=False),
-    beside("scheme_radius_theory", ("scheme", "frequency_step"), "spectral radius of the closed amplification matrix",
-           nan_allowed=False),
-    beside("scheme_growth", ("scheme", "frequency_step"), "growth per step over 50 marched steps", nan_allowed=False),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    frequency_step | | | axis | omega h: natural frequency times the time step
+    critical_step | scheme | | nan | omega h at which a scheme's amplification leaves 1
+        omega h, by bisection on the march itself; NaN where there is none up to 1000
+    critical_step_theory | scheme | | nan | the same by the closed form
+        omega h; NaN without limit
+    scheme_radius | scheme frequency_step | | | spectral radius of one step of the march
+    scheme_radius_theory | scheme frequency_step | | | spectral radius of the closed amplification matrix
+    scheme_growth | scheme frequency_step | | | growth per step over 50 marched steps
+""")
 
 
 def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
     """One mode of the body, without the mass, by every scheme."""
     x = np.geomspace(SMALLEST, LARGEST, asked.points(93))
-    found: dict[str, list[Array | float]] = {variable.name: [] for variable in VARIABLES}
+    found: dict[str, list[Array | float]] = {output.name: [] for output in OUTPUTS[1:]}
     for method in METHODS:
         work.check()
         scene = ground.passage(1, method.table)
@@ -51,7 +50,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
         grows = lambda at, s=scene, m=method: one_step(s, m, at) > 1.0 + GROWS  # noqa: E731
         found["critical_step"].append(threshold(grows, SMALLEST, FAR))
         found["critical_step_theory"].append(method.limit if math.isfinite(method.limit) else math.nan)
-    return dataset_of((*AXES, *VARIABLES), {"scheme": list(LABELS), "frequency_step": x}, found, (1, STEPS))
+    return dataset_of(OUTPUTS, {"scheme": list(LABELS), "frequency_step": x}, found, (1, STEPS))
 
 
 def one_step(scene: MapScene, method: Method, x: Array) -> Array:
@@ -81,4 +80,4 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-MAP = Map("schemes", "growth of every scheme over the step, and its limit", 4.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("schemes", "growth of every scheme over the step, and its limit", 4.0, OUTPUTS, compute, sentences)

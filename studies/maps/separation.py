@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import counted, listed, number, percent
@@ -23,18 +23,18 @@ MODES, STEPS = 20, 6000
 SLOWEST, FASTEST = 0.05, 1.5  # speed ratios
 REFINED = 48  # speeds between the last that holds and the first that does not
 
-AXES = (
-    axis("separation_mass_ratio", "carriage mass over body mass"),
-    axis("separation_speed_ratio", "speed over omega_1 L / pi"),
-)
-VARIABLES = (
-    beside("smallest_contact_force", tuple(a.name for a in AXES), "smallest contact force over the weight",
-           "over the weight, on 0-98 % of the span; NaN where the march overflows"),
-    beside("separation_onset", ("separation_mass_ratio",), "onset of separation",
-           "lowest speed ratio at which the contact opens; it may hold again at higher ones; NaN where it always "
-           "holds"),
-    beside("separation_place", ("separation_mass_ratio",), "place of separation", "in lengths, at that speed"),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    separation_mass_ratio | | | axis | carriage mass over body mass
+    separation_speed_ratio | | | axis | speed over omega_1 L / pi
+    smallest_contact_force | separation_mass_ratio separation_speed_ratio | | nan |
+        smallest contact force over the weight
+        over the weight, on 0-98 % of the span; NaN where the march overflows
+    separation_onset | separation_mass_ratio | | nan | onset of separation
+        lowest speed ratio at which the contact opens; it may hold again at higher ones; NaN where it always holds
+    separation_place | separation_mass_ratio | | nan | place of separation
+        in lengths, at that speed
+""")
 
 
 class Contact(NamedTuple):
@@ -66,7 +66,7 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
         "separation_place": [found.place for found in onsets],
     }
     along = {"separation_mass_ratio": asked.mass_ratios, "separation_speed_ratio": speed}
-    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+    return dataset_of(OUTPUTS, along, values, (MODES, STEPS))
 
 
 def contact(scene: MapScene, mass: float, speed: Array, work: Work) -> Contact:
@@ -117,4 +117,4 @@ def _range(place: Array) -> str:
     return f"at {' to '.join(ends)}"
 
 
-MAP = Map("separation", "where a crossing mass would lift off", 2.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("separation", "where a crossing mass would lift off", 2.0, OUTPUTS, compute, sentences)

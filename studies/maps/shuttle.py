@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.variable import axis, beside
+from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.results.formatting import listed, number, percent
@@ -29,19 +29,20 @@ CYCLE_POINTS = 720
 UNSHAKEN = "Swinging mass: near the formula for one mode nothing grows"
 TOLD = (0.1, 0.5, 1.0)
 
-AXES = (
-    axis("shuttle_damping_ratio", "damping ratio of all modes"),
-    axis("shuttle_mass_ratio", "carriage mass over body mass"),
-    axis("shuttle_frequency_ratio", "frequency of the shuttle over omega_1"),
-)
-VARIABLES = (
-    beside("multiplier", tuple(a.name for a in AXES), "largest Floquet multiplier", "of one period, in magnitude"),
-    beside("tongue_low", ("shuttle_mass_ratio",), "lower end of the main tongue", "of the main unstable interval "
-           "without damping, frequency over omega_1; NaN where there is none"),
-    beside("tongue_high", ("shuttle_mass_ratio",), "upper end of the main tongue", "as tongue_low"),
-    beside("tongue_theory", ("shuttle_mass_ratio",), "centre of the main tongue by theory", "by the first mode alone, "
-           "frequency over omega_1", nan_allowed=False),
-)  # fmt: skip
+OUTPUTS = outputs("""
+    * | | | optional alone |
+    shuttle_damping_ratio | | | axis | damping ratio of all modes
+    shuttle_mass_ratio | | | axis | carriage mass over body mass
+    shuttle_frequency_ratio | | | axis | frequency of the shuttle over omega_1
+    multiplier | shuttle_damping_ratio shuttle_mass_ratio shuttle_frequency_ratio | | nan | largest Floquet multiplier
+        of one period, in magnitude
+    tongue_low | shuttle_mass_ratio | | nan | lower end of the main tongue
+        of the main unstable interval without damping, frequency over omega_1; NaN where there is none
+    tongue_high | shuttle_mass_ratio | | nan | upper end of the main tongue
+        as tongue_low
+    tongue_theory | shuttle_mass_ratio | | | centre of the main tongue by theory
+        by the first mode alone, frequency over omega_1
+""")
 
 
 class Tongue(NamedTuple):
@@ -68,8 +69,8 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
         "tongue_high": [tongue.high for tongue in tongues],
         "tongue_theory": one_mode(scene, mass),
     }
-    along = dict(zip((a.name for a in AXES), (DAMPING, mass, frequency), strict=True))
-    return dataset_of((*AXES, *VARIABLES), along, values, (MODES, STEPS))
+    along = {"shuttle_damping_ratio": DAMPING, "shuttle_mass_ratio": mass, "shuttle_frequency_ratio": frequency}
+    return dataset_of(OUTPUTS, along, values, (MODES, STEPS))
 
 
 def multipliers(scene: MapScene, mass: float, frequency: Array, damping: float) -> Array:
@@ -158,4 +159,4 @@ def _times(growth: float) -> str:
     return f"{number(growth)} times" if math.isfinite(growth) else "beyond all numbers"
 
 
-MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, AXES, VARIABLES, compute, sentences)
+MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, OUTPUTS, compute, sentences)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from engine.floating.results import ENDS, OF_CARRIAGES
-from results_schema.variable import axis
+from results_schema.variable import outputs
 from results_schema.variables import Variable
 
 UNITS = {"position": "m", "speed": "m s-1", "contact_force": "N"}
@@ -120,7 +120,11 @@ RESULTS = (
     _history("potential_energy", (), "J", "elastic energy, that of springs and of height"),
     _history("momentum", ("component",), "kg m s-1", "momentum of everything over the ground"),
     _history("angular_momentum", ("component",), "kg m2 s-1", "angular momentum about the ground's origin"),
-    axis("frame", "body whose frame it is", dtype="str"),
-    axis("component", "component of the vector", dtype="str"),
-    axis("quaternion", "part of the quaternion", dtype="str", meaning="w is the scalar one"),
+    *outputs("""
+        * | | | axis str |
+        frame | | | | body whose frame it is
+        component | | | | component of the vector
+        quaternion | | | | part of the quaternion
+            w is the scalar one
+    """),
 )

@@ -211,7 +211,7 @@ def small() -> xr.Dataset:
 def test_a_study_of_all_maps_is_as_declared(small: xr.Dataset) -> None:
     assert {"critical_step", "critical_mass_ratio", "growth", "multiplier"} <= set(small.data_vars)
     for one in MAPS.values():
-        assert {variable.name for variable in one.variables} <= set(small.data_vars)
+        assert {variable.name for variable in one.outputs} <= set(small.variables)
     assert int(small["status"]) == 0 and int(small["modes_used"]) == 20 and int(small["steps_used"]) == 6000
 
 

@@ -14,7 +14,7 @@ def alias_said(*growth: tuple[float, float, float]) -> str:
     """What the map says of scenes, each with its growth at 0.5, 1.2 and 4 times the rule's steps, by both schemes."""
     values = np.broadcast_to(np.array(growth)[None, None, None], (2, 1, 1, len(growth), 3))
     along = {"step_multiple": [0.5, 1.2, 4.0]}
-    return " ".join(alias.sentences(xr.Dataset({"growth": ([axis.name for axis in alias.AXES], values)}, along)))
+    return " ".join(alias.sentences(xr.Dataset({"growth": (alias.OUTPUTS[5].dims, values)}, along)))
 
 
 def test_too_few_steps_count_as_growth_beyond_what_grows_in_truth() -> None:
