@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.floating.elastic import CELLS, ElasticBody, Y, Z, elastic_body
+from engine.floating.elastic import ABOUT_X, CELLS, ElasticBody, Y, Z, elastic_body
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
@@ -238,21 +238,29 @@ def _joints(study: Study, name: str, size: int, motions: list[str]) -> Iterator[
 
 
 def _check_held(model: FloatingModel) -> None:
-    """A frame sits where the shapes of its body vanish, unless that moves freely or has rotations that joints leave
-    free."""
+    """A frame sits where the shapes of its body vanish, unless that moves freely, and a joint that is driven or
+    controlled about an axis holds the track's direction."""
     for name, body in model.bodies.items():
         joints = model.frame(name).joints
         if not body.omega.size or any(isinstance(joint, Free) for joint in joints):
             continue
         at = body.fields(np.zeros(1), (0,))[0, 0]
-        far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0]).max(axis=(0, 2))
-        moved = np.abs(at).max(axis=1) > HELD * np.maximum(far, 1e-300)
+        far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0, :, : Z + 1]).max()
         where = model.study.source.where(f"body.{name}.supports")
-        if moved[: Z + 1].any():
+        if np.abs(at[: Z + 1]).max() > HELD * far:
             raise BadInput(
                 "the track begins where its joint holds it: its shapes must vanish there",
                 where=where,
                 expected="pinned or clamped at its beginning",
+            )
+        innermost = next((joint for joint in reversed(joints) if joint.turns), None)
+        axis = None if innermost is None else innermost.turned_about
+        if axis is not None and np.abs(axis @ at[ABOUT_X:]).max() > HELD * far * np.linalg.norm(axis) / body.length:
+            raise BadInput(
+                "a joint that is driven or controlled holds the track's direction: shapes must not turn there",
+                where=where,
+                expected="clamped at its beginning",
+                remedy="a rigid body on the joint that carries this one, for a beam in a cradle",
             )
 
 

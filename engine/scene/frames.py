@@ -7,15 +7,31 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from engine.scene.time_motions import AnyTimeMotion
+from engine.scene.time_motions import AnySliding, AnyTurning, TimeMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import KindOf, Noun, Spec, kinds
-from engine.study_file.units import Dimensionless, Inertia, Length, Rate, SecondMoment, fault
+from engine.study_file.units import (
+    Angle,
+    AngularRate,
+    Damping,
+    Dimensionless,
+    Inertia,
+    Length,
+    RotationalDamping,
+    RotationalStiffness,
+    SecondMoment,
+    Speed,
+    Stiffness,
+    fault,
+)
 
 GROUND = "ground"
 MOST_JOINTS = 6
 
 Direction = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False)]
+RotationVector = Annotated[tuple[Angle, Angle, Angle], Strict(False)]
+Spin = Annotated[tuple[AngularRate, AngularRate, AngularRate], Strict(False)]
+Velocity = Annotated[tuple[Speed, Speed, Speed], Strict(False)]
 Place = Annotated[tuple[Length, Length, Length], Strict(False)]
 Inertias = Annotated[
     tuple[Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)]],
@@ -24,14 +40,20 @@ Inertias = Annotated[
 
 
 class Joint(Spec):
-    """Base of all joints. freedoms: how many coordinates it has."""
+    """Base of all joints. freedoms: how many coordinates it has; turns: whether it turns what it holds."""
 
     freedoms: ClassVar[int] = 1
+    turns: ClassVar[bool] = True
     if TYPE_CHECKING:
 
         @property
         def kind(self) -> str:
             """As in the study file."""
+
+    @property
+    def turned_about(self) -> Direction | None:
+        """The axis about which a motion turns what it holds, if there is one."""
+        return None
 
 
 class AxisJoint(Joint):
@@ -43,11 +65,11 @@ class AxisJoint(Joint):
     """
 
     axis: Direction
-    start: Dimensionless | None = None
-    rate: Rate | None = None
-    stiffness: Dimensionless = Field(default=0.0, ge=0)
-    damping: Dimensionless = Field(default=0.0, ge=0)
-    motion: AnyTimeMotion | None = None
+    start: float | None = None
+    rate: float | None = None
+    stiffness: float = 0.0
+    damping: float = 0.0
+    motion: TimeMotion | None = None
 
     @property
     def is_driven(self) -> bool:
@@ -64,33 +86,48 @@ class AxisJoint(Joint):
 
 
 class Revolute(AxisJoint):
-    """Turns about an axis; rad, rad/s, N m/rad, N m s/rad."""
+    """Turns about an axis."""
 
     kind: Literal["revolute"]
+    start: Angle | None = None
+    rate: AngularRate | None = None
+    stiffness: RotationalStiffness = Field(default=0.0, ge=0)
+    damping: RotationalDamping = Field(default=0.0, ge=0)
+    motion: AnyTurning | None = None
+
+    @property
+    def turned_about(self) -> Direction | None:
+        return self.axis if self.motion is not None else None
 
 
 class Prismatic(AxisJoint):
-    """Slides along an axis; m, m/s, N/m, N s/m."""
+    """Slides along an axis."""
 
+    turns: ClassVar[bool] = False
     kind: Literal["prismatic"]
+    start: Length | None = None
+    rate: Speed | None = None
+    stiffness: Stiffness = Field(default=0.0, ge=0)
+    damping: Damping = Field(default=0.0, ge=0)
+    motion: AnySliding | None = None
 
 
 class Spherical(Joint):
-    """Turns freely. rate: rad/s, in the frame of its body, at time 0. damping: N m s/rad."""
+    """Turns freely. rate: in the frame of its body, at time 0."""
 
     freedoms: ClassVar[int] = 3
     kind: Literal["spherical"]
-    rate: Annotated[tuple[Rate, Rate, Rate], Strict(False)] = (0.0, 0.0, 0.0)
-    damping: Dimensionless = Field(default=0.0, ge=0)
+    rate: Spin = (0.0, 0.0, 0.0)
+    damping: RotationalDamping = Field(default=0.0, ge=0)
 
 
 class Free(Joint):
-    """Moves freely in space. velocity: m/s over the ground, at time 0; rate: rad/s, in the frame of its body."""
+    """Moves freely in space. velocity: over the ground, at time 0; rate: in the frame of its body."""
 
     freedoms: ClassVar[int] = 6
     kind: Literal["free"]
-    velocity: Direction = (0.0, 0.0, 0.0)
-    rate: Annotated[tuple[Rate, Rate, Rate], Strict(False)] = (0.0, 0.0, 0.0)
+    velocity: Velocity = (0.0, 0.0, 0.0)
+    rate: Spin = (0.0, 0.0, 0.0)
 
 
 JOINTS = kinds("joint", "wanderlast.joints", Joint, Revolute, Prismatic, Spherical, Free)
@@ -112,7 +149,7 @@ class Frame(Spec):
     on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND
     at: Length | None = Field(default=None, ge=0)
     position: Place = (0.0, 0.0, 0.0)
-    turned: Direction = (0.0, 0.0, 0.0)
+    turned: RotationVector = (0.0, 0.0, 0.0)
     joints: Annotated[tuple[AnyJoint, ...], Strict(False), Field(max_length=MOST_JOINTS)] = ()
     inertia: Inertias | None = None
     lateral_second_moment: SecondMoment | None = Field(default=None, gt=0)

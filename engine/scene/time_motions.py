@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from engine.study_file.spec import KindOf, Spec, kinds
-from engine.study_file.units import Dimensionless, Frequency, Rate, Time, fault
+from engine.study_file.units import Angle, AngularRate, Frequency, Length, Speed, Time, fault
 from results_schema.arrays import Array
 
 #: Columns of a piece: start (s); coefficients of a polynomial of degree 5 in the time since then, constant first;
@@ -22,7 +22,7 @@ Number = Callable[[str], Array]  # (V,) of a key of the motion, for every varian
 
 
 class TimeMotion(Spec):
-    """Base of the motions of joints: rad or m, by the joint."""
+    """Base of the motions of joints."""
 
     if TYPE_CHECKING:
 
@@ -43,8 +43,8 @@ class Steady(TimeMotion):
     """start + rate t."""
 
     kind: Literal["steady"]
-    start: Dimensionless = 0.0
-    rate: Rate
+    start: float = 0.0
+    rate: float
 
     def pieces(self, number: Number) -> Array:
         found = _blank(number("rate"), 1)
@@ -56,8 +56,8 @@ class Swing(TimeMotion):
     """centre + amplitude sin(2 pi f t)."""
 
     kind: Literal["swing"]
-    centre: Dimensionless = 0.0
-    amplitude: Dimensionless
+    centre: float = 0.0
+    amplitude: float
     frequency: Frequency = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
@@ -72,7 +72,7 @@ class SpinUp(TimeMotion):
     (Kane, Ryan and Banerjee 1987)."""
 
     kind: Literal["spin-up"]
-    rate: Rate
+    rate: float
     time: Time = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
@@ -90,7 +90,7 @@ class Points(TimeMotion):
 
     kind: Literal["waypoints"]
     times: Annotated[tuple[Time, ...], Strict(False), Field(min_length=2, max_length=1000)]
-    values: Annotated[tuple[Dimensionless, ...], Strict(False), Field(min_length=2, max_length=1000)]
+    values: tuple[float, ...]
 
     @model_validator(mode="after")
     def _ascending(self) -> Points:
@@ -106,8 +106,78 @@ class Points(TimeMotion):
         return np.stack([spline_pieces(t, v) for t, v in zip(*(column.T for column in columns), strict=True)])
 
 
-TIME_MOTIONS = kinds("motion of a joint", "wanderlast.joint_motions", TimeMotion, Steady, Swing, SpinUp, Points)
-AnyTimeMotion = Annotated[TimeMotion, KindOf("motion of a joint", TIME_MOTIONS)]
+class SteadyTurn(Steady):
+    """Of a joint that turns."""
+
+    start: Angle = 0.0
+    rate: AngularRate
+
+
+class SteadySlide(Steady):
+    """Of a joint that slides."""
+
+    start: Length = 0.0
+    rate: Speed
+
+
+class SwingTurn(Swing):
+    """Of a joint that turns."""
+
+    centre: Angle = 0.0
+    amplitude: Angle
+
+
+class SwingSlide(Swing):
+    """Of a joint that slides."""
+
+    centre: Length = 0.0
+    amplitude: Length
+
+
+class SpinUpTurn(SpinUp):
+    """Of a joint that turns."""
+
+    rate: AngularRate
+
+
+class SpinUpSlide(SpinUp):
+    """Of a joint that slides."""
+
+    rate: Speed
+
+
+class PointsTurn(Points):
+    """Of a joint that turns."""
+
+    values: Annotated[tuple[Angle, ...], Strict(False), Field(min_length=2, max_length=1000)]
+
+
+class PointsSlide(Points):
+    """Of a joint that slides."""
+
+    values: Annotated[tuple[Length, ...], Strict(False), Field(min_length=2, max_length=1000)]
+
+
+TURNING = kinds(
+    "motion of a joint that turns",
+    "wanderlast.turning_motions",
+    TimeMotion,
+    SteadyTurn,
+    SwingTurn,
+    SpinUpTurn,
+    PointsTurn,
+)
+SLIDING = kinds(
+    "motion of a joint that slides",
+    "wanderlast.sliding_motions",
+    TimeMotion,
+    SteadySlide,
+    SwingSlide,
+    SpinUpSlide,
+    PointsSlide,
+)
+AnyTurning = Annotated[TimeMotion, KindOf("motion of a joint that turns", TURNING)]
+AnySliding = Annotated[TimeMotion, KindOf("motion of a joint that slides", SLIDING)]
 
 
 def spline_pieces(times: Array, values: Array) -> Array:

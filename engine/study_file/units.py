@@ -5,7 +5,6 @@ Each dimension is an annotated float: `length: Length = Field(gt=0)`.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,6 +25,8 @@ _OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
 _SUPERSCRIPTS = {"²": 2, "³": 3, "⁴": 4}
 _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}  # JSON schema's
 _BASE = ("meter", "kilogram", "second")
+_PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint has it
+_DEGREE = str(_PI / 180)
 _COMMON = {
     name: (Fraction(factor), base)
     for base, names in (
@@ -36,7 +37,8 @@ _COMMON = {
         ({"second": -1}, {"Hz": "1", "kHz": "1e3"}),
         ({"kilogram": 1, "meter": 1, "second": -2}, {"N": "1", "kN": "1e3", "MN": "1e6"}),
         ({"kilogram": 1, "meter": -1, "second": -2}, {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"}),
-        ({"radian": 1}, {"rad": "1"}),
+        ({"radian": 1}, {"rad": "1", "deg": _DEGREE, "°": _DEGREE}),
+        ({"radian": 1, "second": -1}, {"rpm": str(_PI / 30)}),
     )
     for name, factor in names.items()
 }  # what pint says of them, which takes half a second to import
@@ -47,8 +49,8 @@ _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm":
 class Unit:
     """Dimension of a field: its name, SI unit (UDUNITS text, "" for a plain number), exponents of m, kg, s.
 
-    angle: exponents of the radian that are the same dimension, besides 0. A frequency in rad/s or rpm is turned
-    into cycles per second.
+    angle: exponents of the radian that are the same dimension, besides 0 (turns: and not 0). A frequency in rad/s or
+    rpm is turned into cycles per second.
     """
 
     noun: str
@@ -56,6 +58,7 @@ class Unit:
     exponents: tuple[int, int, int]
     angle: int = 0
     per_turn: bool = False
+    turns: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.read, handler(source))
@@ -77,11 +80,11 @@ class Unit:
         """
         number, unit = _split(text, self)
         factor, exponents, angle = _unit_factor(unit)
-        if exponents != self.exponents or angle not in (0, self.angle):
+        if exponents != self.exponents or angle not in ((self.angle,) if self.turns else (0, self.angle)):
             found = _dimension_name(exponents, angle)
             raise fault(f"{found} where {self.article} is wanted", expected=self.article, received=shortened(text))
         if self.per_turn and angle == 1:
-            factor /= 2 * Fraction(math.pi)
+            factor /= 2 * _PI
         try:
             return float(Fraction(number) * factor)
         except OverflowError:
@@ -210,9 +213,12 @@ INERTIA = Unit("moment of inertia", "kg m2", (2, 1, 0))
 TIME = Unit("time", "s", (0, 0, 1))
 RATE = Unit("rate", "s-1", (0, 0, -1))
 DIMENSIONLESS = Unit("plain number", "", (0, 0, 0))
+ANGLE = Unit("angle", "rad", (0, 0, 0), angle=1, turns=True)
+ANGULAR_RATE = Unit("rate of turning", "rad s-1", (0, 0, -1), angle=1, turns=True)
 KNOWN = (
     LENGTH, AREA, SECOND_MOMENT, PRESSURE, DENSITY, MASS, FORCE, SPEED, ACCELERATION, FREQUENCY, STIFFNESS,
     ROTATIONAL_STIFFNESS, DAMPING, ROTATIONAL_DAMPING, INERTIA, TIME, DIMENSIONLESS,
+    ANGLE,
 )  # fmt: skip
 
 Length = Annotated[float, LENGTH]
@@ -233,3 +239,5 @@ Inertia = Annotated[float, INERTIA]
 Time = Annotated[float, TIME]
 Rate = Annotated[float, RATE]
 Dimensionless = Annotated[float, DIMENSIONLESS]
+Angle = Annotated[float, ANGLE]
+AngularRate = Annotated[float, ANGULAR_RATE]

@@ -143,6 +143,11 @@ def test_another_formulation(held: str) -> None:
             2: lambda t: (0.4 * np.sin(rate * t), 0.4 * rate * np.cos(rate * t), -0.4 * rate**2 * np.sin(rate * t))
         }
     joints = [joint] if held != "free" else [{"kind": "prismatic", "axis": a} for a in ([1, 0, 0], [0, 0, 1])] + [joint]
+    frames: dict[str, object] = {"hull": {"joints": joints}}
+    bodies = {}
+    if held == "driven":  # in a cradle, as what is driven holds the directions of tracks
+        frames = {"cradle": {"joints": joints}, "hull": {"on": "cradle", "at": 0.0}}
+        bodies = {"cradle": {"kind": "rigid", "length": 10.0, "mass": 7.0, "inertia": 3.0, "own_weight": True}}
     if held != "free":
         given |= {0: lambda t: (0.0, 0.0, 0.0), 1: lambda t: (0.0, 0.0, 0.0)}
     beam = FLYER | {"supports": "pinned-pinned", "modes": 2, "second_moment": 4e-6, "own_weight": True}
@@ -150,17 +155,16 @@ def test_another_formulation(held: str) -> None:
     study = Study(
         kind="moving-frames",
         gravity=9.81,
-        body={"hull": beam | {"damping_ratio": 0.01}},
-        frame={"hull": {"joints": joints}},
+        body={"hull": beam | {"damping_ratio": 0.01}} | bodies,
+        frame=frames,
         carriage={"load": load},
     )
     duration, count = 1.2, 4800
     found = []
     for scheme in (FOX_GOODWIN,):
         model, marched = steps(study, duration, count, 48, scheme)
-        found.append(
-            np.column_stack([history(model, marched, "ends", 0, 3)[:, [0, 2]], history(model, marched, "carriages")])
-        )
+        end = history(model, marched, "ends", 3 * list(model.bodies).index("hull"), 3)
+        found.append(np.column_stack([end[:, [0, 2]], history(model, marched, "carriages")]))
     times, mass, modes = marched.times[0], 120.0, 2
     x, dm = np.polynomial.legendre.leggauss(24)
     places, masses = beam_in_plane(lambda s: sines(s, modes, 10.0, mass), 5.0 * (x + 1.0), 0.5 * mass * dm, 40.0, modes)
@@ -187,6 +191,19 @@ def test_another_formulation(held: str) -> None:
 def test_a_frame_sits_where_shapes_vanish() -> None:
     with pytest.raises(BadInput, match=r"body\.arm\.supports"):
         build(arm({"joints": [SPIN_UP]}, supports="free-clamped"))
+
+
+@pytest.mark.parametrize("controlled", [False, True])
+def test_what_is_driven_holds_the_direction_of_its_track(controlled: bool) -> None:
+    """Pinned shapes turn where a motion turns them; about another axis, or behind a free hinge, nothing holds them."""
+    joint = SPIN_UP | ({"stiffness": 1.0} if controlled else {})
+    with pytest.raises(BadInput, match="holds the track's direction") as refused:
+        build(arm({"joints": [joint]}, supports="pinned-pinned"))
+    assert "a rigid body on the joint" in str(refused.value)
+    build(arm({"joints": [joint | {"axis": [0, 0, 1]}]}, supports="pinned-pinned"))
+    build(arm({"joints": [joint, {"kind": "revolute", "axis": [0, 1, 0]}]}, supports="pinned-pinned"))
+    with pytest.raises(BadInput, match="holds the track's direction"):
+        build(arm({"joints": [joint, {"kind": "prismatic", "axis": [0, 1, 0]}]}, supports="pinned-pinned"))
 
 
 def test_closed_loops_are_refused() -> None:

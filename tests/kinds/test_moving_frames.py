@@ -101,6 +101,8 @@ def broken(**tables: object) -> Callable[[], object]:
 
 LOAD = {"kind": "mass", "on": "beam", "mass": 1.0, "motion": {"kind": "free", "start": 2.0}}
 REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
+PRISMATIC = {"kind": "prismatic", "axis": [0, 1, 0]}
+STEADY = {"kind": "steady", "rate": "1 deg/s"}
 
 
 @pytest.mark.parametrize(
@@ -116,6 +118,10 @@ REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
         ({"frame": {"other": {}}}, "no such body"),
         ({"frame": {"beam": {"at": 1.0}}}, "the ground has no track"),
         ({"frame": {"beam": {"joints": [REVOLUTE | {"axis": [0, 0, 0]}]}}}, "an axis needs a direction"),
+        ({"frame": {"beam": {"joints": [REVOLUTE | {"stiffness": "1 N/m"}]}}}, "rotational stiffness"),
+        ({"frame": {"beam": {"joints": [REVOLUTE | {"rate": "1 Hz"}]}}}, r"rate of turning \(rad s-1\)"),
+        ({"frame": {"beam": {"joints": [PRISMATIC | {"start": "1 deg"}]}}}, r"a length \(m\)"),
+        ({"frame": {"beam": {"joints": [PRISMATIC | {"motion": STEADY}]}}}, "a speed"),
         ({"frame": {"beam": {"lateral_modes": 2}}}, "lateral_second_moment"),
         ({"sensor": {"under": {"under": "load", "quantity": "velocity"}}}, "only the displacement"),
     ],
@@ -139,3 +145,29 @@ def test_numbers_of_joints_may_be_swept() -> None:
     assert expand(study).size == 2
     tip = studies.run(study)["tip_max"]
     assert tip[1] > 1.5 * tip[0] > 0.0
+
+
+def test_numbers_of_joints_have_units() -> None:
+    """Degrees and millimetres beside the same in SI, also where they are swept; `rate` has the unit of its joint."""
+    turn = REVOLUTE | {"stiffness": "3 kN m/rad", "damping": "2 N m s/rad", "start": "3 deg", "rate": "30 deg/s"}
+    slide = PRISMATIC | {"stiffness": "40 N/mm", "damping": "5 N s/mm", "start": "2 mm", "rate": "-20 mm/s"}
+    plain = [
+        REVOLUTE | {"stiffness": 3000.0, "damping": 2.0, "start": np.pi / 60.0, "rate": np.pi / 6.0},
+        PRISMATIC | {"stiffness": 4e4, "damping": 5e3, "start": 2e-3, "rate": -0.02},
+    ]
+
+    def ends(joints: list[dict[str, object]], turned: list[object], rates: list[object]) -> np.ndarray:
+        study = Study(
+            kind="moving-frames",
+            gravity=0.0,
+            body={"arm": ARM | {"modes": 1}},
+            frame={"arm": {"joints": joints, "turned": turned}},
+            sensor={"tip": {"body": "arm", "at": 10.0}},
+            sweep={"rate": {"of": "frame.arm.joints.0.rate", "values": rates}},
+            question={"duration": 0.5},
+        )
+        assert expand(study).axes[0].units == "rad s-1"
+        return np.asarray(studies.run(study)["end_place"].values)
+
+    wanted = ends(plain, [0.0, np.pi / 2.0, 0.0], [np.pi / 6.0, np.pi / 3.0])
+    assert ends([turn, slide], [0, "90 deg", 0], ["30 deg/s", "10 rpm"]) == pytest.approx(wanted, abs=1e-12)
