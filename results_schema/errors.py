@@ -37,6 +37,12 @@ class BadInput(WanderlastError):
 
     exit_code = 2
 
+    def moved(self, where: str, what: str = "") -> BadInput:
+        """The same refusal of another place, and in other words."""
+        return BadInput(
+            what or self.what, where=where, expected=self.expected, received=self.received, remedy=self.remedy
+        )
+
 
 class ArchiveError(WanderlastError):
     """An archive or a part of one that is damaged, foreign or of a newer schema."""

@@ -25,22 +25,6 @@ class UniformSection(Protocol):
         """m."""
 
 
-def _one(section: UniformSection) -> float:
-    return 1.0
-
-
-def _bending(section: UniformSection) -> float:
-    return -section.bending_stiffness  # M = -E I w'', V = dM/ds
-
-
-def _strain(section: UniformSection) -> float:
-    return -section.fibre_distance
-
-
-def _stress(section: UniformSection) -> float:
-    return -section.bending_stiffness * section.fibre_distance / section.second_moment
-
-
 @dataclass(frozen=True)
 class Quantity:
     """A quantity that sensors read: a derivative of the deflection w by the place along the track, or by time.
@@ -56,7 +40,7 @@ class Quantity:
     unit: str
     derivative: int = 0
     rate: int = 0
-    factor: Callable[[UniformSection], float] = _one
+    factor: Callable[[UniformSection], float] = lambda section: 1.0
     of_section: bool = False
     needs_fibre: bool = False
     of_mass: bool = False
@@ -70,6 +54,14 @@ class Quantity:
         return self.of_section or self.derivative > 1
 
 
+def _bending(section: UniformSection) -> float:
+    return -section.bending_stiffness  # M = -E I w'', V = dM/ds
+
+
+def _stress(section: UniformSection) -> float:
+    return -section.bending_stiffness * section.fibre_distance / section.second_moment
+
+
 _ROWS = (
     Quantity("displacement", "m", of_mass=True, meant=("deflection",)),
     Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
@@ -78,7 +70,7 @@ _ROWS = (
     Quantity("shear_force", "N", 3, factor=_bending, of_section=True, meant=("shear",)),
     Quantity("axial_force", "N", 1, of_section=True, meant=("normal_force",)),
     Quantity("stress", "Pa", 2, factor=_stress, of_section=True, needs_fibre=True),
-    Quantity("strain", "1", 2, factor=_strain, of_section=True, needs_fibre=True),
+    Quantity("strain", "1", 2, factor=lambda section: -section.fibre_distance, of_section=True, needs_fibre=True),
     Quantity("contact_force", "N", of_contact=True, told=True),
 )
 

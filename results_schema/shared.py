@@ -32,8 +32,6 @@ declare(
         mode_count | | | axis int64 | number of modes
         quantity | | | axis str | measured quantity
         relative_step | | | axis | omega_1 times the time step
-        robot | | | axis str planned | robot
-        component | | | axis str planned | component of the vector
     """),
 )
 

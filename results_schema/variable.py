@@ -28,7 +28,6 @@ class Variable:
         (a choice of variants, whose coordinate is the flat number in the grid, last axis fastest); "some" those of the
         study's sweep that matter (in a group, which has no status); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
-    planned: no version writes it yet; left out of the table for people.
     gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
     """
 
@@ -42,7 +41,6 @@ class Variable:
     required: bool = True
     nan_allowed: bool = False
     gaps_allowed: bool = False
-    planned: bool = False
     lead: Literal["grid", "history", "some", "none"] = "grid"
 
     def attributes(self) -> dict[str, Any]:
@@ -77,7 +75,6 @@ WORDS: Mapping[str, Mapping[str, Any]] = {
     "history": {"lead": "history"},
     "nan": {"nan_allowed": True},
     "gaps": {"gaps_allowed": True},
-    "planned": {"planned": True},
 }
 
 

@@ -30,7 +30,7 @@ def reference_table() -> str:
     for kind, variables in registered().items():
         where = {EVERY_KIND: "every kind", AXES: "coordinates", "march": "most kinds"}.get(kind, kind)
         own = [variable for variable in variables if kind == "march" or variable not in shared]
-        rows += [_row(where, variable) for variable in own if not variable.planned]
+        rows += [_row(where, variable) for variable in own]
     return "\n".join(rows) + "\n"
 
 

@@ -200,12 +200,12 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
         return np.zeros(values.size)
     body = model.bodies[spring.body].modal
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
-    stiffness = values.stiffness(spring.keys)
+    stiffness = values.column(spring.keys.stiffness)
     if spring.held is not None:
         own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
         return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
     contact = mobility / (1.0 + values.touching_mass(model.carriages[spring.carriage].name) * mobility)
-    return np.asarray(stiffness * (1.0 / values.sprung_mass(spring.keys) + contact))
+    return np.asarray(stiffness * (1.0 / values.column(spring.keys.mass) + contact))
 
 
 def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:

@@ -99,17 +99,17 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     masses = [_contact_mass(model, values, number) for number in numbers]
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
     rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
-    coefficients = [values.damping(damper.key) for damper in model.dampers]
-    coefficients += [values.damping(spring.keys.damping) for spring in model.springs]
+    coefficients = [values.column(damper.key) for damper in model.dampers]
+    coefficients += [values.column(spring.keys.damping) for spring in model.springs]
     pushes, alongside = [none] * len(model.pushes), [moving_mass(model, values, p.carriage) for p in model.pushes]
-    stiffness = [none if spring.rigid else values.stiffness(spring.keys) for spring in model.springs]
+    stiffness = [none if spring.rigid else values.column(spring.keys.stiffness) for spring in model.springs]
     ones, others = np.ones((model.body_modes, values.size)), model.omega.size - model.body_modes
     constant = others - len(model.sprung)
     return LaneTable(
         omega=model.omega,
         rates=to_blocks(np.concatenate([*rates, np.zeros((others, values.size))])),
         inverse_modal_mass=to_blocks(
-            np.concatenate([ones, *(1.0 / values.sprung_mass(s.keys)[None] for s in model.sprung), ones[:constant]])
+            np.concatenate([ones, *(1.0 / values.column(s.keys.mass)[None] for s in model.sprung), ones[:constant]])
         ),
         mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
         joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),

@@ -336,13 +336,7 @@ def _body_part(study: Study, name: str, body: Body, first: int) -> BodyPart:
     try:
         modal = build_body(body, study.spots(name))
     except BadInput as error:
-        raise study.source.fault(
-            f"body.{name}.{error.where}",
-            error.what,
-            expected=error.expected,
-            received=error.received,
-            remedy=error.remedy,
-        ) from None
+        raise error.moved(study.source.where(f"body.{name}.{error.where}")) from None
     return BodyPart(name, modal, slice(first, first + modal.omega.size), body.own_weight)
 
 

@@ -138,9 +138,8 @@ def _read_at(study: Study, path: str, amount: Any, entry: str) -> Number:
         number: Number = value_in(Scene(**data), path)
     except ValidationError as error:
         problem = bad_input(error.errors(include_url=False)[0], Scene, data, study.source)
-        what, received = f"{path}: {problem.what}", problem.received or shortened(amount)
-        expected = problem.expected
-        raise study.source.fault(entry, what, expected=expected, received=received, remedy=problem.remedy) from None
+        problem.received = problem.received or shortened(amount)
+        raise problem.moved(study.source.where(entry), f"{path}: {problem.what}") from None
     return number
 
 

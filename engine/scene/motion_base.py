@@ -67,9 +67,9 @@ class Motion(Spec):
         """Seconds per unit of tau."""
 
     @property
-    @abstractmethod
     def duration(self) -> float:
         """Length of the motion in tau."""
+        return 1.0
 
     @property
     @abstractmethod

@@ -35,10 +35,6 @@ class Cruise(Motion):
         return abs(self.end - self.start) / self.speed
 
     @property
-    def duration(self) -> float:
-        return 1.0
-
-    @property
     def max_speed(self) -> float:
         return abs(self.end - self.start)
 
@@ -51,7 +47,8 @@ class Cruise(Motion):
 
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
-        return [_stroke_check(start, end), _touch_check(here, (length, start, end), np.minimum, np.maximum)]
+        touch = Check(here, (length, start, end), _line_touches, _NO_TOUCH, _TOUCHING)
+        return [_stroke_check(start, end), touch]
 
     def law(self, tau: Array, side: Side) -> Path:
         velocity = np.full_like(tau, self.end - self.start)
@@ -211,10 +208,6 @@ class Waypoints(Motion):
         return self.times[-1]
 
     @property
-    def duration(self) -> float:
-        return 1.0
-
-    @property
     def max_speed(self) -> float:
         knots, slopes, curvatures = self._derivatives()
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -266,10 +259,6 @@ class Sliding(Motion):
         return 1.0
 
     @property
-    def duration(self) -> float:
-        return 1.0
-
-    @property
     def max_speed(self) -> float:
         return abs(self.speed)
 
@@ -295,11 +284,8 @@ def _stroke_check(start: str, end: str) -> Check:
     return Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
 
 
-def _touch_check(here: str, needs: tuple[str, ...], low: Any, high: Any) -> Check:
-    def touches(length: Any, start: Any, end: Any) -> Any:
-        return (high(start, end) > 0.0) & (low(start, end) < length)
-
-    return Check(here, needs, touches, _NO_TOUCH, _TOUCHING)
+def _line_touches(length: Any, start: Any, end: Any) -> Any:
+    return (np.maximum(start, end) > 0.0) & (np.minimum(start, end) < length)
 
 
 def _ascending(*times: Any) -> Any:

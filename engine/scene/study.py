@@ -366,7 +366,7 @@ def _check_names(study: Study) -> None:
     try:
         results = expand("march", sensors, list(study.carriage), envelopes)
     except BadInput as error:
-        raise study.source.fault(error.where, error.what, expected=error.expected, remedy=error.remedy) from None
+        raise error.moved(study.source.where(error.where)) from None
     for name in study.sweep.axes:
         if name in results:
             what = "a result has this name"
@@ -435,9 +435,7 @@ def _within(study: Study, here: str) -> Iterator[None]:
     try:
         yield
     except BadInput as error:
-        raise study.source.fault(
-            f"{here}.{error.where}", error.what, expected=error.expected, received=error.received, remedy=error.remedy
-        ) from None
+        raise error.moved(study.source.where(f"{here}.{error.where}")) from None
 
 
 def _check_along(study: Study, carriage: Carriage) -> None:

@@ -85,8 +85,8 @@ class VariantValues:
         """Of some variants of a sweep, given by their flat numbers."""
         return cls(study, cases.columns_of(variants), variants.size)
 
-    def _of(self, path: str) -> Array:
-        """(V,) values at a dotted key."""
+    def column(self, path: str) -> Array:
+        """(V,) values at a dotted key, such as those that springs and dampers bring."""
         found = self.columns.get(path)
         if found is None:
             value = self.study.value(path)
@@ -96,7 +96,7 @@ class VariantValues:
     @property
     def gravity(self) -> Array:
         """(V,) m/s^2."""
-        return self._of("gravity")
+        return self.column("gravity")
 
     @property
     def has_fixed_steps(self) -> bool:
@@ -106,12 +106,12 @@ class VariantValues:
     @property
     def steps(self) -> Counts:
         """(V,) steps over a passage or cycle, where the study fixes them."""
-        return self._of(STEPS).astype(np.int64)
+        return self.column(STEPS).astype(np.int64)
 
     @property
     def tighter(self) -> Array:
         """(V,) `solver.tolerance` over the study's own."""
-        return self._of(TOLERANCE) / self.study.solver.tolerance
+        return self.column(TOLERANCE) / self.study.solver.tolerance
 
     def all_as_tight(self, factor: float) -> VariantValues:
         """The same, but where the tolerance is swept it is this part of the study's own."""
@@ -122,7 +122,7 @@ class VariantValues:
 
     def speed(self, carriage: str) -> Array:
         """(V,) m/s, the top speed of a motion that has one."""
-        return self._of(f"carriage.{carriage}.motion.speed")
+        return self.column(f"carriage.{carriage}.motion.speed")
 
     def force(self, carriage: str) -> Array:
         """(V,) N of a carriage besides its weight."""
@@ -131,18 +131,6 @@ class VariantValues:
     def touching_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage that touch the body."""
         return self._sum(carriage, self.study.carriage[carriage].touching)
-
-    def sprung_mass(self, spring: SpringKeys) -> Array:
-        """(V,) kg that stand on a spring."""
-        return self._of(spring.mass)
-
-    def stiffness(self, spring: SpringKeys) -> Array:
-        """(V,) N/m."""
-        return self._of(spring.stiffness)
-
-    def damping(self, damper: str) -> Array:
-        """(V,) N s/m of a damper by its key."""
-        return self._of(damper)
 
     def part(self, lanes: Counts) -> VariantValues:
         """Some of the variants."""
@@ -154,7 +142,7 @@ class VariantValues:
         if motion.pace is None:
             return np.full(self.size, motion.time_scale)
         key = f"carriage.{carriage}.motion.{motion.pace}"
-        return float(motion.time_scale * self.study.value(key)) / self._of(key)
+        return float(motion.time_scale * self.study.value(key)) / self.column(key)
 
     @property
     def scene_time_scale(self) -> Array:
@@ -165,8 +153,8 @@ class VariantValues:
         """(V,) seconds after time 0 at which a carriage sets off."""
         spec = self.study.carriage[carriage]
         if spec.headway is None:
-            return self._of(f"carriage.{carriage}.delay")
-        return self._of(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
+            return self.column(f"carriage.{carriage}.delay")
+        return self.column(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
 
     def timing(self) -> dict[str, tuple[Array, Array]]:
         """Per carriage pace and delay (V,) relative to the scene's time scale, rounded so that they group."""
@@ -181,18 +169,18 @@ class VariantValues:
         return self._sum(carriage, self.study.carriage[carriage].masses)
 
     def _sum(self, carriage: str, keys: tuple[str, ...]) -> Array:
-        return sum(map(self._of, keys_of_carriage(carriage, keys)), np.zeros(self.size))
+        return sum(map(self.column, keys_of_carriage(carriage, keys)), np.zeros(self.size))
 
     def damping_rates(self, body: str, omega: Array) -> Array:
         """(N, V) 2 zeta omega of a body's modes, 1/s: one ratio, one per mode, or Rayleigh's a + b omega^2."""
         key = f"body.{body}.damping_ratio"
         spec = self.study.body[body]
         if spec.rayleigh is not None:
-            return self._of(f"{key}.rayleigh.0") + self._of(f"{key}.rayleigh.1") * omega[:, None] ** 2
+            return self.column(f"{key}.rayleigh.0") + self.column(f"{key}.rayleigh.1") * omega[:, None] ** 2
         if spec.modal_ratios:
             last = len(spec.modal_ratios) - 1  # goes on for modes beyond the list
-            return np.stack([2.0 * self._of(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
-        return 2.0 * self._of(key) * omega[:, None]
+            return np.stack([2.0 * self.column(f"{key}.{min(k, last)}") * w for k, w in enumerate(omega)])
+        return 2.0 * self.column(key) * omega[:, None]
 
 
 def rounded(values: Array) -> Array:

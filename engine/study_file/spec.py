@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from types import UnionType
+from types import MappingProxyType, UnionType
 from typing import Annotated, Any, ClassVar, Literal, NoReturn, TypeVar, Union, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -71,12 +71,10 @@ class KindOf:
 
     table: kind -> class, looked up when a study is read, so that a new kind is one new entry. What stands beside the
     keys that a user wrote (`Beside`) reaches the validators as their context.
-    planned: kinds that the interface names and that are not built yet.
     """
 
     noun: str
     table: Mapping[str, type[Spec]]
-    planned: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -94,12 +92,10 @@ class KindOf:
             written = {key: item for key, item in value.items() if not isinstance(item, Beside)}
             return self.table[kind].model_validate(written, context=beside[0] if beside else None)
         known = ", ".join(self.table)
-        if isinstance(kind, str) and kind in self.planned:
-            problem = fault(f'{self.noun} kind "{kind}" is not built yet', expected=known, received=shortened(kind))
-        elif "kind" not in value:
+        if "kind" not in value:
             problem = fault("the kind is missing", expected=f"one of {known}")
         else:
-            remedy = nearest(kind, [*self.table, *self.planned])
+            remedy = nearest(kind, list(self.table))
             what = f"unknown {self.noun} kind"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
@@ -124,21 +120,15 @@ def _kind_of(cls: type[Spec]) -> str:
     return "" if field is None else str(next(iter(get_args(field.annotation)), ""))
 
 
-def one_of(*words: str, planned: Sequence[str] = (), meant: Mapping[str, str] | None = None) -> Callable[[str], str]:
-    """Validator of a word out of a list, of which some are not built yet.
-
-    meant: words that others use -> the one of the list.
-    """
-    others = meant or {}
+def one_of(*words: str, meant: Mapping[str, str] = MappingProxyType({})) -> Callable[[str], str]:
+    """Validator of a word out of a list. meant: words that others use -> the one of the list."""
 
     def check(word: str) -> str:
         if word in words:
             return word
+        known = meant.get(word.lower().replace("_", "-").replace(" ", "-"))
+        remedy = f'did you mean "{known}"?' if known else nearest(word, words)
         expected = f"one of {', '.join(words)}"
-        if word in planned:
-            raise fault(f'"{word}" is not built yet', expected=expected, received=shortened(word))
-        known = others.get(word.lower().replace("_", "-").replace(" ", "-"))
-        remedy = f'did you mean "{known}"?' if known else nearest(word, [*words, *planned])
         raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
 
     return check

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -106,6 +106,12 @@ class Unit:
         return f"{noun} ({self.symbol})" if self.symbol else noun
 
 
+def unit_of(dimension: Any) -> Unit:
+    """The unit of an annotated float, such as `Length`."""
+    found: Unit = get_args(dimension)[1]
+    return found
+
+
 def fault(what: str, *, expected: str = "", received: str = "", remedy: str = "") -> PydanticCustomError:
     """A refusal raised inside a pydantic validator; `engine.study_file.spec` turns it into BadInput."""
     context = {"what": what, "expected": expected, "received": received, "remedy": remedy}
@@ -195,49 +201,25 @@ def _dimension_name(exponents: tuple[int, int, int], angle: int) -> str:
     return f"a quantity in {' '.join(f'{name}{power}' for name, power in powers if power) or 'no unit'}"
 
 
-LENGTH = Unit("length", "m", (1, 0, 0))
-AREA = Unit("area", "m2", (2, 0, 0))
-SECOND_MOMENT = Unit("second moment of area", "m4", (4, 0, 0))
-PRESSURE = Unit("pressure", "Pa", (-1, 1, -2))
-DENSITY = Unit("density", "kg m-3", (-3, 1, 0))
-MASS = Unit("mass", "kg", (0, 1, 0))
-FORCE = Unit("force", "N", (1, 1, -2))
-SPEED = Unit("speed", "m s-1", (1, 0, -1))
-ACCELERATION = Unit("acceleration", "m s-2", (1, 0, -2))
-FREQUENCY = Unit("frequency", "Hz", (0, 0, -1), angle=1, per_turn=True)
-STIFFNESS = Unit("stiffness", "N m-1", (0, 1, -2))
-ROTATIONAL_STIFFNESS = Unit("rotational stiffness", "N m rad-1", (2, 1, -2), angle=-1)
-DAMPING = Unit("damping coefficient", "N s m-1", (0, 1, -1))
-ROTATIONAL_DAMPING = Unit("rotational damping coefficient", "N m s rad-1", (2, 1, -1), angle=-1)
-INERTIA = Unit("moment of inertia", "kg m2", (2, 1, 0))
-TIME = Unit("time", "s", (0, 0, 1))
-RATE = Unit("rate", "s-1", (0, 0, -1))
-DIMENSIONLESS = Unit("plain number", "", (0, 0, 0))
-ANGLE = Unit("angle", "rad", (0, 0, 0), angle=1, turns=True)
-ANGULAR_RATE = Unit("rate of turning", "rad s-1", (0, 0, -1), angle=1, turns=True)
-KNOWN = (
-    LENGTH, AREA, SECOND_MOMENT, PRESSURE, DENSITY, MASS, FORCE, SPEED, ACCELERATION, FREQUENCY, STIFFNESS,
-    ROTATIONAL_STIFFNESS, DAMPING, ROTATIONAL_DAMPING, INERTIA, TIME, DIMENSIONLESS,
-    ANGLE,
-)  # fmt: skip
-
-Length = Annotated[float, LENGTH]
-Area = Annotated[float, AREA]
-SecondMoment = Annotated[float, SECOND_MOMENT]
-Pressure = Annotated[float, PRESSURE]
-Density = Annotated[float, DENSITY]
-Mass = Annotated[float, MASS]
-Force = Annotated[float, FORCE]
-Speed = Annotated[float, SPEED]
-Acceleration = Annotated[float, ACCELERATION]
-Frequency = Annotated[float, FREQUENCY]
-Stiffness = Annotated[float, STIFFNESS]
-RotationalStiffness = Annotated[float, ROTATIONAL_STIFFNESS]
-Damping = Annotated[float, DAMPING]
-RotationalDamping = Annotated[float, ROTATIONAL_DAMPING]
-Inertia = Annotated[float, INERTIA]
-Time = Annotated[float, TIME]
-Rate = Annotated[float, RATE]
-Dimensionless = Annotated[float, DIMENSIONLESS]
-Angle = Annotated[float, ANGLE]
-AngularRate = Annotated[float, ANGULAR_RATE]
+Length = Annotated[float, Unit("length", "m", (1, 0, 0))]
+Area = Annotated[float, Unit("area", "m2", (2, 0, 0))]
+SecondMoment = Annotated[float, Unit("second moment of area", "m4", (4, 0, 0))]
+Pressure = Annotated[float, Unit("pressure", "Pa", (-1, 1, -2))]
+Density = Annotated[float, Unit("density", "kg m-3", (-3, 1, 0))]
+Mass = Annotated[float, Unit("mass", "kg", (0, 1, 0))]
+Force = Annotated[float, Unit("force", "N", (1, 1, -2))]
+Speed = Annotated[float, Unit("speed", "m s-1", (1, 0, -1))]
+Acceleration = Annotated[float, Unit("acceleration", "m s-2", (1, 0, -2))]
+Frequency = Annotated[float, Unit("frequency", "Hz", (0, 0, -1), angle=1, per_turn=True)]
+Stiffness = Annotated[float, Unit("stiffness", "N m-1", (0, 1, -2))]
+RotationalStiffness = Annotated[float, Unit("rotational stiffness", "N m rad-1", (2, 1, -2), angle=-1)]
+Damping = Annotated[float, Unit("damping coefficient", "N s m-1", (0, 1, -1))]
+RotationalDamping = Annotated[float, Unit("rotational damping coefficient", "N m s rad-1", (2, 1, -1), angle=-1)]
+Inertia = Annotated[float, Unit("moment of inertia", "kg m2", (2, 1, 0))]
+Time = Annotated[float, Unit("time", "s", (0, 0, 1))]
+Rate = Annotated[float, Unit("rate", "s-1", (0, 0, -1))]
+Dimensionless = Annotated[float, Unit("plain number", "", (0, 0, 0))]
+Angle = Annotated[float, Unit("angle", "rad", (0, 0, 0), angle=1, turns=True)]
+AngularRate = Annotated[float, Unit("rate of turning", "rad s-1", (0, 0, -1), angle=1, turns=True)]
+#: Every unit above.
+KNOWN = tuple(unit_of(one) for one in list(globals().values()) if get_origin(one) is Annotated)

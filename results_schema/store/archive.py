@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -90,12 +91,7 @@ def write_archive(
         raise ValueError(f"schema_version: expected {SCHEMA_VERSION}, received {root.attrs['schema_version']}")
     tables = {"/": from_dataset(root)}
     tables |= {"/" + name.strip("/"): from_dataset(dataset) for name, dataset in (groups or {}).items()}
-    added = seal(tables)
-
-    def fill(temporary: Path) -> None:
-        write_tables(temporary, tables, added)
-
-    files.write_whole(path, fill, look)
+    files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables)), look)
 
 
 def open_archive(path: Path | str) -> Archive:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -107,11 +108,7 @@ def write_body(path: Path | str, body: StoredBody) -> None:
         columns[POINT_NAMES] = Column(("off_track",), np.array(body.points, dtype=object), {"long_name": "name"})
     attributes: dict[str, Any] = {key: canonical(float(body.numbers[key])) for key in NUMBERS}
     tables = {"/": Table(sizes, columns, attributes | {_VERSION: canonical(BODY_VERSION)})}
-
-    def fill(temporary: Path) -> None:
-        write_tables(temporary, tables, seal(tables))
-
-    files.write_whole(path, fill)
+    files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables)))
 
 
 def read_numbers(path: Path | str) -> dict[str, float]:

@@ -35,7 +35,7 @@ class Faults:
 FAULTS = Faults()
 
 
-def write_whole(path: Path | str, write: Callable[[Path], None], look: Callable[[], None] = lambda: None) -> None:
+def write_whole(path: Path | str, write: Callable[[Path], object], look: Callable[[], None] = lambda: None) -> None:
     """Let `write` fill a temporary file beside `path`, then put it in the place of `path`.
 
     look: called just before that; what it raises leaves the old file. Raises OutputFailed (path, free bytes) when the
@@ -101,11 +101,7 @@ def clean_leftovers(path: Path | str) -> None:
 
 def write_text(path: Path | str, text: str) -> None:
     """Write a small UTF-8 file whole. Raises OutputFailed."""
-
-    def fill(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
-
-    write_whole(path, fill)
+    write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def make_folder(path: Path) -> None:

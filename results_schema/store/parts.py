@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -144,11 +145,7 @@ class PartStore:
         root = part["/"]
         tables = {**part, "/": replace(root, attributes={**root.attributes, _KEY: self.key})}
         path = self._folder / (name + _SUFFIX)
-
-        def fill(temporary: Path) -> None:
-            write_tables(temporary, tables, seal(tables), PLAIN)
-
-        files.write_whole(path, fill)
+        files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables), filters=PLAIN))
         files.write_sidecar(path)
         return path
 

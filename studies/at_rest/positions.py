@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag
 
+from engine.model.scene_model import SceneModel
+from engine.scene.study import Study
 from engine.study_file.spec import LIST, NUMBER, Spec, ascending, by_form
 from engine.study_file.units import Length
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from studies.results.findings_common import first_carriage
 from studies.results.results import spread
-
-if TYPE_CHECKING:
-    from engine.model.scene_model import SceneModel
-    from engine.scene.study import Study
-
 
 CORRECTED: Sequence[Mapping[str, Any]] = ({"solver.static_correction": True}, {"solver.static_correction": False})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from engine.batch.plan import Plan
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
+from engine.scene.study import Study
 from engine.scene.sweep import Axis, Cases, expand
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
@@ -25,10 +26,6 @@ from studies.protocol.parts import Pieces, Variants
 from studies.results.findings_common import told_trains
 from studies.results.formatting import counted, number, unit_text
 from studies.results.results import typed_unit
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
-
 
 FREQUENCIES_SHOWN = 6
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.observation.cycle_reduction import Compared, Cycle
+from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -19,10 +20,6 @@ from studies.protocol.study import Kind
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, percent, quantity
 from studies.results.results import VARIANT, Index, Results, extreme
-
-if TYPE_CHECKING:
-    from engine.observation.cycle_reduction import Compared, Cycle
-    from engine.scene.study import Study
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 

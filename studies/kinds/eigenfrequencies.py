@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Along
+from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.variable import outputs
 from results_schema.variables import declare
@@ -19,13 +23,6 @@ from studies.protocol.study import question_of
 from studies.results.findings_common import first_carriage, in_words
 from studies.results.formatting import counted, listed, number, percent, quantity
 from studies.results.results import Results, extreme
-
-if TYPE_CHECKING:
-    from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Along
-    from engine.scene.study import Study
-    from engine.scene.variants import VariantValues
-
 
 SHOWN = 3  # frequencies that a sentence lists
 STILL = 1e-3  # relative change along the way below which a frequency counts as constant

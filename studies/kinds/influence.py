@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Along
+from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -19,13 +23,6 @@ from studies.at_rest.positions import all_positions
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, percent, quantity
 from studies.results.results import Index, Results, extreme
-
-if TYPE_CHECKING:
-    from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Along
-    from engine.scene.study import Study
-    from engine.scene.variants import VariantValues
-
 
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.variables import declare
 from studies.kinds.moving_frames import MovingFrames
 from studies.moving import findings
 from studies.moving.variables import RESULTS
 from studies.results.formatting import quantity
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
-    from studies.results.results import Results
+from studies.results.results import Results
 
 declare("sliding-mass", *RESULTS)
 

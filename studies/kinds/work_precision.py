@@ -101,13 +101,8 @@ class WorkPrecision(PiecedKind):
             try:
                 check_smooth(scene_model(study, overrides, asked.mode_counts[-1]), STATIC_QUANTITIES)
             except BadInput as error:
-                raise study.source.fault(
-                    f"question.scenes.{name}",
-                    f"{error.where.rpartition(': ')[2]}: {error.what}",
-                    expected=error.expected,
-                    received=error.received,
-                    remedy=error.remedy,
-                ) from None
+                what = f"{error.where.rpartition(': ')[2]}: {error.what}"
+                raise error.moved(study.source.where(f"question.scenes.{name}"), what) from None
 
     def pieces(self, study: Study) -> Sequence[Piece]:
         """Per scene the steps, SciPy's solvers, the modes, and the program's own choices."""

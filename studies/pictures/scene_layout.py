@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from engine.bodies.modal.description import Spot
+from engine.bodies.modal.outline import Outline
+from engine.model.scene_model import BodyPart, SceneModel
+from engine.scene.carriages import Carriage, Contact
+from engine.scene.sensors import Sensor
 from results_schema.arrays import Array
-
-if TYPE_CHECKING:
-    from engine.bodies.modal.outline import Outline
-    from engine.model.scene_model import BodyPart, SceneModel
-    from engine.scene.carriages import Carriage, Contact
-    from engine.scene.sensors import Sensor
 
 GAP = 0.06  # of the scene's size, between a track and what rides on it
 UP = np.array([0.0, 0.0, 1.0])

@@ -273,8 +273,9 @@ class Pieces:
             work.check()
             work.stage(piece.words)
             try:
-                jobs, keep = [partial(_compute, piece, work)], partial(_keep, store, piece)
-                share_out(jobs, 1, keep, stop=work.stop.event, grace=GRACE_SECONDS)
+                keep = partial(_keep, store, piece.name)
+                job = partial(_compute, piece, work)
+                share_out([job], 1, keep, stop=work.stop.event, grace=GRACE_SECONDS)
             except Interrupted:
                 work.check()
                 raise
@@ -290,8 +291,8 @@ def _compute(piece: Piece, work: Work, halted: Callable[[], bool]) -> xr.Dataset
     return piece.compute(work)
 
 
-def _keep(store: Store, piece: Piece, found: xr.Dataset) -> None:
-    store.write(piece.name, {"/": from_dataset(found)})
+def _keep(store: Store, name: str, found: xr.Dataset) -> None:
+    store.write(name, {"/": from_dataset(found)})
 
 
 def usual(dims: Sequence[str], **values: Any) -> dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]]:

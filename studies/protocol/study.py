@@ -163,7 +163,7 @@ def _check_names(study: Study) -> None:
     try:
         declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
     except BadInput as error:
-        raise study.source.fault(error.where, error.what, remedy=error.remedy) from None
+        raise error.moved(study.source.where(error.where)) from None
     for name in study.sweep.axes:
         if name in declared:
             what = "a result has this name"

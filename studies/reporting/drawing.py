@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from engine.bodies.modal.outline import HELD_AT
+from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass, weight
+from engine.model.scene_model import SceneModel
 from engine.model.station_path import frozen
+from engine.scene.study import Study
 from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_modes
@@ -31,11 +33,6 @@ from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
 from studies.results.findings_common import told_trains
 from studies.results.formatting import counted, number, percent, quantity
-
-if TYPE_CHECKING:
-    from engine.bodies.modal.outline import Outline
-    from engine.model.scene_model import SceneModel
-    from engine.scene.study import Study
 
 PAGE = "drawing.html"
 SHOWN = 6  # modes

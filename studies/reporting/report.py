@@ -140,7 +140,7 @@ def _write(source: Archive, folder: Path) -> Path:
     files.check_output_place(folder / PAGE)
     for figure, one in zip(figures, drawn, strict=True):
         files.write_text(folder / f"{one.files}.svg", f'<?xml version="1.0" encoding="utf-8"?>\n{one.svg}')
-        files.write_whole(folder / f"{one.files}.png", partial(_fill, png(figure)))
+        files.write_whole(folder / f"{one.files}.png", partial(Path.write_bytes, data=png(figure)))
     files.write_text(folder / PAGE, text)
     return folder / PAGE
 
@@ -214,10 +214,6 @@ def check_folder(folder: Path, page: str) -> None:
     if not folder.parent.is_dir():
         raise BadInput("the folder above the page's does not exist", where=str(folder.parent), remedy="create it first")
     files.check_output_place((folder if folder.exists() else folder.parent) / page)
-
-
-def _fill(content: bytes, path: Path) -> None:
-    path.write_bytes(content)
 
 
 def _facts(results: Results, noun: str) -> list[Row]:

@@ -20,7 +20,6 @@ from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
-from engine.study_file.checks import Check
 from engine.study_file.spec import LIST, WORD, Spec, by_form, distinct, one_of
 from engine.study_file.units import (
     Area,
@@ -316,6 +315,3 @@ class Frame(Body):
 
     def doubts(self, here: str) -> list[Doubt]:
         return [doubt for name in self.section for doubt in section_doubts(f"{here}.section.{name}", f"{here}.length")]
-
-    def checks(self, here: str) -> list[Check]:
-        return []

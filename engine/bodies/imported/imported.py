@@ -21,7 +21,6 @@ from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import Outline
-from engine.study_file.checks import Check
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
 from results_schema.errors import BadInput, shortened
@@ -249,9 +248,6 @@ class Imported(Body):
         from engine.bodies.imported.body import imported_body
 
         return imported_body(self, spots)
-
-    def checks(self, here: str) -> list[Check]:
-        return []
 
 
 class Recovering(Imported):

@@ -145,9 +145,9 @@ class Body(Spec):
         """Its damping ratios where they are given mode by mode: the last one goes on for the modes beyond."""
         return self.damping_ratio if isinstance(self.damping_ratio, tuple) else ()
 
-    @abstractmethod
     def checks(self, here: str) -> list[Check]:
         """Conditions between the numbers of this body at the dotted key `here`."""
+        return []
 
     def doubts(self, here: str) -> list[Doubt]:
         """Its numbers at the dotted key `here` that are likely only within limits."""

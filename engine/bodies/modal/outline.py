@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from engine.bodies.modal.modal_body import ModalBody
 from results_schema.arrays import Array
-
-if TYPE_CHECKING:
-    from engine.bodies.modal.modal_body import ModalBody
 
 STATIONS = 61  # of a track that is drawn
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.study_file.checks import Check
-from engine.study_file.units import AREA, DENSITY, LENGTH, PRESSURE, SECOND_MOMENT, Unit
+from engine.study_file.units import Area, Density, Length, Pressure, SecondMoment, Unit, unit_of
 
 
 @dataclass(frozen=True)
@@ -41,22 +41,22 @@ def section_doubts(here: str, length: str) -> list[Doubt]:
     """
     material = (f"{here}.youngs_modulus", f"{here}.density")
 
-    def doubt(unit: Unit, others: str, needs: tuple[str, ...], expected: str, likely: Callable[..., Any]) -> Doubt:
+    def doubt(dimension: Any, others: str, needs: tuple[str, ...], expected: str, likely: Callable[..., Any]) -> Doubt:
         def holds(*values: Any) -> Any:
             modulus, density = values[-2:]
             return likely(*values[:-2]) | ~(np.asarray(_modulus_of_matter(modulus)) | _density_of_matter(density))
 
         what = "no beam has this"
-        return Doubt(needs[0], (*needs, *material), holds, what, expected, unit, tuple(others.split()))
+        return Doubt(needs[0], (*needs, *material), holds, what, expected, unit_of(dimension), tuple(others.split()))
 
     area, inertia = f"{here}.area", f"{here}.second_moment"
     return [
-        doubt(PRESSURE, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),
-        doubt(DENSITY, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
-        doubt(LENGTH, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
-        doubt(AREA, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
+        doubt(Pressure, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),
+        doubt(Density, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
+        doubt(Length, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
+        doubt(Area, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
               lambda size, along: size <= along**2 / 4),
-        doubt(SECOND_MOMENT, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",
+        doubt(SecondMoment, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",
               lambda size, across, along: size <= across * along**2 / 16),
     ]  # fmt: skip
 

@@ -13,7 +13,6 @@ from pydantic import Field, ValidationInfo, model_validator
 from engine.bodies.frame.refusals import refuse
 from engine.bodies.modal.description import Body, Spot, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
-from engine.study_file.checks import Check
 from results_schema.errors import BadInput, WanderlastError, shortened
 
 
@@ -93,6 +92,3 @@ class Reduced(Body):
         from engine.bodies.reduced.body import load_body
 
         return load_body(self.file, self.modes)
-
-    def checks(self, here: str) -> list[Check]:
-        return []
