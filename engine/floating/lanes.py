@@ -12,8 +12,7 @@ import numpy as np
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import Lane
 from engine.scene.frames import AxisJoint, Free, Spherical
-from engine.scene.motions import Cruise, Sinusoidal
-from engine.scene.time_motions import AMPLITUDE, CONSTANT, RATE, START, spline_pieces
+from engine.scene.time_motions import START
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 #: Keys of numbers that a variant may have to itself within one scene.
 OWN_KEYS = re.compile(
     r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?"
-    r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|inertia\.\d|height)|carriage\.\w+\.motion\..+"
+    r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|inertia\.\d|height)|carriage\.\w+\.motion\.(?!cycles$).+"
     r"|frame\.\w+\.joints\.\d+\.(start|rate(\.\d)?|velocity\.\d|stiffness|damping|motion\..+)"
 )
 
@@ -131,20 +130,4 @@ def _pieces(model: FloatingModel, numbers: Numbers, key: str) -> Array:
         joint = model.frame(name).joints[int(rest[1])]
         assert isinstance(joint, AxisJoint) and joint.motion is not None
         return joint.motion.pieces(lambda word: numbers.of(f"{key}.{word}"))
-    motion = model.study.carriage[name].motion
-    if isinstance(motion, Cruise):
-        start, end, speed = (numbers.of(f"{key}.{word}") for word in ("start", "end", "speed"))
-        found = np.zeros((start.size, 2, columns.PIECE))
-        found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = start, np.sign(end - start) * speed
-        found[:, 1, START], found[:, 1, CONSTANT] = np.abs(end - start) / speed, end
-        return found
-    if isinstance(motion, Sinusoidal):
-        found = np.zeros((numbers.values.size, 1, columns.PIECE))
-        found[:, 0, CONSTANT], found[:, 0, AMPLITUDE] = numbers.of(f"{key}.centre"), numbers.of(f"{key}.amplitude")
-        found[:, 0, RATE] = 2.0 * np.pi * numbers.of(f"{key}.frequency")
-        return found
-    count = len(model.study.value(f"{key}.times"))
-    times, places = (
-        np.stack([numbers.of(f"{key}.{word}.{k}") for k in range(count)], axis=1) for word in ("times", "positions")
-    )
-    return np.stack([spline_pieces(*pair) for pair in zip(times, places, strict=True)])
+    return model.study.carriage[name].motion.pieces(lambda word: numbers.of(f"{key}.{word}"))

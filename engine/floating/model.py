@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 OF_DEPTH = 4  # signals of a body
+MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all its pieces
 HELD = 1e-9  # of the largest: a shape below is zero
 
 
@@ -168,12 +169,19 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
             expected="mass or oscillator",
             received=carriage.kind,
         )
-    if not carriage.motion.slides and carriage.motion.kind not in ("cruise", "sinusoidal", "waypoints"):
+    if not carriage.motion.slides and not carriage.motion.in_pieces:
         raise BadInput(
             "this motion on bodies in frames that move is not built yet",
             where=where(f"carriage.{name}.motion.kind"),
-            expected="free, cruise, sinusoidal or waypoints",
+            expected="free, cruise, out-and-back, sinusoidal or waypoints",
             received=carriage.motion.kind,
+        )
+    if carriage.motion.legs is not None and carriage.motion.duration > MOST_CYCLES:
+        raise BadInput(
+            "too many cycles on a body in a frame that moves",
+            where=where(f"carriage.{name}.motion.cycles"),
+            expected=f"at most {MOST_CYCLES}",
+            received=f"{carriage.motion.duration:.0f}",
         )
     if carriage.start_time > 0.0:
         raise BadInput("carriages here set off at time 0", where=where(f"carriage.{name}.delay"), expected="0")

@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from engine.study_file.checks import Check
 from engine.study_file.spec import Spec
 
+if TYPE_CHECKING:
+    from engine.scene.time_motions import Number
+
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 
@@ -55,6 +58,7 @@ class Motion(Spec):
     passes: ClassVar[bool] = False  # whether the carriage is on the body while it moves only
     slides: ClassVar[bool] = False  # whether its place is an unknown of the equations of motion
     is_harmonic: ClassVar[bool] = False  # whether it swings as a sine about the middle of its range
+    in_pieces: ClassVar[bool] = False  # whether bodies in frames that move know it, by `pieces`
     if TYPE_CHECKING:
 
         @property
@@ -87,6 +91,11 @@ class Motion(Spec):
     @abstractmethod
     def law(self, tau: Array, side: Side) -> Path:
         """The law for 0 <= tau <= duration."""
+
+    def pieces(self, number: Number) -> Array:
+        """(V, pieces, 10) place in m over the time in s, as `engine.scene.time_motions` has its columns, for variants
+        whose numbers are asked by key; the carriage stays where the last one ends."""
+        raise NotImplementedError
 
     @property
     def free_vibration(self) -> float:

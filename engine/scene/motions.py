@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from engine.scene.motion_base import Array, Legs, Motion, Path, Reversal, Side
+from engine.scene.time_motions import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
@@ -24,6 +25,7 @@ class Cruise(Motion):
 
     pace = "speed"
     passes = True
+    in_pieces = True
     kind: Literal["cruise"]
     start: Length
     end: Length
@@ -54,6 +56,13 @@ class Cruise(Motion):
         velocity = np.full_like(tau, self.end - self.start)
         return Path((1.0 - tau) * self.start + tau * self.end, velocity, np.zeros_like(tau))
 
+    def pieces(self, number: Number) -> Array:
+        start, end, speed = (number(key) for key in ("start", "end", "speed"))
+        found = blank(start, 2)
+        found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = start, np.sign(end - start) * speed
+        found[:, 1, START], found[:, 1, CONSTANT] = np.abs(end - start) / speed, end
+        return found
+
 
 class OutAndBack(Motion):
     """From start to end and back, `cycles` times, at constant speed v but for smooth turns. tau = 1 is one cycle.
@@ -66,6 +75,7 @@ class OutAndBack(Motion):
 
     pace = "speed"
     period = 1.0
+    in_pieces = True
     kind: Literal["out-and-back"]
     start: Length
     end: Length
@@ -131,6 +141,27 @@ class OutAndBack(Motion):
         position = np.clip(self.start + way * folded.S, *self.range())  # rounding must not leave the body
         return Path(position, velocity, way * folded.ddS)
 
+    def pieces(self, number: Number) -> Array:
+        """Half a turn, then by turns ways and turns, half a turn at last."""
+        start, end, speed, turn = (number(key) for key in ("start", "end", "speed", "turn"))
+        stroke = end - start
+        depth, quarter = turn * stroke, 0.5 * np.pi * turn * np.abs(stroke) / speed
+        way = (1.0 - 2.0 * turn) * np.abs(stroke) / speed
+        found, ways = blank(start, 4 * self.cycles + 2), 2 * self.cycles
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rate = np.where(depth != 0.0, speed / np.abs(depth), 0.0)
+        for k in range(ways + 1):
+            near, into = (end, -depth) if k % 2 else (start, depth)
+            begins = np.zeros_like(way) if k == 0 else k * (way + 2.0 * quarter) - quarter
+            bow = found[:, 2 * k]  # near + into (1 - cos(rate (t - middle)))
+            bow[:, START], bow[:, CONSTANT], bow[:, AMPLITUDE], bow[:, RATE] = begins, near + into, -into, rate
+            bow[:, PHASE] = 0.5 * np.pi if k == 0 else 0.0  # a later one begins a quarter before its middle
+            straight = found[:, 2 * k + 1]
+            straight[:, START] = begins + (quarter if k in (0, ways) else 2.0 * quarter)
+            straight[:, CONSTANT] = near + into if k < ways else start
+            straight[:, CONSTANT + 1] = np.sign(stroke) * speed * (1.0 if k % 2 == 0 else -1.0) if k < ways else 0.0
+        return found
+
     def _there(self, tau: Array) -> Path:
         """StationPath gone on the way out, 0 <= tau <= 1/2; the three branches of the law."""
         depth, fast, half = self.turn * self.stroke, self.max_speed, self.half_turn
@@ -153,6 +184,7 @@ class Sinusoidal(Motion):
     pace = "frequency"
     is_harmonic = True
     period = 1.0
+    in_pieces = True
     kind: Literal["sinusoidal"]
     centre: Length
     amplitude: Length = Field(gt=0)
@@ -184,6 +216,14 @@ class Sinusoidal(Motion):
         sine = self.amplitude * np.sin(angle)
         return Path(self.centre + sine, rate * self.amplitude * np.cos(angle), -(rate**2) * sine)
 
+    def pieces(self, number: Number) -> Array:
+        centre, frequency = number("centre"), number("frequency")
+        found = blank(centre, 2)
+        found[:, :, CONSTANT] = centre[:, None]
+        found[:, 0, AMPLITUDE], found[:, 0, RATE] = number("amplitude"), 2.0 * np.pi * frequency
+        found[:, 1, START] = self.cycles / frequency
+        return found
+
 
 Places = Annotated[tuple[Length, ...], Strict(False)]
 Times = Annotated[tuple[Time, ...], Strict(False)]
@@ -192,6 +232,7 @@ Times = Annotated[tuple[Time, ...], Strict(False)]
 class Waypoints(Motion):
     """The C2 cubic spline through positions at times, at rest at both ends. tau = 1 is the whole way."""
 
+    in_pieces = True
     kind: Literal["waypoints"]
     times: Times = Field(min_length=2, max_length=1000)
     positions: Places = Field(min_length=2, max_length=1000)
@@ -232,6 +273,9 @@ class Waypoints(Motion):
     def law(self, tau: Array, side: Side) -> Path:
         spline = _spline_at_rest(np.array(self.times) / self.times[-1], np.array(self.positions))
         return Path(*(np.asarray(spline(tau, order), dtype=np.float64) for order in range(3)))
+
+    def pieces(self, number: Number) -> Array:
+        return spline_pieces(number, len(self.times), "positions")
 
     def _derivatives(self) -> tuple[Array, Array, Array]:
         knots = np.array(self.times) / self.times[-1]

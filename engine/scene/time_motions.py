@@ -35,7 +35,8 @@ class TimeMotion(Spec):
         """(V, pieces, 10): the columns above."""
 
 
-def _blank(like: Array, count: int) -> Array:
+def blank(like: Array, count: int) -> Array:
+    """(V, count, 10) pieces of nothing for numbers (V,)."""
     return np.zeros((like.size, count, COLUMNS))
 
 
@@ -47,7 +48,7 @@ class Steady(TimeMotion):
     rate: float
 
     def pieces(self, number: Number) -> Array:
-        found = _blank(number("rate"), 1)
+        found = blank(number("rate"), 1)
         found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = number("start"), number("rate")
         return found
 
@@ -61,7 +62,7 @@ class Swing(TimeMotion):
     frequency: Frequency = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
-        found = _blank(number("frequency"), 1)
+        found = blank(number("frequency"), 1)
         found[:, 0, CONSTANT], found[:, 0, AMPLITUDE] = number("centre"), number("amplitude")
         found[:, 0, RATE] = 2.0 * pi * number("frequency")
         return found
@@ -77,7 +78,7 @@ class SpinUp(TimeMotion):
 
     def pieces(self, number: Number) -> Array:
         rate, time = number("rate"), number("time")
-        found = _blank(rate, 2)
+        found = blank(rate, 2)
         bow = rate * time / (4.0 * pi**2)
         found[:, 0, CONSTANT], found[:, 0, CONSTANT + 2] = -bow, 0.5 * rate / time
         found[:, 0, AMPLITUDE], found[:, 0, RATE], found[:, 0, PHASE] = bow, 2.0 * pi / time, 0.5 * pi
@@ -102,8 +103,7 @@ class Points(TimeMotion):
         return self
 
     def pieces(self, number: Number) -> Array:
-        columns = (np.stack([number(f"{key}.{k}") for k in range(len(self.times))]) for key in ("times", "values"))
-        return np.stack([spline_pieces(t, v) for t, v in zip(*(column.T for column in columns), strict=True)])
+        return spline_pieces(number, len(self.times), "values")
 
 
 class SteadyTurn(Steady):
@@ -180,7 +180,13 @@ AnyTurning = Annotated[TimeMotion, KindOf("motion of a joint that turns", TURNIN
 AnySliding = Annotated[TimeMotion, KindOf("motion of a joint that slides", SLIDING)]
 
 
-def spline_pieces(times: Array, values: Array) -> Array:
+def spline_pieces(number: Number, count: int, key: str) -> Array:
+    """(V, pieces, 10) of the cubic splines through so many values of a key at `times`, see `_spline_pieces`."""
+    columns = (np.stack([number(f"{word}.{k}") for k in range(count)], axis=1) for word in ("times", key))
+    return np.stack([_spline_pieces(*pair) for pair in zip(*columns, strict=True)])
+
+
+def _spline_pieces(times: Array, values: Array) -> Array:
     """(pieces, 10) of the cubic spline at rest at both ends, and the last value from then on."""
     from scipy.interpolate import CubicSpline
 
