@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
-from studies.results.formatting import quantity, scale_for
+from studies.pictures.trajectory import histories, ranging
+from studies.results.formatting import quantity
 from studies.results.results import Index, Results, chosen
 
 MOST_ROWS, MOST_CURVES = 5, 4
@@ -20,16 +19,16 @@ def pictures(results: Results) -> list[Figure]:
     if not traced:
         return []
     shown, own = list(chosen(traced, MOST_CURVES)), [_own(results, traced)]
-    rows = _rows(results)
-    found = []
+    rows, found = _rows(results), list[Figure]()
+    caption = f"At {results.at(own[0])}; one of {len(traced)} kept histories." if len(traced) > 1 else ""
     if rows:
         name = next(iter(rows))
-        found.append(_histories(results, "histories", _title(results, name, rows[name], own), rows, own))
+        found.append(histories(results, "histories", ranging(results, name, rows[name], own), caption, rows, own))
     found += [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
     energies = {"kinetic_energy": "J", "potential_energy": "J"}
     change = float(np.nanmax(results.dataset["energy_change"].values))
     title = f"The energy of everything changes by at most {quantity(change, 'J')}"
-    return [*found, on_method(_histories(results, "energy", title, energies, own))]
+    return [*found, on_method(histories(results, "energy", title, caption, energies, own))]
 
 
 def _own(results: Results, traced: list[Index]) -> Index:
@@ -52,37 +51,6 @@ def _rows(results: Results) -> dict[str, str]:
         ends = ("position", "acceleration_x", "acceleration_z") if carriage.motion.slides else ("acceleration_z",)
         rows |= {f"{name}_{end}": str(results.dataset[f"{name}_{end}"].attrs["units"]) for end in ends}
     return dict(list(rows.items())[:MOST_ROWS])
-
-
-def _title(results: Results, name: str, unit: str, shown: list[Index]) -> str:
-    values = np.concatenate([results.trace(name, index).values for index in shown])
-    ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
-    return f"{name.replace('_', ' ').capitalize()} goes from {ends[0]} to {ends[1]}"
-
-
-def _histories(results: Results, name: str, title: str, rows: dict[str, str], shown: list[Index]) -> Figure:
-    traced = len(results.traced())
-    caption = f"At {results.at(shown[0])}; one of {traced} kept histories." if traced > 1 else ""
-    return draw(name, title, caption, 0.6 + 1.6 * len(rows), partial(_draw, results, rows, shown))
-
-
-def _draw(results: Results, rows: dict[str, str], shown: list[Index], drawing: Drawing) -> None:
-    plots = drawing.subplots(len(rows), 1, squeeze=False, sharex=True)[:, 0]
-    for axes, (name, unit) in zip(plots, rows.items(), strict=True):
-        traces = [results.trace(name, index) for index in shown]
-        largest = max(float(np.nanmax(np.abs(trace.values), initial=0.0)) for trace in traces)
-        scale = scale_for(largest, unit)
-        for index, trace, colour in zip(shown, traces, shades(len(shown)), strict=True):
-            label = results.at(index).replace(", ", "\n")
-            axes.plot(trace.times, trace.values * scale.factor, color=colour, label=label, linewidth=1.2)
-        words = name.replace("_", " ")
-        axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)
-        if name in results.sensors and unit == "m":
-            axes.invert_yaxis()
-    plots[-1].set_xlabel("time (s)")
-    drawing.align_ylabels()
-    if len(shown) > 1:
-        legend_of_all(drawing, plots[0])
 
 
 def _portrait(results: Results, name: str, shown: list[Index]) -> Figure:

@@ -31,22 +31,22 @@ def pictures(results: Results) -> list[Figure]:
     many = f"{len(shown)} of {len(results.traced())} kept histories." if len(results.traced()) > len(shown) else ""
     units = {name: results.sensors[name] for name in sensors}
     hang = " Displacements point down, as the body hangs." if "m" in units.values() else ""
-    title = _ranging(results, sensors[0], units[sensors[0]], results.noun(sensors[0]), shown)
-    found = [_histories(results, "sensors", title, f"{many}{more}{hang}", units, shown)]
+    title = ranging(results, sensors[0], units[sensors[0]], shown)
+    found = [histories(results, "sensors", title, f"{many}{more}{hang}", units, shown)]
     ways = _carriage_rows(results)
     if not ways:
         return found
     name = next(iter(ways))
-    title = _ranging(results, name, ways[name], name.replace("_", " "), shown)
-    return [*found, _histories(results, "carriages", title, many, ways, shown)]
+    title = ranging(results, name, ways[name], shown)
+    return [*found, histories(results, "carriages", title, many, ways, shown)]
 
 
-def _ranging(results: Results, name: str, unit: str, noun: str, shown: list[Index]) -> str:
+def ranging(results: Results, name: str, unit: str, shown: list[Index]) -> str:
     """From where to where the histories of a result go."""
     values = np.concatenate([results.trace(name, index).values for index in shown])
     ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
-    place = f" {results.place(name)}" if name in results.sensors else ""
-    return f"{noun.capitalize()}{place} goes from {ends[0]} to {ends[1]}"
+    noun = f"{results.noun(name)} {results.place(name)}" if name in results.sensors else name.replace("_", " ")
+    return f"{noun[0].upper()}{noun[1:]} goes from {ends[0]} to {ends[1]}"
 
 
 def _carriage_rows(results: Results) -> dict[str, str]:
@@ -55,9 +55,10 @@ def _carriage_rows(results: Results) -> dict[str, str]:
     return {name: str(results.dataset[name].attrs["units"]) for name in names if name in results.dataset}
 
 
-def _histories(
+def histories(
     results: Results, name: str, title: str, caption: str, units: dict[str, str], shown: list[Index]
 ) -> Figure:
+    """One row for each of some results, with their units, over time."""
     height = 0.6 + 1.7 * len(units)
     return draw(name, title, caption.strip(), height, partial(_draw, results, units, shown))
 
