@@ -18,6 +18,11 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Group
 from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.linear_algebra import one_thread
+from engine.march.march import prepare
+from engine.march.richardson import march_pair, march_scheme
+from engine.march.stepper import Halted as Gone
+from engine.march.tables import SceneTables
+from engine.model.lane_table import in_whole_blocks, padded
 from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.arrays import Counts
@@ -103,8 +108,6 @@ def warm_up(plan: Plan) -> None:
 
 def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
     """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
-    from engine.march.stepper import Halted as Gone
-
     try:
         plan.choose(partial(run_jobs, threads=threads or cores()), partial(_any_set, (stop,)))
     except Gone:
@@ -114,11 +117,6 @@ def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> Non
 def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
     """Wall time of marching every variant once with the study's sensors alone, without compiling, tabulating, and
     gathering results; the mean over ``repeats`` marches in a row."""
-    from engine.march.march import prepare
-    from engine.march.richardson import march_pair
-    from engine.march.tables import SceneTables
-    from engine.model.lane_table import padded
-
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
     tables = {id(b): SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in plan.groups}
     workers = threads or cores()
@@ -213,11 +211,6 @@ def _do(job: Callable[[Halted], object], results: queue.Queue[Any], halted: Halt
 
 def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
-    from engine.march.richardson import march_scheme
-    from engine.march.stepper import Halted as Gone
-    from engine.march.tables import SceneTables
-    from engine.model.lane_table import in_whole_blocks
-
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
     with suppress(Gone):
         values = in_whole_blocks(grid.values.part(np.zeros(1, dtype=np.int64)))

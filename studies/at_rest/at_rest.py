@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.model.distinct_models import base_scene, scenes, structure
+from engine.model.station_path import frozen
 from engine.scene.carriages import MAX_CONTACTS
+from engine.scene.sweep import expand
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.at_rest.labelling import Gathering, asked_coordinates
@@ -82,8 +86,6 @@ class AtRestKind(PiecedKind):
 
     def pieces(self, study: Study) -> list[Piece]:
         from engine.batch.plan import check_memory
-        from engine.model.distinct_models import base_scene
-        from engine.scene.sweep import expand
         from engine.unreduced.scene import unreduced_model
 
         model, asked = base_scene(study), question_of(study, self.settings)
@@ -131,19 +133,12 @@ def _numbers(study: Study, asked: Asked, positions: int) -> int:
 
 def _shapes(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Shapes along all bodies, of the scene without sweep."""
-    from engine.model.distinct_models import base_scene
-    from engine.model.station_path import frozen
-
     model = base_scene(study)
     return _plain(kind.shapes(model, frozen(model, places.all)))
 
 
 def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
     """Some variants, in the order of the scenes that they share."""
-    from engine.model.distinct_models import scenes, structure
-    from engine.scene.sweep import expand
-    from engine.scene.variants import VariantValues
-
     cases = expand(study)
     everything = np.arange(cases.size, dtype=np.int64)
     chosen = everything[np.argsort(structure(cases, everything), kind="stable")][part]
@@ -161,8 +156,6 @@ def _evaluated(
     kind: AtRestKind, model: SceneModel, values: VariantValues, places: Positions
 ) -> dict[str, NDArray[Any]]:
     """Results of some variants of a scene, with NaN where a contact is off the body."""
-    from engine.model.station_path import frozen
-
     along = frozen(model, places.all)
     found = dict(kind.variants(model, values, along))
     own = [along[rider].here for rider in {0, *(load.rider for load in model.carriages[0].loads)}]
@@ -178,10 +171,6 @@ def _evaluated(
 
 def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:
     """Results with another number of modes of every body, with and without static correction."""
-    from engine.model.distinct_models import base_scene
-    from engine.model.station_path import frozen
-    from engine.scene.variants import VariantValues
-
     found = []
     for correction in CORRECTED:
         model = base_scene(with_modes(study, modes, correction))
@@ -195,10 +184,6 @@ def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, w
 
 def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Results of the unreduced model, and those of the modes at the same positions."""
-    from engine.model.distinct_models import base_scene
-    from engine.model.station_path import frozen
-    from engine.scene.variants import VariantValues
-
     model, positions = base_scene(study), places.all[places.unreduced]
     reduced = kind.variants(model, VariantValues(model.study, {}, 1), frozen(model, positions))
     full = kind.unreduced(study.without_sweep(), model, positions)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.model.distinct_models import base_scene
 from results_schema.variable import outputs
-from results_schema.variables import Variable
+from results_schema.variables import Variable, axes, expand
 from studies.at_rest.positions import Asked, Positions, positions_of
 from studies.protocol.parts import usual
 from studies.protocol.study import question_of
@@ -49,7 +50,6 @@ class Gathering:
     """The pieces of one study with what their dimensions mean."""
 
     def __init__(self, kind: AtRestKind, pieces: Mapping[str, xr.Dataset], study: Study) -> None:
-        from engine.model.distinct_models import base_scene
         from engine.scene.sweep import expand
 
         self.pieces, self.asked = pieces, question_of(study, kind.settings)
@@ -68,8 +68,6 @@ class Gathering:
         return found.assign_coords({name: found_one for name, found_one in self._coordinates() if name in found.dims})
 
     def _coordinates(self) -> list[tuple[str, Any]]:
-        from results_schema.variables import axes
-
         known = {**axes(), **self.declared}
         values: dict[str, NDArray[Any]] = {
             **asked_coordinates(self.places, self.asked),
@@ -143,6 +141,4 @@ class Gathering:
 
 def _declared(kind: str, study: Study) -> dict[str, Variable]:
     """The kind's declarations for the names of a study."""
-    from results_schema.variables import expand
-
     return expand(kind, sensor_units(study), tuple(study.carriage))

@@ -19,7 +19,11 @@ from rich.text import Text
 from results_schema.errors import printable
 from results_schema.status import Status, label
 from studies.commands.error_exit import drop_stdout
+from studies.findings.numerics_used import is_marched, told_choices
+from studies.reporting.answers import answer_of
 from studies.results.formatting import counted, number, quantity
+from studies.results.results import Results
+from studies.runs.audit import told_accuracy, told_audit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -187,8 +191,6 @@ def show_archive(summary: Summary) -> None:
 
 def show_choices(results: Results) -> None:
     """What variants were computed with."""
-    from studies.findings.numerics_used import told_choices
-
     paragraphs(*told_choices(results))
 
 
@@ -208,9 +210,6 @@ def show_everything(summary: Summary) -> None:
 def show_outcome(outcome: Outcome) -> None:
     """The answer of a run in sentences, the results that were asked for, their accuracy, and what to do next."""
     from studies.reporting import summary
-    from studies.reporting.answers import answer_of
-    from studies.results.results import Results
-    from studies.runs.audit import told_accuracy
 
     results = Results.of(outcome.results)
     _heading(outcome.results.attrs["title"])
@@ -225,10 +224,7 @@ def show_outcome(outcome: Outcome) -> None:
 
 def show_details(outcome: Outcome) -> None:
     """How a run was computed: the range of every result with both variants, models, schemes, work, and the audit."""
-    from studies.findings.numerics_used import told_choices
     from studies.reporting import summary
-    from studies.results.results import Results
-    from studies.runs.audit import told_audit
 
     results = Results.of(outcome.results)
     rows = [
@@ -320,7 +316,6 @@ def _about_statuses(counts: Mapping[str, int], noun: str, expected: Sequence[str
 
 
 def _about_work(outcome: Outcome) -> str:
-    from studies.findings.numerics_used import is_marched
     from studies.reporting import summary
 
     variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))

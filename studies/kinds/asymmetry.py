@@ -9,6 +9,7 @@ import numpy as np
 
 from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.study import Study
+from engine.scene.sweep import expand
 from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -126,8 +127,6 @@ KIND = Asymmetry()
 
 def _check_cruise(study: Study, carriage: str) -> None:
     """Every variant cruises over half of its stroke or more; a turn blends its part of the stroke at either end."""
-    from engine.scene.sweep import expand
-
     key = f"carriage.{carriage}.motion.turn"
     swept = [axis.values for axis in expand(study).axes if key in axis.paths]
     largest = float(max(swept[0])) if swept else float(study.value(key))

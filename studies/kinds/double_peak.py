@@ -11,7 +11,7 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.status import Fidelity
 from results_schema.variable import outputs
-from results_schema.variables import AXES, MARCH, declare
+from results_schema.variables import AXES, MARCH, axes, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
 from studies.findings.peaks import PEAKS, peaks
@@ -187,8 +187,6 @@ def _apart(phase: Array, other: Array) -> Array:
 
 
 def _axis(name: str) -> dict[str, object]:
-    from results_schema.variables import axes
-
     return axes()[name].attributes()
 
 

@@ -12,6 +12,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
+from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
 from results_schema.arrays import Array
 from results_schema.variable import outputs
 from results_schema.variables import declare
@@ -80,14 +81,9 @@ class Eigenfrequencies(AtRestKind):
         super().check(study)
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.statics.coupled_modes import coupled_frequencies
-
         return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.scene.variants import VariantValues
-        from engine.statics.coupled_modes import coupled_modes
-
         found = coupled_modes(model, VariantValues(model.study, {}, 1), along, _count(model.study))
         lines = []
         for part in model.bodies:

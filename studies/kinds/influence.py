@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along
+from engine.observation.contact_forces import contact_forces
+from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
+from engine.statics.static_response import contact_names, static_shapes, static_values
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
@@ -78,10 +81,6 @@ class Influence(AtRestKind):
         super().check(study)
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.observation.contact_forces import contact_forces
-        from engine.observation.signals import build_sensors
-        from engine.statics.static_response import static_values
-
         found = static_values(model, build_sensors(model), values, along)
         named: dict[str, NDArray[Any]] = {}
         for j, sensor in enumerate(model.study.sensor):
@@ -94,9 +93,6 @@ class Influence(AtRestKind):
         return {**named, "contact_force": found.contacts}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
-        from engine.scene.variants import VariantValues
-        from engine.statics.static_response import static_shapes
-
         values = VariantValues(model.study, {}, 1)
         lines = [
             static_shapes(model, values, along, body, np.linspace(0.0, part.modal.length, BODY_PLACES))[0]
@@ -105,7 +101,6 @@ class Influence(AtRestKind):
         return {"deflection": np.stack(lines)}
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
-        from engine.statics.static_response import contact_names
         from engine.unreduced.scene import unreduced_model
         from engine.unreduced.statics import unreduced_statics
 
@@ -125,8 +120,6 @@ class Influence(AtRestKind):
         return Fidelity.STATIC
 
     def inner(self, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
-        from engine.statics.static_response import contact_names
-
         return {"contact_force": ("contact", np.array(contact_names(model)))}
 
     def findings(self, results: Results) -> list[str]:

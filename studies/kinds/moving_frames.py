@@ -14,6 +14,7 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.variables import declare
 from studies.moving import findings
+from studies.moving.parts import gather
 from studies.moving.variables import RESULTS
 from studies.protocol.study import PiecedKind, question_of
 
@@ -68,8 +69,6 @@ class MovingFrames(PiecedKind):
         return pieces(study, duration)
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
-        from studies.moving.parts import gather
-
         return gather(pieces, study, self.name)
 
     def findings(self, results: Results) -> list[str]:

@@ -14,8 +14,11 @@ from engine.study_file.units import fault
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
-from results_schema.variables import declare
+from results_schema.variables import axes, declare
+from studies.precision import checks
+from studies.precision import findings as advice
 from studies.precision.checks import slug_of
+from studies.precision.pareto import fitted_order, formal_order, fronts
 from studies.precision.variables import COORDINATES, RESULTS
 from studies.protocol.parts import Piece, Work, usual
 from studies.protocol.study import PiecedKind, question_of
@@ -87,7 +90,6 @@ class WorkPrecision(PiecedKind):
     def check(self, study: Study) -> None:
         """One mass on one smooth way in every scene, and sensors with a static value."""
         from engine.methods.ode import check_smooth
-        from studies.precision import checks
         from studies.precision.precision import scene_model
 
         asked = question_of(study, Question)
@@ -120,8 +122,6 @@ class WorkPrecision(PiecedKind):
         return _gathered(pieces, question_of(study, Question))
 
     def findings(self, results: Results) -> list[str]:
-        from studies.precision import findings as advice
-
         return advice.findings(results.dataset, question_of(results.study, Question).wanted)
 
     def figures(self, results: Results) -> list[Figure]:
@@ -185,7 +185,6 @@ _PARTS: Mapping[str, tuple[str, float]] = {
 def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     import xarray as xr
 
-    from studies.precision.pareto import fitted_order, formal_order, fronts
     from studies.precision.precision import COMPARED, MARCHED, QUANTITIES
 
     def stacked(part: str, name: str) -> Array:
@@ -254,7 +253,6 @@ def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, A
 
 
 def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
-    from results_schema.variables import axes
     from studies.precision.ladders import SOLVERS
 
     named = [f"{method} {tolerance:g}" for method, tolerances in SOLVERS.items() for tolerance in tolerances]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from engine.march.step_rules import alias_steps
 from results_schema.arrays import Array
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
@@ -74,8 +75,6 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def rule_steps(scene: MapScene, speed: Array) -> Array:
     """(n,) steps per passage of the rule for speeds (n,) over omega_1 L/pi."""
-    from engine.march.step_rules import alias_steps
-
     return alias_steps(scene.model, scene.model.leading_body.modal.length / (speed * scene.speed_unit))
 
 

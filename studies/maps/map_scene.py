@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.model.lane_table import padded
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts, Mask
 
 if TYPE_CHECKING:
@@ -124,8 +126,6 @@ class MapScene:
     def values(self, mass: Array, pace: Array | None = None, damping: Array | None = None) -> VariantValues:
         """Variants (V,) with masses over the body's, speeds over omega_1 L/pi or frequencies over omega_1, and damping
         ratios."""
-        from engine.scene.variants import VariantValues
-
         key = f"carriage.{CARRIAGE}"
         columns = {f"{key}.mass": mass * self.model.leading_body.modal.mass}
         if pace is not None and self.study.carriage[CARRIAGE].motion.pace == "speed":
@@ -157,9 +157,6 @@ class MapScene:
 
     def laid_out(self, steps: int, values: VariantValues) -> tuple[SceneTables, VariantValues]:
         """Tables of so many steps, and the variants filled up to whole blocks of lanes."""
-        from engine.model.lane_table import padded
-        from engine.scene.variants import VariantValues
-
         lanes = padded(np.arange(values.size))
         columns = {path: column[lanes] for path, column in values.columns.items()}
         return self._tables(steps), VariantValues(values.study, columns, lanes.size)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.kernels.layout import BELOW_AT, SMALLEST
 from results_schema.arrays import Array
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
@@ -71,8 +72,6 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def contact(scene: MapScene, mass: float, speed: Array, work: Work) -> Contact:
     """The contact of passages at speed ratios (n,)."""
-    from engine.kernels.layout import BELOW_AT, SMALLEST
-
     values = scene.values(np.full_like(speed, mass), speed)
     marks = scene.march(STEPS, values, work).statistics[-1]
     weight = mass * scene.model.leading_body.modal.mass * scene.study.gravity

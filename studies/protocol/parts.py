@@ -17,8 +17,9 @@ from results_schema.arrays import Counts
 from results_schema.errors import Interrupted, OutputFailed
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
-from results_schema.variables import declarations
+from results_schema.variables import declarations, expand
 from studies.protocol.stopping import Stop
+from studies.results.results import Results, envelope_units, sensor_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -167,7 +168,6 @@ class Variants:
     def _named(self, dataset: xr.Dataset) -> Counts:
         """The variants that the answer names, of which no history is kept yet although those of others are."""
         from engine.batch.plan import NAMED
-        from studies.results.results import Results
 
         if self.plan.study.output.histories != "auto":
             return np.empty(0, np.int64)
@@ -183,8 +183,6 @@ class Variants:
 
     def _summarised(self, found: Collector) -> xr.Dataset:
         from engine.batch.dataset import build
-        from results_schema.variables import expand
-        from studies.results.results import envelope_units, sensor_units
 
         study = self.plan.study
         dataset = self.kind.summarise(build(self.plan, found.arrays, found.selected), study)

@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
 from results_schema.pieces import Pieces, lacks, no_row_of
+from results_schema.validate import validate
+from results_schema.variables import expand
+from studies.protocol.parts import Memory, Variants, Work
+from studies.results.results import envelope_units, sensor_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,8 +73,6 @@ class Kind:
 
     def parts(self, study: Study) -> Parts:
         """The work. Raises BadInput where it cannot be done."""
-        from studies.protocol.parts import Variants
-
         return Variants(self, study)
 
     def reduction(self, study: Study) -> Reduction | None:
@@ -157,9 +159,6 @@ def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
 
 def _check_names(study: Study) -> None:
     """Refuse names of sensors, carriages and axes that the kind's own results have."""
-    from results_schema.variables import expand
-    from studies.results.results import sensor_units
-
     try:
         declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
     except BadInput as error:
@@ -239,8 +238,6 @@ def run(study: Study, **options: Any) -> xr.Dataset:
 
     options: threads, progress and chunk, as of `engine.run`.
     """
-    from studies.protocol.parts import Memory, Work
-
     started = time.perf_counter()
     parts, store = kind_of(study).parts(study), Memory()
     parts.compute(store, Work(**options))
@@ -253,9 +250,6 @@ def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
     Raises ArchiveError where the two differ.
     """
-    from results_schema.validate import validate
-    from studies.results.results import envelope_units, sensor_units
-
     if "sensor" in dataset.dims:
         units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
         dataset = dataset.assign_coords(sensor_unit=units)

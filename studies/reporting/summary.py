@@ -13,6 +13,9 @@ from results_schema.variables import expand
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.formatting import quantity
+from studies.results.results import Results, sensor_units
+from studies.runs.audit import Verdict
+from studies.runs.audit import as_json as audit_as_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,9 +93,6 @@ def exit_code(outcome: Outcome) -> int:
     Statuses that the study expects belong to its answer. A study that measures asks where methods fail: a method that
     diverges is its answer, and nothing that a script has to look after. So it ends with 0.
     """
-    from studies.results.results import Results
-    from studies.runs.audit import Verdict
-
     if outcome.audit is not None and not Verdict.of(outcome.audit).held:
         return SOME_NOT_OK
     expected = {label(Status.OK), *Results.of(outcome.results).study.expected}
@@ -123,17 +123,12 @@ def ranges(study_results: Results) -> Iterator[Range]:
 
 def _beside_the_grid(study: Study) -> set[str]:
     """Results whose dimensions do not begin with the sweep's."""
-    from studies.results.results import sensor_units
-
     declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
     return {name for name, variable in declared.items() if variable.lead != "grid"}
 
 
 def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
     """What `run --json` prints."""
-    from studies.results.results import Results
-    from studies.runs.audit import as_json as audit_as_json
-
     results, told = outcome.results, Results.of(outcome.results)
     return {
         "archive": str(outcome.archive),

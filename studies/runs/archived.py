@@ -11,7 +11,9 @@ import numpy as np
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
+from results_schema.variables import declarations
 from studies.findings.numerics_used import is_marched
+from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
 from studies.results.results import Results, envelope_units, sensor_units
 
@@ -52,9 +54,6 @@ def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> 
     """The groups of bodies; that of a body out of files, under the first carriage, with its lowest elastic frequency
     over the axes that change it, which nobody could tell later without the files."""
     import xarray as xr
-
-    from results_schema.variables import declarations
-    from studies.findings.theory import first_omega
 
     name = results.carriage.on
     path, body = f"{MODELS}{name}", results.study.body[name]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.statuses import lost
@@ -55,7 +56,6 @@ def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
     """The audit, shared out among threads."""
     from engine.batch.audit import audit
     from engine.batch.execution import run_jobs
-    from engine.march.stepper import Halted
 
     try:
         return audit(plan, variants, work.halted, partial(run_jobs, threads=work.threads))

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from engine.kernels.compiling import told_of_compiling
+from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import files
@@ -123,7 +124,6 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
 def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.Dataset]:
     """The bodies of the scene without its sweep."""
     from engine.batch.dataset import model_groups
-    from engine.model.distinct_models import base_scene
 
     return model_groups(base_scene(parts.study))
 

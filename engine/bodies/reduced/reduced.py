@@ -14,6 +14,7 @@ from engine.bodies.frame.refusals import refuse
 from engine.bodies.modal.description import Body, Spot, check_spot_name
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput, WanderlastError, shortened
+from results_schema.store.bodies import read_body, read_numbers
 
 
 class Reduced(Body):
@@ -29,8 +30,6 @@ class Reduced(Body):
     def numbers(self) -> dict[str, float]:
         """The numbers in the file. Raises BadInput and ArchiveError."""
         assert self.recorded is None, "what an archive holds is told without the files of its models"
-        from results_schema.store.bodies import read_numbers
-
         return read_numbers(self.file)
 
     @property
@@ -51,8 +50,6 @@ class Reduced(Body):
     def untold(self) -> tuple[str, ...]:
         if self.recorded is not None:
             return ()  # the archive's sensors were looked at before they were read
-        from results_schema.store.bodies import read_body
-
         fibres = read_body(self.file).arrays["fibre_distance"][:, 1]
         return () if np.isfinite(fibres).all() else ("stress", "strain")
 
@@ -69,8 +66,6 @@ class Reduced(Body):
         return self
 
     def check_spot(self, spot: Spot) -> None:
-        from results_schema.store.bodies import read_body
-
         if spot.point is None:
             what, remedy = f"a reduced body has no {spot.key}s", "save it with a point there, and read point = its name"
             raise BadInput(what, where=spot.key, expected="one of its points", remedy=remedy)
@@ -80,8 +75,6 @@ class Reduced(Body):
 
     def with_more_modes(self, times: int) -> Reduced:
         """The same body with more of the modes in its file."""
-        from results_schema.store.bodies import read_body
-
         if self.modes == "auto":
             return self
         return self.model_copy(
