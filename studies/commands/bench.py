@@ -127,10 +127,6 @@ class Throughput:
     scheme: str
     ties: int
 
-    def as_json(self) -> dict[str, Any]:
-        """For `bench --json`."""
-        return asdict(self)
-
 
 def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) -> Throughput:
     """March the scene several times and take the best; threads: None takes all cores."""
@@ -144,11 +140,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
         case_mode_steps_per_second=rate * scene.modes * scene.steps,
         variants_per_second=rate,
         seconds=seconds,
-        modes=scene.modes,
-        steps=scene.steps,
-        variants=scene.variants,
         threads=threads,
         best_of=best_of,
-        scheme=scene.scheme,
-        ties=scene.ties,
+        **asdict(scene),
     )

@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -155,6 +156,7 @@ def info(archive: Path, every: bool, text: bool) -> None:
     _refuse_what_is_no_archive(archive)
     from results_schema.store.archive import describe, open_archive
     from studies.commands import console
+    from studies.findings.numerics_used import told_choices
     from studies.runs.archived import results_of
 
     found = describe(archive)
@@ -165,7 +167,7 @@ def info(archive: Path, every: bool, text: bool) -> None:
     else:
         console.show_archive(found)
         if found.whole:
-            console.show_choices(results_of(open_archive(archive)))
+            console.paragraphs(*told_choices(results_of(open_archive(archive))))
     if not found.whole:
         raise ArchiveError(found.damage)
 
@@ -243,7 +245,7 @@ def bench(threads: int | None, as_json: bool, **scene: Any) -> None:
 
     found = measure(Scene(**scene), threads)
     if as_json:
-        console.say_json(found.as_json())
+        console.say_json(asdict(found))
     else:
         console.show_throughput(found)
 

@@ -189,11 +189,6 @@ def show_archive(summary: Summary) -> None:
     )
 
 
-def show_choices(results: Results) -> None:
-    """What variants were computed with."""
-    paragraphs(*told_choices(results))
-
-
 def show_everything(summary: Summary) -> None:
     """Every attribute, dimension and variable of an archive."""
     from studies.commands.preview import size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from engine.march.outcome import Flat, used
 from results_schema.arrays import Array
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.findings.numerics_used import NAMES
-from studies.results.formatting import number, percent, scientific
+from studies.results.formatting import number, percent, scientific, spanned
 from studies.results.results import spread
 
 HEADINGS = (
@@ -92,8 +92,8 @@ def _row(model: Fidelity, modes: int, scheme: int, parts: Sequence[Part], total:
         NAMES[model],
         str(modes) if marched else "none",
         label(SchemeUsed(scheme)) if marched else "",
-        _span([part.used["steps_used"][0] for part in parts]) if marched else "none",
-        _span([part.used["work"][0] for part in parts]) if marched else "none",
+        spanned([part.used["steps_used"][0] for part in parts], "{:,.0f}".format) if marched else "none",
+        spanned([part.used["work"][0] for part in parts], "{:,.0f}".format) if marched else "none",
         _error(np.concatenate([part.error for part in parts])),
         of_tolerance,
     )
@@ -110,8 +110,3 @@ def _error(errors: Array) -> str:
         return "unknown"
     unknown = errors.size - known.size
     return scientific(float(known.max())) + (f", {unknown:,} unknown" if unknown else "")
-
-
-def _span(values: Sequence[Any]) -> str:
-    low, high = int(min(values)), int(max(values))
-    return f"{low:,}" if low == high else f"{low:,} to {high:,}"

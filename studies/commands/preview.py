@@ -8,7 +8,6 @@ from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
@@ -24,7 +23,7 @@ from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
 from studies.results.findings_common import told_trains
-from studies.results.formatting import counted, number, unit_text
+from studies.results.formatting import counted, number, spanned, unit_text
 from studies.results.results import typed_unit
 
 FREQUENCIES_SHOWN = 6
@@ -157,7 +156,7 @@ def _bodies(base: SceneModel) -> Table:
         ratios = rates[elastic] / (2.0 * omega[elastic])
         shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
         more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
-        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, span(ratios)))
+        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, spanned(ratios)))
     return Table("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 
@@ -184,8 +183,8 @@ def _range(study: Study, axis: Axis) -> str:
     """Smallest and largest value of a swept number, in the unit of the study file."""
     typed = typed_unit(study, axis.name)
     if typed is None:
-        return f"{span(axis.values)} {unit_text(axis.units)}".strip()
-    return f"{span(axis.values * typed.factor)} {typed.unit}"
+        return f"{spanned(axis.values)} {unit_text(axis.units)}".strip()
+    return f"{spanned(axis.values * typed.factor)} {typed.unit}"
 
 
 def _ratios(plan: Plan) -> Table:
@@ -195,7 +194,7 @@ def _ratios(plan: Plan) -> Table:
     for grid in plan.grids:
         for ratio, values in _ratios_of(grid, name):
             found.setdefault(ratio, []).append(values)
-    rows = [(ratio, span(np.concatenate(values))) for ratio, values in found.items()]
+    rows = [(ratio, spanned(np.concatenate(values))) for ratio, values in found.items()]
     return Table(f"Ratios of {name}", ("ratio", "range"), rows)
 
 
@@ -208,15 +207,3 @@ def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:
         yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
     if scene.study.carriage[name].inertial:
         yield "mass over the body's mass", moving_mass(scene, values, 0) / scene.leading_body.modal.mass
-
-
-def span(values: NDArray[Any]) -> str:
-    """Smallest and largest of some numbers.
-
-    >>> span(np.array([0.5, 2.0, 1.0])), span(np.array([3.0]))
-    ('0.5 to 2', '3')
-    """
-    if values.size == 0:
-        return "none"
-    low, high = number(float(values.min())), number(float(values.max()))
-    return low if low == high else f"{low} to {high}"

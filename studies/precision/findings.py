@@ -18,7 +18,7 @@ from studies.precision.pareto import (
     is_out_of_reach,
     step_choices,
 )
-from studies.results.formatting import counted, listed, number
+from studies.results.formatting import counted, listed, number, spanned
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +100,7 @@ def automatic(dataset: xr.Dataset) -> list[str]:
 def _automatic(found: Sequence[Automatic], tolerance: float) -> str:
     """The program's own choices at a tolerance."""
     costs = [(ratio, point.scene) for point in found if (ratio := point.over_front) is not None]
-    errors = _span([point.error / tolerance for point in found], _times)
+    errors = spanned([point.error / tolerance for point in found], _times)
     beyond = [point.scene for point in found if point.error > tolerance]
     erring = f"Its histories err {errors} times what was asked{f', too much in {listed(beyond)}' if beyond else ''}."
     who = f"The automatic choice at {_plain(tolerance)}"
@@ -153,7 +153,7 @@ def _nearest(points: Sequence[Choice], known: float, words: Callable[[Choice], s
 
 def _good_to(known: Sequence[float]) -> str:
     """How good references are."""
-    span = _span(known, lambda value: number(value, 2))
+    span = spanned(known, lambda value: number(value, 2))
     return f"the reference itself is good to {span} only"
 
 
@@ -188,8 +188,8 @@ def lead(dataset: xr.Dataset, tolerance: float) -> str:
         return f"No choice surely brings whole histories within {_plain(tolerance)} of the static value: {_also(rest)}."
     counts = Counter(scheme_words(choice.scheme) for choice in taken)
     names = listed([f"{name} in {counted(count, 'scene')}" for name, count in counts.most_common()])
-    span = _span([choice.seconds for choice in taken], short_time)
-    steps, modes = (_span([getattr(choice, key) for choice in taken], number) for key in ("steps", "modes"))
+    span = spanned([choice.seconds for choice in taken], short_time)
+    steps, modes = (spanned([getattr(choice, key) for choice in taken], number) for key in ("steps", "modes"))
     return (
         f"Whole histories within {_plain(tolerance)} of the static value cost {span} per variant: {steps} steps and "
         f"{modes} {'mode' if modes == '1' else 'modes'}, cheapest by {names}.{f' But {_also(rest)}.' if rest else ''}"
@@ -221,11 +221,6 @@ def _also(parts: Sequence[str]) -> str:
     return " and ".join(parts)
 
 
-def _span(values: Sequence[float], words: Callable[[float], str]) -> str:
-    ends = dict.fromkeys((words(min(values)), words(max(values))))
-    return " to ".join(ends)
-
-
 def _orders(dataset: xr.Dataset) -> str:
     """Which schemes have which measured order, and which have none."""
     orders = dataset["fitted_order"].sel(quantity="history")
@@ -235,8 +230,7 @@ def _orders(dataset: xr.Dataset) -> str:
         known = orders.sel(scheme=scheme).values
         known = known[np.isfinite(known)]
         if known.size:
-            ends = dict.fromkeys(number(float(end)) for end in (known.min(), known.max()))
-            shown = f"{scheme_words(str(scheme))} ({' to '.join(ends)})"
+            shown = f"{scheme_words(str(scheme))} ({spanned(known.tolist())})"
             groups.setdefault(round(float(np.median(known))), []).append(shown)
         elif dataset["error"].sel(scheme=scheme, quantity="history").notnull().any():
             none.append(scheme_words(str(scheme)))
@@ -299,7 +293,7 @@ def _solvers(dataset: xr.Dataset) -> list[str]:
         return []
     threads = str(dataset.attrs.get("threads", ""))
     over = f"{threads} thread{'' if threads == '1' else 's'}" if threads else "all threads"
-    span = _span(known, lambda ratio: number(ratio, 2))
+    span = spanned(known, lambda ratio: number(ratio, 2))
     return [
         f"SciPy's DOP853 and Radau, one variant after another on one thread, need {span} times as long per variant as "
         f"the march of a batch on {over} that is at least as exact on the same equations (errors up to "

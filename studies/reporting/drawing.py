@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -56,18 +57,6 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
-class Page(NamedTuple):
-    """Everything that the template shows; plain text but for drawings."""
-
-    title: str
-    facts: Sequence[Row]
-    remarks: Sequence[str]
-    figures: Sequence[Drawn]
-    shapes: Sequence[Shapes]
-    tables: Sequence[Table]
-    study_text: str
-
-
 def write_drawing(study: Study, folder: Path) -> Path:
     """Write the page into a folder; its path. Raises BadInput before anything is written, as `check` does."""
     check_folder(folder, PAGE)
@@ -79,8 +68,8 @@ def write_drawing(study: Study, folder: Path) -> Path:
     return folder / PAGE
 
 
-def page_of(study: Study, remarks: Sequence[str]) -> Page:
-    """The page of a study; remarks: what is worth knowing about it."""
+def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
+    """Everything that the template shows of a study, plain text but for drawings; remarks: what is worth knowing."""
     model = base_scene(study)
     scene = layout(model, in_a_row(model))
     variants = expand(study).size
@@ -94,7 +83,7 @@ def page_of(study: Study, remarks: Sequence[str]) -> Page:
         for name in study.body
         if name not in scene.bodies
     ]
-    return Page(
+    return SimpleNamespace(
         title=study.title or study.kind,
         facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}"), *trains],
         remarks=[f"{text[0].upper()}{text[1:]}." for text in (*remarks, *unused)],

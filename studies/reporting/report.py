@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -74,34 +75,6 @@ class Finding:
     text: str
 
 
-@dataclass(frozen=True)
-class Page:
-    """Everything that the template shows; plain text but for the drawings.
-
-    figures, more_figures: of the question, open and folded. accuracy: in one sentence; exactness, method_figures: how
-    exact the answer is and how it was computed, folded.
-    """
-
-    title: str
-    question: str
-    noun: str
-    facts: Sequence[Row]
-    findings: Sequence[Finding]
-    accuracy: str
-    exactness: Sequence[str]
-    figures: Sequence[Drawn]
-    more_figures: Sequence[Drawn]
-    method_figures: Sequence[Drawn]
-    statuses: Sequence[Row]
-    scene: Mapping[str, Sequence[Row]]
-    sweep: Sequence[Row]
-    results: Sequence[tuple[str, ...]]
-    percentiles: Sequence[str]
-    declarations: Sequence[tuple[str, ...]]
-    provenance: Sequence[Row]
-    study_text: str
-
-
 def write_report(archive: Path | str, folder: Path | str) -> Path:
     """Write the page of an archive and its figures (SVG and PNG) into a folder; the page's path.
 
@@ -145,11 +118,16 @@ def _write(source: Archive, folder: Path) -> Path:
     return folder / PAGE
 
 
-def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_question: int) -> Page:
-    """The page of an archive, with so many figures of the question before those on methods."""
+def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_question: int) -> SimpleNamespace:
+    """Everything that the template shows of an archive, plain text but for the drawings; of these so many of the
+    question come before those on methods.
+
+    figures, more_figures: of the question, open and folded. accuracy: in one sentence; exactness, method_figures: how
+    exact the answer is and how it was computed, folded.
+    """
     kind = kind_named(results.study.kind)
     open_figures = min(of_question, MOST_OPEN)
-    return Page(
+    return SimpleNamespace(
         title=results.study.title or str(source.root.attrs.get("title", "")) or kind.name,
         question=kind.question,
         noun=noun(source.root),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -117,6 +117,16 @@ def scientific(value: float) -> str:
     """
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{mantissa.removesuffix('.0')}e{int(exponent)}" if value else "0"
+
+
+def spanned(values: Iterable[float], words: Callable[[float], str] = number) -> str:
+    """The smallest and the largest of some values in words, or the one that they are.
+
+    >>> spanned([0.5, 2.0, 1.0]), spanned([3.0]), spanned([])
+    ('0.5 to 2', '3', 'none')
+    """
+    known = list(values)
+    return " to ".join(dict.fromkeys((words(min(known)), words(max(known))))) if known else "none"
 
 
 def counted(count: int, noun: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.status import LOST, Status, label
 from results_schema.variables import sensor_unit
-from studies.results.formatting import Scale, axis_title, number, quantity
+from studies.results.formatting import Scale, axis_title, number, quantity, spanned
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,8 +80,7 @@ class Axis:
     @property
     def span(self) -> str:
         """Its smallest and largest value, or its one value, with units."""
-        low, high = (self.in_words(float(end)) for end in (self.values.min(), self.values.max()))
-        return low if low == high else f"{low} to {high}"
+        return spanned(self.values.tolist(), self.in_words)
 
     def value(self, index: int) -> str:
         """One value with its unit."""

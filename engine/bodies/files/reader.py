@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -39,11 +39,11 @@ def read_files(request: Request) -> FileModel:
     Raises BadInput with file, line and card where they are known.
     """
     named = tuple(_state(path) for _, path in request.files)
-    found = _remembered(request, named)
-    if found.states == _states(found.model):
-        return found.model
-    _remembered.cache_clear()  # an included file has changed
-    return _remembered(request, named).model
+    model, states = _remembered(request, named)
+    if states != _states(model):
+        _remembered.cache_clear()  # an included file has changed
+        model, _ = _remembered(request, named)
+    return model
 
 
 def role_of(fault: BadInput, files: Mapping[str, str]) -> str:
@@ -52,18 +52,11 @@ def role_of(fault: BadInput, files: Mapping[str, str]) -> str:
     return max(named, key=lambda role: len(files[role])) if named else next(iter(files))
 
 
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """A model and the states of all its files."""
-
-    model: FileModel
-    states: tuple[State | None, ...]
-
-
 @lru_cache(maxsize=8)
-def _remembered(request: Request, named: tuple[State, ...]) -> _Read:
+def _remembered(request: Request, named: tuple[State, ...]) -> tuple[FileModel, tuple[State | None, ...]]:
+    """A model and the states of all its files."""
     model = _read(request)
-    return _Read(model, _states(model))
+    return model, _states(model)
 
 
 def _states(model: FileModel) -> tuple[State | None, ...]:
@@ -82,15 +75,8 @@ def _state(path: str) -> State:
 def _read(request: Request) -> FileModel:
     with tempfile.TemporaryDirectory(prefix="wanderlast-") as folder:
         answer, refusal = Path(folder) / "model.npz", Path(folder) / "refusal.json"
-        order = {
-            "kind": request.kind,
-            "files": dict(request.files),
-            "options": dict(request.options),
-            "seconds": request.seconds,
-            "memory": request.memory,
-            "answer": str(answer),
-            "refusal": str(refusal),
-        }
+        named = {"files": dict(request.files), "options": dict(request.options)}
+        order = asdict(request) | named | {"answer": str(answer), "refusal": str(refusal)}
         try:
             done = subprocess.run(
                 [sys.executable, "-P", "-m", "engine.bodies.files.child_process"],
