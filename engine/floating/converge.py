@@ -112,14 +112,15 @@ def converge(
     study: Study,
     values: VariantValues,
     duration: Array,
+    longest: float,
     halted: Callable[[], bool] = lambda: False,
 ) -> Converged:
-    """March variants of one scene level by level; duration (V,) s. Where the study fixes the steps, these are marched,
-    and twice as many to tell the error. Raises Halted."""
+    """March variants of one scene level by level; duration (V,) s, and the longest of all variants of the scene. Where
+    the study fixes the steps, these are marched, and twice as many to tell the error. Raises Halted."""
     V = values.size
     found: Outcome | None = None
     active = np.arange(V)
-    for level in levels(study, float(duration.max())):
+    for level in levels(study, longest):
         if halted():
             raise Halted
         model, own = level.model, values.part(active)

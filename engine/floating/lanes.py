@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import Lane
+from engine.kernels.layout import LANES
 from engine.scene.frames import AxisJoint, Free, Spherical
 from engine.scene.time_motions import START
 from engine.scene.variants import VariantValues
@@ -43,8 +45,8 @@ class Numbers:
         return np.full(self.values.size, 0.0 if value is None else float(value))
 
 
-def lanes(model: FloatingModel, values: VariantValues) -> Lane:
-    """The table of some variants."""
+def lanes(model: FloatingModel, values: VariantValues, step: Array) -> Lane:
+    """The table of some variants, each with its step (V,) in s."""
     numbers, V = Numbers(model, values), values.size
     gravity = np.zeros((V, 3))
     gravity[:, 2] = numbers.of("gravity")
@@ -56,7 +58,19 @@ def lanes(model: FloatingModel, values: VariantValues) -> Lane:
     for c, name in enumerate(model.study.carriage):
         _carriage(model, numbers, name, start, carriages[:, c])
     motions = _motions(model, numbers)
-    return Lane(gravity, _damping(model, values), joints, carriages, motions, _events(motions), start)
+    return Lane(gravity, _damping(model, values), joints, carriages, motions, _events(motions), start, step[:, None])
+
+
+def in_blocks(table: Array) -> Array:
+    """(V, ...) as (blocks, ..., LANES), the last variant in the lanes that are left over."""
+    blocks = -(-len(table) // LANES)
+    filled = np.concatenate([table, np.repeat(table[-1:], blocks * LANES - len(table), axis=0)])
+    return np.ascontiguousarray(np.moveaxis(filled.reshape(blocks, LANES, *table.shape[1:]), 1, -1))
+
+
+def out_of_blocks(table: NDArray[Any], variants: int) -> NDArray[Any]:
+    """(blocks, ..., LANES) as (V, ...)."""
+    return np.ascontiguousarray(np.moveaxis(table, -1, 1).reshape(-1, *table.shape[1:-1])[:variants])
 
 
 def _start_joint(joint: OneJoint, numbers: Numbers, start: Array, springs: Array) -> None:

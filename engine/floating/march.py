@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.floating.lanes import lanes
+from engine.floating.lanes import in_blocks, lanes, out_of_blocks
 from engine.kernels.floating import layout
-from engine.kernels.floating.layout import Record, Weights
+from engine.kernels.floating.layout import Lane, Record, Weights
 from engine.kernels.floating.march import march as march_lanes
 from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
+from engine.kernels.layout import LANES
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.statuses import gravest
@@ -41,18 +42,19 @@ def march(
     model: FloatingModel, values: VariantValues, duration: Array, steps: int, stations: Counts, scheme: Weights
 ) -> Marched:
     """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending)."""
-    V, signals = values.size, model.signals
-    statistics = np.zeros((V, signals, layout.STATISTICS))
+    V, h = values.size, duration / steps
+    table = lanes(model, values, h)
+    in_lanes = Lane(*map(in_blocks, table))
+    shape = (len(in_lanes.step), model.signals)
+    statistics = np.zeros((*shape, layout.STATISTICS, LANES))
     statistics[:, :, layout.LARGEST], statistics[:, :, layout.SMALLEST] = -np.inf, np.inf
-    history = np.full((V, stations.size, signals), np.nan)
-    codes, last = np.zeros(V, dtype=np.int64), np.zeros(V, dtype=np.int64)
-    h = duration / steps
-    first = model.signal_of("carriages") + CONTACT_FORCE
-    table = lanes(model, values)
-    record = Record(np.asarray(stations), statistics, history, codes, last)
-    march_lanes(model.system, table, scheme, steps, h, record)
+    history = np.full((shape[0], stations.size, shape[1], LANES), np.nan)
+    codes, last = np.zeros((2, shape[0], LANES), dtype=np.int64)
+    march_lanes(model.system, in_lanes, scheme, steps, Record(np.asarray(stations), statistics, history, codes, last))
+    statistics, history, codes, last = (out_of_blocks(part, V) for part in (statistics, history, codes, last))
     # without gravity nothing lies on a track: it holds what moves on it
     heavy = table.gravity[:, 2] > 0.0
+    first = model.signal_of("carriages") + CONTACT_FORCE
     lifts = heavy & (
         statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST].min(axis=1, initial=0.0) < 0.0
     )

@@ -301,6 +301,7 @@ def _system(model: FloatingModel) -> System:
         np.array([[j.kind, j.coordinate, j.motion] for j in model.joints], dtype=np.int64).reshape(-1, 3),
         np.array([j.axis for j in model.joints], dtype=np.float64).reshape(-1, 3),
         track,
+        np.any(track != 0.0, axis=(1, 2)),
         shorter.reshape(B, CELLS, 6, n * n),
         _riders(model, names),
         np.arange(B, dtype=np.int64),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.floating.elastic import ElasticBody
-from engine.kernels.floating.observe import OF_BODY
+from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
 from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 #: rate of a fifth of it.
 MISSING = 0.05
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
-SPIN = 10  # of a frame's signals
 
 
 def lacking(body: ElasticBody) -> float:
@@ -34,7 +33,7 @@ def lacking(body: ElasticBody) -> float:
 def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:
     """(V, B) s, the first station at which a body turns so fast that it lacks `MISSING` of its stiffness; NaN where
     none does."""
-    first = model.signal_of("frames") + SPIN
+    first = model.signal_of("frames") + BODY_SPIN
     found = []
     for b, body in enumerate(model.bodies.values()):
         spin = marched.history[:, :, first + OF_BODY * b : first + OF_BODY * b + 3]

@@ -46,6 +46,11 @@ def two_to(row):
     return np.ldexp(1.0, np.maximum(row, _LEAST).astype(np.int64))
 
 
+def root(row):
+    """The square root of every lane."""
+    return np.sqrt(row)
+
+
 def everywhere(truths):
     """Whether all lanes are true."""
     return bool(np.all(truths))
@@ -164,6 +169,17 @@ def _lower_two_to(context, builder, called, values):
     whole = ir.VectorType(ir.IntType(64), LANES)
     bits = builder.bitcast(builder.fadd(power, shift), whole)
     return builder.bitcast(builder.shl(bits, ir.Constant(whole, [_MANTISSA] * LANES)), _ROW)
+
+
+@type_callable(root)
+def _type_root(context):
+    return lambda row: ROW if row == ROW else None
+
+
+@lower_builtin(root, Row)
+def _lower_root(context, builder, called, values):
+    kind = ir.FunctionType(_ROW, [_ROW])
+    return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f64", (), kind), values)
 
 
 @type_callable(everywhere)

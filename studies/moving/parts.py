@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from engine.scene.sweep import Cases
 
 PIECE_SECONDS = 8.0  # of one piece, about
-STEP_SECONDS, MODE_SECONDS = 4e-6, 8e-7  # of a step, and for each coordinate besides, about; for sizes of pieces only
+STEP_SECONDS, COORDINATE_SECONDS = 5e-7, 3e-7  # of a step, and for each coordinate besides; for sizes of pieces only
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
-AT_ONCE = 32  # variants of one job
+NEWTON_STEPS = 4  # from a straight line, for roots to rounding
+BLOCKS = 4  # of lanes in one job at most: those that need more steps fill the lanes anew
 COMPONENTS, QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
@@ -67,12 +68,12 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     for scene in scenes(study, cases):
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
         coarsest = next(iter(levels(scene.study, longest)))
-        each = coarsest.steps * LEVELS_TAKEN * (STEP_SECONDS + MODE_SECONDS * coarsest.model.size**2)
+        each = coarsest.steps * LEVELS_TAKEN * (STEP_SECONDS + COORDINATE_SECONDS * coarsest.model.size)
         size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
         for first in range(0, scene.variants.size, size):
             own = scene.variants[first : first + size]
             words = f"{own.size:,} variants over {longest:.4g} s"
-            compute = partial(_march, scene.study, cases, own, duration)
+            compute = partial(_march, scene.study, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found
 
@@ -85,27 +86,34 @@ def results_names(model: FloatingModel) -> list[str]:
 
 
 def _march(
-    study: Study, cases: Cases, variants: Counts, duration: Callable[[Mapping[str, Array], int], Array], work: Work
+    study: Study,
+    cases: Cases,
+    variants: Counts,
+    duration: Callable[[Mapping[str, Array], int], Array],
+    longest: float,
+    work: Work,
 ) -> xr.Dataset:
-    """The results of some variants of one scene, on threads."""
+    """The results of some variants of one scene, whose longest takes so many seconds, on threads."""
     from engine.batch.execution import run_jobs
     from engine.batch.plan import shown
     from engine.floating.converge import converge
     from engine.floating.model import build
+    from engine.kernels.layout import LANES
     from engine.scene.variants import VariantValues
 
     model = build(study, 2)
     kept = shown(study, cases.size)
     found: dict[int, dict[str, NDArray[Any]]] = {}
+    at_once = LANES * int(np.clip(np.ceil(variants.size / (LANES * work.threads)), 1, BLOCKS))
 
     def job(first: int) -> None:
-        own = variants[first : first + AT_ONCE]
+        own = variants[first : first + at_once]
         columns = cases.columns_of(own)
         values = VariantValues(study, columns, own.size)
-        converged = converge(study, values, duration(columns, own.size), work.halted)
+        converged = converge(study, values, duration(columns, own.size), longest, work.halted)
         found[first] = _arrays(model, converged, np.flatnonzero(np.isin(own, kept)), own)
 
-    run_jobs([partial(job, first) for first in range(0, variants.size, AT_ONCE)], work.threads)
+    run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
     parts = [found[first] for first in sorted(found)]
     return _plain({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
@@ -113,6 +121,7 @@ def _march(
 def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Counts) -> dict[str, NDArray[Any]]:
     """Results of V variants by name, and the histories of some of them ("history:" before their names)."""
     from engine.floating.results import ends, frame_signals, signals
+    from engine.kernels.floating.observe import BODY_ATTITUDE, BODY_SPIN, BODY_VELOCITY, OF_BODY
     from engine.march.outcome import number_of
 
     outcome = converged.outcome
@@ -128,19 +137,18 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
     history, times = outcome.history[kept], outcome.times[kept]
     for name in model.places:
         number = next(signal.number for signal in signals(model) if signal.name == f"{name}_position")
-        found[f"{name}_period"] = np.array(
-            [period(*pair) for pair in zip(outcome.times, outcome.history[:, :, number], strict=True)]
-        )
+        place, speed = outcome.history[:, :, number], outcome.history[:, :, number + 1]
+        found[f"{name}_period"] = periods(outcome.times, place, speed)
     stations, bodies, whole = history.shape[1], len(model.bodies), model.signal_of("whole")
-    frames = history[:, :, frame_signals(model)].reshape(kept.size, stations, bodies, -1)
+    frames = history[:, :, frame_signals(model)].reshape(kept.size, stations, bodies, OF_BODY)
     traces = {
         "elapsed": times,
         **{signal.name: history[:, :, signal.number] for signal in signals(model)},
         "end_place": history[:, :, ends(model)].reshape(kept.size, stations, bodies, 3),
         "frame_place": frames[..., 0:3],
-        "frame_attitude": frames[..., 3:7],
-        "frame_velocity": frames[..., 7:10],
-        "frame_rate": frames[..., 10:13],
+        "frame_velocity": frames[..., BODY_VELOCITY : BODY_VELOCITY + 3],
+        "frame_rate": frames[..., BODY_SPIN : BODY_SPIN + 3],
+        "frame_attitude": quaternions(frames[..., BODY_ATTITUDE : BODY_ATTITUDE + 9]),
         "kinetic_energy": history[:, :, whole],
         "potential_energy": history[:, :, whole + 1],
         "momentum": history[:, :, whole + 2 : whole + 5],
@@ -149,16 +157,38 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
     return found | {"kept": own[kept]} | {f"history:{name}": array for name, array in traces.items()}
 
 
-def period(times: Array, places: Array) -> float:
-    """Mean time of two passes of the middle of a way, s; NaN where there are less than three."""
-    from scipy.interpolate import CubicSpline
+def quaternions(rows: Array) -> Array:
+    """Attitudes (..., 9) as quaternions (..., 4), scalar first and not negative; NaN stays."""
+    from scipy.spatial.transform import Rotation
 
-    known = np.isfinite(places)
-    if known.sum() < 4 or np.ptp(places[known]) == 0.0:
-        return np.nan
-    middle = 0.5 * (places[known].max() + places[known].min())
-    passes = CubicSpline(times[known], places[known] - middle).roots(extrapolate=False)
-    return float(2.0 * (passes[-1] - passes[0]) / (passes.size - 1)) if passes.size > 2 else np.nan
+    found = np.full((*rows.shape[:-1], 4), np.nan)
+    known = np.isfinite(rows).all(axis=-1)
+    if known.any():
+        found[known] = Rotation.from_matrix(rows[known].reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return found
+
+
+def periods(times: Array, places: Array, speeds: Array) -> Array:
+    """(V,) mean times of two passes of the middle of a way, s, of histories (V, stations), cubic between two stations;
+    NaN where there are less than three passes."""
+    gap = places - 0.5 * (np.nanmax(places, axis=1) + np.nanmin(places, axis=1))[:, None]
+    side = np.sign(gap)
+    own, k = np.nonzero(side[:, :-1] * side[:, 1:] <= 0.0)
+    own, k = own[gap[own, k] != 0.0], k[gap[own, k] != 0.0]
+    h = times[own, k + 1] - times[own, k]
+    ends = gap[own, k], gap[own, k + 1], h * speeds[own, k], h * speeds[own, k + 1]
+    one, other, start, end = ends
+    x = one / (one - other)
+    for _ in range(NEWTON_STEPS):  # of the cubic with these values and slopes
+        bend, curve = 3.0 * (other - one) - 2.0 * start - end, 2.0 * (one - other) + start + end
+        x -= (one + x * (start + x * (bend + x * curve))) / (start + x * (2.0 * bend + x * 3.0 * curve))
+    passes, everyone = times[own, k] + x * h, np.arange(len(times))
+    first, behind = np.searchsorted(own, everyone), np.searchsorted(own, everyone, "right")
+    found = np.full(len(times), np.nan)
+    known = behind - first > 2
+    whole = passes[behind[known] - 1] - passes[first[known]]
+    found[known] = 2.0 * whole / (behind - first - 1)[known]
+    return found
 
 
 def _plain(arrays: dict[str, NDArray[Any]]) -> xr.Dataset:

@@ -17,10 +17,12 @@ from types import ModuleType
 
 import numpy as np
 
-from engine.floating.lanes import lanes
+from engine.floating.lanes import in_blocks, lanes
 from engine.floating.model import FloatingModel, build
 from engine.kernels.floating import equations
 from engine.kernels.floating.layout import Coordinates, Lane
+from engine.kernels.floating.motions import motions_at
+from engine.kernels.layout import LANES
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 
@@ -176,19 +178,17 @@ def left_of_particles(
 
 
 def left_of(module: ModuleType, model: FloatingModel, y: np.ndarray, u: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """What is left of the equations, by the kernels of a module."""
-    lane = Lane(*(part[0] for part in lanes(model, VariantValues(model.study, {}, 1))))
-    work, out = module.room(model.system, lane), np.zeros(y.size)
-    module_motions(lane, work)
-    module.residual(model.system, lane, Coordinates(y, u, a), work, out)
-    return out
-
-
-def module_motions(lane: Lane, work: equations.Work) -> None:
-    """What is given at time 0."""
-    from engine.kernels.floating.motions import motions_at
-
-    motions_at(lane.motions, 0.0, 0.0, work.motions)
+    """What is left of the equations, by the kernels of a module, in the second lane; others stand elsewhere."""
+    table = lanes(model, VariantValues(model.study, {}, 1), np.ones(1))
+    lane = Lane(*(in_blocks(part)[0] for part in table))
+    work, out = module.room(model.system, lane), np.zeros((y.size, LANES))
+    now = np.zeros(LANES)
+    motions_at(lane.motions, now, now, work.piece, work.motions)
+    scaled = np.arange(LANES, dtype=np.float64)
+    x = Coordinates(*(np.multiply.outer(part, scaled) for part in (y, u, a)))
+    x.y[11] = y[11]  # on the track
+    module.residual(model.system, lane, x, work, out)
+    return out[:, 1]
 
 
 #: Terms of the equations, by their text in the kernel, and what stands there without them.
@@ -202,50 +202,47 @@ TERMS = {
     "S x a": ("add(cross(S, acc), Jal)", "Jal"),
     "J al": ("add(cross(S, acc), Jal)", "cross(S, acc)"),
     "w x J w": (", cross(w, Jw))", ", NOTHING)"),
-    "sum ax(H) q''": ("times(x.a[first + i], axial(H))", "NOTHING"),
-    "2 (w tr N - N^T w)": ("times(2.0 * x.u[first + i], add(", "times(0.0, add("),
-    "J, linear in q": ("yy += q * (H[1][1] + F[1][1])", "yy += 0.0"),
-    "H, linear in q": ("q = x.y[first + j]", "q = 0.0"),
-    "t . a": ("dot(vector(system.modes, row, TRANSLATION), acc) + dot(axial(H)", "dot(axial(H)"),
+    "sum ax(H) q''": ("times(dda, axial(H))", "NOTHING"),
+    "2 (w tr N - N^T w)": ("times(2.0 * du, add(", "times(0.0 * du, add("),
+    "J, linear in q": ("yy = yy + q * (H[1][1] + F[1][1])", "pass"),
+    "H, linear in q": ("q = lanes_at(x.y, (first + j,))", "q = 0.0"),
+    "t . a": ("dot(shared_vector(system.modes, row, TRANSLATION), acc) + dot(axial(H)", "dot(axial(H)"),
     "ax(H) . al": (" + dot(axial(H), al)", ""),
     "w . H w": (" + dot(w, turned_out(H, w))", ""),
-    "tr(H) w . w": (" - trace * square", ""),
-    "2 w . sum ax(H_ji) q_j'": ("2.0 * dot(w, axial(B)) * x.u[first + j]", "0.0"),
-    "M q''": (" + (B[0][0] + B[1][1] + B[2][2]) * x.a[first + j]", ""),
-    "K q": ("(system.pairs[pair, STIFFNESS] + stiffening) * x.y[first + j]", "0.0"),
-    "D q'": ("lane.damping[row] * x.u[first + i] - trace", "-trace"),
+    "tr(H) w . w": (" - (H[0][0] + H[1][1] + H[2][2]) * square", ""),
+    "2 w . sum ax(H_ji) q_j'": ("2.0 * dot(w, axial(B)) * lanes_at(x.u, (first + j,))", "0.0"),
+    "M q''": (" + (B[0][0] + B[1][1] + B[2][2]) * lanes_at(x.a, (first + j,))", ""),
+    "K q": ("(system.pairs[pair, STIFFNESS] + stiffening) * lanes_at(x.y, (first + j,))", "0.0"),
+    "D q'": ("lanes_at(lane.damping, (row,)) * lanes_at(x.u, (first + i,)) - (H", "-(H"),
     # of what moves on it, (11)-(20)
-    "al x d": (
-        "add(vector(work.frames, b, ACCELERATION), add(cross(al, d), ",
-        "add(vector(work.frames, b, ACCELERATION), add(NOTHING, ",
-    ),
-    "w x (w x d)": ("add(cross(al, d), cross(w, cross(w, d)))", "cross(al, d)"),
-    "2 w x d'": ("times(2.0, cross(w, rate)), change)))", "NOTHING, change)))"),
+    "al x d": ("add(acc, add(cross(al, d), ", "add(acc, add(NOTHING, "),
+    "w x (w x d)": ("add(acc, add(cross(al, d), cross(w, cross(w, d))))", "add(acc, cross(al, d))"),
+    "2 w x d'": ("return add(acc, times(2.0, cross(w, rate)))", "return acc"),
     "J_T s'": ("times(ds, tangent))\n    change", "NOTHING)\n    change"),
-    "phi q''": ("add(combined(at, 0, SHAPE, n, x.a, first), times(2.0 * ds", "add(NOTHING, times(2.0 * ds"),
-    "2 phi' q' s'": ("times(2.0 * ds, combined(at, 0, SLOPE, n, x.u, first))", "NOTHING"),
-    "phi'' q s'^2": ("times(ds * ds, combined(at, 0, CURVE, n, x.y, first))", "NOTHING"),
+    "phi q''": ("add(combined_there(at, SHAPE, n, x.a, first), times(2.0 * ds", "add(NOTHING, times(2.0 * ds"),
+    "2 phi' q' s'": ("times(2.0 * ds, combined_there(at, SLOPE, n, x.u, first))", "NOTHING"),
+    "phi'' q s'^2": ("times(ds * ds, combined_there(at, CURVE, n, x.y, first))", "NOTHING"),
     "(I + J_T) s''": ("times(dds, tangent)))", "NOTHING))"),
-    "psi q''": ("add(combined(at, 0, TURN, n, x.a, first), times(2.0 * ds", "add(NOTHING, times(2.0 * ds"),
-    "2 psi' q' s'": ("times(2.0 * ds, combined(at, 0, TURN_SLOPE, n, x.u, first))", "NOTHING"),
-    "psi'' q s'^2": ("times(ds * ds, combined(at, 0, TURN_CURVE, n, x.y, first))", "NOTHING"),
+    "psi q''": ("ddt = combined_there(at, TURN, n, x.a, first)", "ddt = NOTHING"),
+    "2 psi' q' s'": ("times(2.0 * ds, combined_there(at, TURN_SLOPE, n, x.u, first))", "NOTHING"),
+    "psi'' q s'^2": ("times(ds * ds, combined_there(at, TURN_CURVE, n, x.y, first))", "NOTHING"),
     "J_R s''": ("times(dds, slope)))", "NOTHING))"),
     "w x w_s": ("own_change), cross(w, own))", "own_change), NOTHING)"),
     "w_s x I w_s": (", cross(whole, inertia_times(E, lane, c, whole)))", ", NOTHING)"),
     # back on the body, (21)
     "f on the frame": ("    add_vector(work.frames, b, FORCE, f)\n", ""),
-    "d x f on the frame": ("    add_vector(work.frames, b, TORQUE, cross(add(d, arm), f))\n", ""),
+    "d x f on the frame": ("    add_vector(work.frames, b, TORQUE, cross(d, f))\n", ""),
     "torque on the frame": ("        add_vector(work.frames, b, TORQUE, about)\n", ""),
-    "phi^T f": ("r = dot(vector(at, i, SHAPE), f)", "r = 0.0"),
-    "psi^T t": ("r += dot(spin_of(t, vector(at, i, TURN)), about)", "pass"),
+    "phi^T f": ("r = dot(vector(work.modes, i, SHAPE), f)", "r = no_vector()[0]"),
+    "psi^T t": ("add_to(out, first + i, dot(spin_of(t, vector(at, i, TURN)), about))", "pass"),
     "tangent . f": ("dot(tangent, f) - along_track", "-along_track"),
-    "psi' q . t": ("out[k] += dot(spin_of(t, combined(at, 0, TURN_SLOPE, n, x.y, first)), about)", "pass"),
-    "sprung mass": ("out[z] += own[2] + ", "out[z] += "),
+    "psi' q . t": ("add_to(out, k, dot(spin_of(t, combined_there(at, TURN_SLOPE, n, x.y, first)), about))", "pass"),
+    "sprung mass": ("add_to(out, z, own_force[2] + ", "add_to(out, z, "),
     # through joints
-    "phi^T F where a body hangs": ("dot(vector(system.modes, row + i, HANGING_SHAPE), F) + ", ""),
+    "phi^T F where a body hangs": ("dot(shared_vector(system.modes, row + i, HANGING_SHAPE), F) + ", ""),
     "psi^T T where a body hangs": (" + dot(turning, T)", ""),
-    "spring of a joint": (" + lane.joints[j, 0] * value", ""),
-    "damper of a joint": (" + lane.joints[j, 1] * rate", ""),
+    "spring of a joint": (" + stiffness * value", ""),
+    "damper of a joint": (" + damping * rate", ""),
 }
 
 

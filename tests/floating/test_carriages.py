@@ -49,7 +49,7 @@ def test_pieces_are_the_law(motion: dict[str, object]) -> None:
     """Place, speed and acceleration at many times, of all variants; then the carriage stays where it is."""
     scene = study(motion)
     own = scene.carriage["load"].motion
-    pieces = lanes(build(scene), VariantValues(scene, {}, 1)).motions[0, 0]
+    pieces = lanes(build(scene), VariantValues(scene, {}, 1), np.ones(1)).motions[0, 0]
     end = own.duration * own.time_scale
     for t in np.random.default_rng(1).uniform(0.0, end, 200):
         path = own.path(t / own.time_scale)

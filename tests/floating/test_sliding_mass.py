@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from engine.floating.march import Marched, march
+from engine.floating.model import build
 from engine.floating.results import differences, outcome, results_of
-from tests.floating.scenes import FOX_GOODWIN, history, sliding_mass, steps
+from engine.scene.variants import VariantValues
+from tests.floating.scenes import AVERAGE_ACCELERATION, FOX_GOODWIN, history, sliding_mass, steps
 
 PERIOD = 2.0 * np.pi / 6.5480886  # of the beam, s
 CROSSINGS = (4.2128, 13.5532, 23.0755, 32.6171, 42.1598, 51.7024)  # s, from an ODE solver of other equations
@@ -104,3 +107,22 @@ def test_a_missing_part_of_a_history_is_a_difference() -> None:
     holed.history[0, 5, model.signal_of("carriages")] = np.nan
     named = [result.name for result in results_of(model)]
     assert differences(model, holed, whole)[named.index("load_position_max"), 0] == np.inf
+
+
+def test_lanes_do_not_hang_on_their_neighbours() -> None:
+    """Variants that lift off, slide over an end, or stay, side by side and each for itself: the same bits."""
+    study = sliding_mass()
+    masses, starts = np.linspace(20.0, 400.0, 21), np.linspace(0.01, 7.0, 21)
+    columns = {"carriage.load.mass": masses, "carriage.load.motion.start": starts}
+    model, stations = build(study), np.arange(0, 2001, 50)
+
+    def own(part: slice) -> Marched:
+        values = VariantValues(study, {key: column[part] for key, column in columns.items()}, masses[part].size)
+        return march(model, values, np.full(values.size, 20.0), 2000, stations, AVERAGE_ACCELERATION)
+
+    together = own(slice(None))
+    for k in range(21):
+        alone = own(slice(k, k + 1))
+        assert alone.history.tobytes() == together.history[k : k + 1].tobytes()
+        assert alone.statistics.tobytes() == together.statistics[k : k + 1].tobytes()
+        assert (alone.status, alone.last) == (together.status[k], together.last[k])

@@ -13,6 +13,7 @@ from engine.scene.sweep import expand
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.kinds.sliding_mass import KIND
+from studies.moving.parts import periods
 from studies.protocol.study import kind_of
 from studies.results.results import Results
 from tests.floating.scenes import ARM, sliding_mass
@@ -171,3 +172,20 @@ def test_numbers_of_joints_have_units() -> None:
 
     wanted = ends(plain, [0.0, np.pi / 2.0, 0.0], [np.pi / 6.0, np.pi / 3.0])
     assert ends([turn, slide], [0, "90 deg", 0], ["30 deg/s", "10 rpm"]) == pytest.approx(wanted, abs=1e-12)
+
+
+def test_periods_of_histories() -> None:
+    """Of sines at few stations, one of which lie on the middle, one that ends early, one that passes it once."""
+    times = np.tile(np.linspace(0.0, 60.0, 241), (4, 1))
+    rate = 2.0 * np.pi / np.array([9.3, 8.0, 7.1, 200.0])[:, None]
+    places, speeds = 7.0 + 5.0 * np.sin(rate * times), 5.0 * rate * np.cos(rate * times)
+    places[2, 200:] = np.nan
+    assert periods(times, places, speeds) == pytest.approx([9.3, 8.0, 7.1, np.nan], rel=1e-4, nan_ok=True)
+
+
+def test_a_job_without_histories() -> None:
+    """More variants than have one: the numbers of all are there."""
+    study = paper(2.0, sweep={"mass": {"of": "carriage.load.mass", "from": 20.0, "to": 90.0, "count": 90}})
+    found = studies.run(study)
+    assert found["load_position_max"].notnull().all()
+    assert found.sizes["history"] < 90

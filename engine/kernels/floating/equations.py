@@ -31,6 +31,7 @@ from engine.kernels.floating.layout import (
     ORIGIN,
     OWN_MASS,
     PARENT,
+    PIECE,
     PLACE,
     PLACE_COORDINATE,
     PLACE_MOTION,
@@ -55,12 +56,14 @@ from engine.kernels.floating.layout import (
 from engine.kernels.floating.tracks import (
     AT_PLACE,
     CURVE,
+    GATHERED,
     SHAPE,
     SLOPE,
     TURN,
     TURN_CURVE,
     TURN_SLOPE,
     combined,
+    combined_there,
     foreshortening_at,
     shapes_at,
 )
@@ -74,7 +77,10 @@ from engine.kernels.floating.vectors import (
     keep_matrix,
     keep_vector,
     matrix,
+    no_vector,
     rotation,
+    shared_matrix,
+    shared_vector,
     spin_change_of,
     spin_of,
     times,
@@ -82,11 +88,12 @@ from engine.kernels.floating.vectors import (
     turned_out,
     vector,
 )
-from engine.kernels.jit import called
-from engine.kernels.layout import FloatArray
+from engine.kernels.jit import called, piece
+from engine.kernels.layout import LANES, FloatArray, IntArray
+from engine.kernels.sines import hyperbolic_tangent
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
 
 NOTHING = (0.0, 0.0, 0.0)
-IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 # columns of Work.frames: attitude to the ground and position over it; velocity, spin, acceleration less gravity and
 # angular acceleration, resolved in the frame; force, and torque about its origin, that the body needs; the place where
@@ -95,14 +102,15 @@ ATTITUDE, POSITION, VELOCITY, SPIN, ACCELERATION, ANGULAR, FORCE, TORQUE = 0, 9,
 HANGING_PLACE, HANGING, HANGING_TURNED, FRAME = 30, 33, 36, 45
 # columns of Work.joints: its rotation, or its shift
 JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
-# columns of Work.contacts: force of the track on a carriage
-CONTACT, CONTACTS = 0, 3
+# columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
+CONTACT, TOUCHED, CONTACTS = 0, 3, 6
 
 
 class Work(NamedTuple):
-    """Room for one lane's frames (B, FRAME), joints (J, JOINT), contacts (C, CONTACTS), modes at a place (n, AT_PLACE)
-    and first moments of a body's modes (n, 9); the motions (M, 3) as given now: value, rate and acceleration; base
-    (J, 9): attitudes of spherical joints at the start of the step."""
+    """Room for a block of lanes, the last axis of each, of frames (B, FRAME), joints (J, JOINT), contacts (C,
+    CONTACTS), modes at a place (n, AT_PLACE) and first moments of a body's modes (n, 9); the motions (M, 3) as given
+    now: value, rate and acceleration; base (J, 9): attitudes of spherical joints at the start of the step; cells, and
+    gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion."""
 
     frames: FloatArray
     joints: FloatArray
@@ -111,29 +119,48 @@ class Work(NamedTuple):
     moments: FloatArray
     motions: FloatArray
     base: FloatArray
+    cells: IntArray
+    gathered: FloatArray
+    piece: FloatArray
 
 
-@called
+@piece
 def room(system, lane):
-    """Work for a lane, its joints not turned yet."""
-    base = np.zeros((system.axes.shape[0], 9))
+    """Work for a block of lanes, the joints not turned yet."""
+    widest = system.track.shape[4]
+    base = np.zeros((system.axes.shape[0], 9, LANES))
     base[:, 0], base[:, 4], base[:, 8] = 1.0, 1.0, 1.0
     return Work(
-        np.zeros((system.tree.shape[0], FRAME)),
-        np.zeros((system.axes.shape[0], JOINT)),
-        np.zeros((system.riders.shape[0], CONTACTS)),
-        np.zeros((system.track.shape[4], AT_PLACE)),
-        np.zeros((system.track.shape[4], 9)),
-        np.zeros((lane.motions.shape[0], 3)),
+        np.zeros((system.tree.shape[0], FRAME, LANES)),
+        np.zeros((system.axes.shape[0], JOINT, LANES)),
+        np.zeros((system.riders.shape[0], CONTACTS, LANES)),
+        np.zeros((widest, AT_PLACE, LANES)),
+        np.zeros((widest, 9, LANES)),
+        np.zeros((lane.motions.shape[0], 3, LANES)),
         base,
+        np.zeros(LANES, np.int64),
+        np.zeros((GATHERED, LANES)),
+        np.zeros((PIECE + 1, LANES)),
     )
 
 
 @called
+def add_to(out, k, row):
+    """A row of lanes added to another."""
+    put_lanes(out, (k,), lanes_at(out, (k,)) + row)
+
+
+@called
+def three_at(x, k):
+    """Rows k to k + 2."""
+    return lanes_at(x, (k,)), lanes_at(x, (k + 1,)), lanes_at(x, (k + 2,))
+
+
+@called
 def residual(system, lane, x, work, out):
-    """What is left of the equations of a lane, into out (N)."""
-    for k in range(out.size):
-        out[k] = 0.0
+    """What is left of the equations of a block of lanes, into out (N, LANES)."""
+    for k in range(out.shape[0]):
+        put_lanes(out, (k,), all_lanes(0.0))
     bodies = system.tree.shape[0]
     for b in range(bodies):
         if not system.tree[b, RESTS]:
@@ -154,17 +181,13 @@ def residual(system, lane, x, work, out):
 def follow_frame(system, lane, b, x, work):
     """Position, attitude, velocities and accelerations of a frame, (1)-(5), from those of its parent."""
     frames, p = work.frames, system.tree[b, PARENT]
-    place = vector(system.bodies, b, PLACE)
+    place = add(no_vector(), shared_vector(system.bodies, b, PLACE))
     if p < 0:
-        keep_matrix(frames, b, ATTITUDE, IDENTITY)
-        for k in range(POSITION, FORCE):
-            frames[b, k] = 0.0
-        g = lane.gravity
-        keep_vector(frames, b, ACCELERATION, (-g[0], -g[1], -g[2]))
-        shift(frames, b, place, NOTHING, NOTHING)
+        stand_on_ground(lane, b, frames)
+        shift(frames, b, place, no_vector(), no_vector())
     else:
         for k in range(FORCE):
-            frames[b, k] = frames[p, k]
+            put_lanes(frames, (b, k), lanes_at(frames, (p, k)))
         n, first, row = system.tree[p, MODES], system.tree[p, FIRST], b * system.track.shape[4]
         place = add(place, combined(system.modes, row, HANGING_SHAPE, n, x.y, first))
         rate = combined(system.modes, row, HANGING_SHAPE, n, x.u, first)
@@ -178,9 +201,19 @@ def follow_frame(system, lane, b, x, work):
             keep_vector(frames, b, HANGING, t)
             keep_matrix(frames, b, HANGING_TURNED, E)
             turn(frames, b, E, spin_of(t, dt), spin_change_of(t, dt, ddt))
-    turn(frames, b, matrix(system.bodies, b, TURNED), NOTHING, NOTHING)
+    look_along(frames, b, shared_matrix(system.bodies, b, TURNED))
     for j in range(system.tree[b, FIRST_JOINT], system.tree[b, END_JOINT]):
         follow_joint(system, j, b, x, work)
+
+
+@called
+def stand_on_ground(lane, b, frames):
+    """A frame that is the ground's, which gravity accelerates upward."""
+    for k in range(FORCE):
+        put_lanes(frames, (b, k), all_lanes(0.0))
+    for k in range(3):
+        put_lanes(frames, (b, ATTITUDE + 4 * k), all_lanes(1.0))
+    keep_vector(frames, b, ACCELERATION, times(-1.0, three_at(lane.gravity, 0)))
 
 
 @called
@@ -198,10 +231,16 @@ def turn(frames, b, E, rate, acceleration):
     """The frame turns by E, whose angular velocity and acceleration are resolved in the old axes."""
     w = vector(frames, b, SPIN)
     angular = add(add(vector(frames, b, ANGULAR), acceleration), cross(w, rate))
-    keep_vector(frames, b, ANGULAR, turned_in(E, angular))
-    keep_vector(frames, b, SPIN, turned_in(E, add(w, rate)))
-    keep_vector(frames, b, VELOCITY, turned_in(E, vector(frames, b, VELOCITY)))
-    keep_vector(frames, b, ACCELERATION, turned_in(E, vector(frames, b, ACCELERATION)))
+    keep_vector(frames, b, ANGULAR, angular)
+    keep_vector(frames, b, SPIN, add(w, rate))
+    look_along(frames, b, E)
+
+
+@called
+def look_along(frames, b, E):
+    """What is known of the frame is resolved in the columns of E."""
+    for k in (VELOCITY, SPIN, ACCELERATION, ANGULAR):
+        keep_vector(frames, b, k, turned_in(E, vector(frames, b, k)))
     keep_matrix(frames, b, ATTITUDE, after(matrix(frames, b, ATTITUDE), E))
 
 
@@ -209,34 +248,29 @@ def turn(frames, b, E, rate, acceleration):
 def follow_joint(system, j, b, x, work):
     """The frame of a body goes on from before one of its joints to behind it."""
     k, m, kind = system.joint_table[j, COORDINATE], system.joint_table[j, MOTION], system.joint_table[j, KIND]
-    axis = vector(system.axes, j, 0)
     if kind == SPHERICAL:
-        E = after(matrix(work.base, j, 0), rotation((x.y[k], x.y[k + 1], x.y[k + 2])))
+        E = after(matrix(work.base, j, 0), rotation(three_at(x.y, k)))
         keep_matrix(work.joints, j, JOINT_TURNED, E)
-        rate, change = (x.u[k], x.u[k + 1], x.u[k + 2]), (x.a[k], x.a[k + 1], x.a[k + 2])
-        turn(work.frames, b, E, turned_out(E, rate), turned_out(E, change))
+        turn(work.frames, b, E, turned_out(E, three_at(x.u, k)), turned_out(E, three_at(x.a, k)))
         return
-    value, rate, change = (x.y[k], x.u[k], x.a[k]) if k >= 0 else vector(work.motions, m, 0)
+    axis = shared_vector(system.axes, j, 0)
+    value, rate, change = given_or_free(k, m, x, work)
     if kind == PRISMATIC:
         d = times(value, axis)
         keep_vector(work.joints, j, JOINT_SHIFT, d)
         shift(work.frames, b, d, times(rate, axis), times(change, axis))
     else:
-        E = turned_about(axis, value)
+        E = rotation(times(value, axis))
         keep_matrix(work.joints, j, JOINT_TURNED, E)
         turn(work.frames, b, E, times(rate, axis), times(change, axis))
 
 
 @called
-def turned_about(e, t):
-    """Rotation by any angle about a unit axis, as rows."""
-    s, c = np.sin(t), 1.0 - np.cos(t)
-    x, y, z = e
-    return (
-        (1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y),
-        (c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x),
-        (c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y)),
-    )
+def given_or_free(k, m, x, work):
+    """Value, rate and acceleration of a coordinate, or of the motion where that is -1."""
+    if k >= 0:
+        return lanes_at(x.y, (k,)), lanes_at(x.u, (k,)), lanes_at(x.a, (k,))
+    return vector(work.motions, m, 0)
 
 
 @called
@@ -250,7 +284,7 @@ def body_forces(system, lane, b, x, work, out):
     """
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
     w, al, acc = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR), vector(work.frames, b, ACCELERATION)
-    S = add(combined(system.modes, b * widest, TRANSLATION, n, x.y, first), vector(system.bodies, b, MOMENT))
+    S = add(combined(system.modes, b * widest, TRANSLATION, n, x.y, first), shared_vector(system.bodies, b, MOMENT))
     drift = combined(system.modes, b * widest, TRANSLATION, n, x.u, first)
     push = combined(system.modes, b * widest, TRANSLATION, n, x.a, first)
     P = second_moments(system, b, x, work)
@@ -260,25 +294,35 @@ def body_forces(system, lane, b, x, work, out):
     force = add(times(system.bodies[b, MASS], acc), add(cross(al, S), cross(w, cross(w, S))))
     force = add(force, add(times(2.0, cross(w, drift)), push))
     torque = add(add(cross(S, acc), Jal), cross(w, Jw))
-    square = dot(w, w)
-    across = square - w[0] * w[0]  # what turns the track's direction
     for i in range(n):
-        row = b * widest + i
-        H = matrix(work.moments, i, 0)
+        H, du, dda = matrix(work.moments, i, 0), lanes_at(x.u, (first + i,)), lanes_at(x.a, (first + i,))
         trace = H[0][0] + H[1][1] + H[2][2]
-        torque = add(torque, times(x.a[first + i], axial(H)))
-        torque = add(torque, times(2.0 * x.u[first + i], add(times(trace, w), times(-1.0, turned_in(H, w)))))
-        r = dot(vector(system.modes, row, TRANSLATION), acc) + dot(axial(H), al) + dot(w, turned_out(H, w))
-        r += lane.damping[row] * x.u[first + i] - trace * square
-        for j in range(n):
-            B = matrix(system.pairs, (b * widest + j) * widest + i, SECOND_ORDER)
-            r += 2.0 * dot(w, axial(B)) * x.u[first + j] + (B[0][0] + B[1][1] + B[2][2]) * x.a[first + j]
-            pair = row * widest + j
-            stiffening = system.pairs[pair, STIFFENING + 1] * across - system.pairs[pair, STIFFENING] * acc[0]
-            r += (system.pairs[pair, STIFFNESS] + stiffening) * x.y[first + j]
-        out[first + i] += r
+        torque = add(torque, times(dda, axial(H)))
+        torque = add(torque, times(2.0 * du, add(times(trace, w), times(-1.0, turned_in(H, w)))))
     keep_vector(work.frames, b, FORCE, force)
     keep_vector(work.frames, b, TORQUE, torque)
+    for i in range(n):
+        mode_force(system, lane, b, i, x, work, out)
+
+
+@called
+def mode_force(system, lane, b, i, x, work, out):
+    """What is left of the equation of a mode of a body whose frame moves, see `body_forces`."""
+    n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
+    w, al, acc = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR), vector(work.frames, b, ACCELERATION)
+    row, H = b * widest + i, matrix(work.moments, i, 0)
+    square = dot(w, w)
+    across = square - w[0] * w[0]  # what turns the track's direction
+    r = dot(shared_vector(system.modes, row, TRANSLATION), acc) + dot(axial(H), al) + dot(w, turned_out(H, w))
+    r = r + lanes_at(lane.damping, (row,)) * lanes_at(x.u, (first + i,)) - (H[0][0] + H[1][1] + H[2][2]) * square
+    for j in range(n):
+        B = shared_matrix(system.pairs, (b * widest + j) * widest + i, SECOND_ORDER)
+        r = r + 2.0 * dot(w, axial(B)) * lanes_at(x.u, (first + j,))
+        r = r + (B[0][0] + B[1][1] + B[2][2]) * lanes_at(x.a, (first + j,))
+        pair = row * widest + j
+        stiffening = system.pairs[pair, STIFFENING + 1] * across - system.pairs[pair, STIFFENING] * acc[0]
+        r = r + (system.pairs[pair, STIFFNESS] + stiffening) * lanes_at(x.y, (first + j,))
+    add_to(out, first + i, r)
 
 
 @called
@@ -288,31 +332,34 @@ def modal_forces(system, lane, b, x, work, out):
     acc = vector(work.frames, b, ACCELERATION)
     for i in range(n):
         row = b * widest + i
-        r = dot(vector(system.modes, row, TRANSLATION), acc) + lane.damping[row] * x.u[first + i]
+        r = dot(shared_vector(system.modes, row, TRANSLATION), acc)
+        r = r + lanes_at(lane.damping, (row,)) * lanes_at(x.u, (first + i,))
         for j in range(n):
             pair = row * widest + j
-            r += system.pairs[pair, MODAL_MASS] * x.a[first + j] + system.pairs[pair, STIFFNESS] * x.y[first + j]
-        out[first + i] += r
-    keep_vector(work.frames, b, FORCE, NOTHING)
-    keep_vector(work.frames, b, TORQUE, NOTHING)
+            r = r + system.pairs[pair, MODAL_MASS] * lanes_at(x.a, (first + j,))
+            r = r + system.pairs[pair, STIFFNESS] * lanes_at(x.y, (first + j,))
+        add_to(out, first + i, r)
+    keep_vector(work.frames, b, FORCE, no_vector())
+    keep_vector(work.frames, b, TORQUE, no_vector())
 
 
 @called
 def second_moments(system, b, x, work):
     """int d d^T dm of the deformed body, as rows; H_i of all its modes into work.moments."""
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
-    P = matrix(system.bodies, b, SECOND)
-    xx, xy, xz = P[0]
-    yy, yz, zz = P[1][1], P[1][2], P[2][2]
+    P = shared_matrix(system.bodies, b, SECOND)
+    xx, xy, xz = add(no_vector(), P[0])
+    yy, yz, zz = add(no_vector(), (P[1][1], P[1][2], P[2][2]))
     for i in range(n):
-        q, H, F = x.y[first + i], first_moments(system, b, i, x), matrix(system.modes, b * widest + i, FIRST_ORDER)
+        q, H = lanes_at(x.y, (first + i,)), first_moments(system, b, i, x)
+        F = shared_matrix(system.modes, b * widest + i, FIRST_ORDER)
         keep_matrix(work.moments, i, 0, H)
-        xx += q * (H[0][0] + F[0][0])
-        yy += q * (H[1][1] + F[1][1])
-        zz += q * (H[2][2] + F[2][2])
-        xy += q * 0.5 * (H[0][1] + H[1][0] + F[0][1] + F[1][0])
-        xz += q * 0.5 * (H[0][2] + H[2][0] + F[0][2] + F[2][0])
-        yz += q * 0.5 * (H[1][2] + H[2][1] + F[1][2] + F[2][1])
+        xx = xx + q * (H[0][0] + F[0][0])
+        yy = yy + q * (H[1][1] + F[1][1])
+        zz = zz + q * (H[2][2] + F[2][2])
+        xy = xy + q * (0.5 * (H[0][1] + H[1][0] + F[0][1] + F[1][0]))
+        xz = xz + q * (0.5 * (H[0][2] + H[2][0] + F[0][2] + F[2][0]))
+        yz = yz + q * (0.5 * (H[1][2] + H[2][1] + F[1][2] + F[2][1]))
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
@@ -320,10 +367,11 @@ def second_moments(system, b, x, work):
 def first_moments(system, b, i, x):
     """H_i = int d phi_i^T dm of the deformed body, as rows."""
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
-    one, two, three = matrix(system.modes, b * widest + i, FIRST_ORDER)
+    F = shared_matrix(system.modes, b * widest + i, FIRST_ORDER)
+    one, two, three = add(no_vector(), F[0]), add(no_vector(), F[1]), add(no_vector(), F[2])
     for j in range(n):
-        B = matrix(system.pairs, (b * widest + j) * widest + i, SECOND_ORDER)
-        q = x.y[first + j]
+        B = shared_matrix(system.pairs, (b * widest + j) * widest + i, SECOND_ORDER)
+        q = lanes_at(x.y, (first + j,))
         one, two, three = add(one, times(q, B[0])), add(two, times(q, B[1])), add(three, times(q, B[2]))
     return one, two, three
 
@@ -331,28 +379,21 @@ def first_moments(system, b, i, x):
 @called
 def ridden(system, c, x, work):
     """Place, speed and acceleration of a carriage along its track."""
-    k, m = system.riders[c, PLACE_COORDINATE], system.riders[c, PLACE_MOTION]
-    if k >= 0:
-        return x.y[k], x.u[k], x.a[k]
-    return vector(work.motions, m, 0)
+    return given_or_free(system.riders[c, PLACE_COORDINATE], system.riders[c, PLACE_MOTION], x, work)
+
+
+@called
+def carried(lane, c, column):
+    """A number of a carriage in every lane."""
+    return lanes_at(lane.carriages, (c, column))
 
 
 @called
 def has_attitude(lane, c):
-    """Whether it matters how a carriage is turned."""
-    carriages = lane.carriages
-    turning = carriages[c, INERTIA] + carriages[c, INERTIA + 1] + carriages[c, INERTIA + 2]
-    return turning > 0.0 or carriages[c, HEIGHT] != 0.0
-
-
-@called
-def carriage_acceleration(system, c, x, work):
-    """Acceleration of the point that a carriage touches, less gravity, resolved in the frame of its body."""
-    b, at = system.riders[c, RIDDEN], work.modes
-    along = ridden(system, c, x, work)
-    shapes_at(system, b, along[0], system.tree[b, MODES], 3, at)
-    d, rate, change, _ = touched(system, b, along, x, at)
-    return inertia_force(system, work, b, 1.0, d, rate, change)
+    """Whether it matters how a carriage is turned, in any lane."""
+    turning = carried(lane, c, INERTIA) + carried(lane, c, INERTIA + 1) + carried(lane, c, INERTIA + 2)
+    height = carried(lane, c, HEIGHT)
+    return not everywhere((turning <= 0.0) & (height * height <= 0.0))
 
 
 @called
@@ -362,12 +403,13 @@ def touched(system, b, along, x, at):
     there."""
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     s, ds, dds = along
-    slope = combined(at, 0, SLOPE, n, x.y, first)
+    slope = combined_there(at, SLOPE, n, x.y, first)
     tangent = (1.0 + slope[0], slope[1], slope[2])
-    d = add(add((s, 0.0, 0.0), vector(system.bodies, b, ORIGIN)), combined(at, 0, SHAPE, n, x.y, first))
-    rate = add(combined(at, 0, SHAPE, n, x.u, first), times(ds, tangent))
-    change = add(combined(at, 0, SHAPE, n, x.a, first), times(2.0 * ds, combined(at, 0, SLOPE, n, x.u, first)))
-    change = add(change, add(times(ds * ds, combined(at, 0, CURVE, n, x.y, first)), times(dds, tangent)))
+    origin = shared_vector(system.bodies, b, ORIGIN)
+    d = add((s + origin[0], origin[1], origin[2]), combined_there(at, SHAPE, n, x.y, first))
+    rate = add(combined_there(at, SHAPE, n, x.u, first), times(ds, tangent))
+    change = add(combined_there(at, SHAPE, n, x.a, first), times(2.0 * ds, combined_there(at, SLOPE, n, x.u, first)))
+    change = add(change, add(times(ds * ds, combined_there(at, CURVE, n, x.y, first)), times(dds, tangent)))
     return d, rate, change, tangent
 
 
@@ -375,47 +417,73 @@ def touched(system, b, along, x, at):
 def carriage_forces(system, lane, c, x, work, out):
     """Inertia, weight and friction of a carriage on its body, (10)-(21)."""
     b, at = system.riders[c, RIDDEN], work.modes
-    n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
     turns = has_attitude(lane, c)
     along = ridden(system, c, x, work)
-    s, ds, _ = along
-    shapes_at(system, b, s, n, 6 if turns else 3, at)
+    shapes_at(system, b, along[0], 6 if turns else 3, work)
     d, rate, change, tangent = touched(system, b, along, x, at)
-    f, arm, about = NOTHING, NOTHING, NOTHING
-    mass = lane.carriages[c, OWN_MASS]
+    acc = acceleration_at(system, work, b, d, rate, change)
+    keep_vector(work.contacts, c, TOUCHED, acc)
+    about, mass = no_vector(), carried(lane, c, OWN_MASS)
     if turns:
         own, own_change, arm, about = attitude(system, lane, c, along, x, work)
         swing = add(cross(own_change, arm), cross(own, cross(own, arm)))
-        f = inertia_force(system, work, b, mass, add(d, arm), add(rate, cross(own, arm)), add(change, swing))
+        place = add(d, arm)
+        f = times(mass, acceleration_at(system, work, b, place, add(rate, cross(own, arm)), add(change, swing)))
         add_vector(work.frames, b, TORQUE, about)
         about = add(about, cross(arm, f))
+        push_frame(work, b, place, f)
     else:
-        f = inertia_force(system, work, b, mass, d, rate, change)
-    add_vector(work.frames, b, FORCE, f)
-    add_vector(work.frames, b, TORQUE, cross(add(d, arm), f))
+        f = times(mass, acc)
+        push_frame(work, b, d, f)
     z = system.riders[c, SPRUNG_COORDINATE]
     if z >= 0:
-        up, rising, lifting = add(d, (0.0, 0.0, x.y[z])), add(rate, (0.0, 0.0, x.u[z])), add(change, (0.0, 0.0, x.a[z]))
-        own = inertia_force(system, work, b, lane.carriages[c, SPRUNG_MASS], up, rising, lifting)
-        add_vector(work.frames, b, FORCE, own)
-        add_vector(work.frames, b, TORQUE, cross(up, own))
-        out[z] += own[2] + lane.carriages[c, SPRING] * x.y[z] + lane.carriages[c, DAMPER] * x.u[z]
-        f = add(f, own)
+        up = (d[0], d[1], d[2] + lanes_at(x.y, (z,)))
+        rising = (rate[0], rate[1], rate[2] + lanes_at(x.u, (z,)))
+        lifting = (change[0], change[1], change[2] + lanes_at(x.a, (z,)))
+        own_force = times(carried(lane, c, SPRUNG_MASS), acceleration_at(system, work, b, up, rising, lifting))
+        push_frame(work, b, up, own_force)
+        spring = carried(lane, c, SPRING) * lanes_at(x.y, (z,)) + carried(lane, c, DAMPER) * lanes_at(x.u, (z,))
+        add_to(out, z, own_force[2] + spring)
+        f = add(f, own_force)
     keep_vector(work.contacts, c, CONTACT, f)
-    t = combined(at, 0, TURN, n, x.y, first) if turns else NOTHING
     k = system.riders[c, PLACE_COORDINATE]
     if k >= 0:
-        out[k] += dot(tangent, f) - along_track(lane, c, ds, f, tangent)
-        if turns:
-            out[k] += dot(spin_of(t, combined(at, 0, TURN_SLOPE, n, x.y, first)), about)
+        add_to(out, k, dot(tangent, f) - along_track(lane, c, along[1], f, tangent))
+    push_modes(system, b, x, work, f, out)
+    if turns:
+        turn_modes(system, c, x, work, about, out)
+
+
+@called
+def push_frame(work, b, d, f):
+    """A force that a frame needs besides at a place of it."""
+    add_vector(work.frames, b, FORCE, f)
+    add_vector(work.frames, b, TORQUE, cross(d, f))
+
+
+@called
+def push_modes(system, b, x, work, f, out):
+    """A force of a carriage on the modes at its place; where the track between its origin and there grows shorter as it
+    bends, through that too."""
+    n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
     for i in range(n):
-        r = dot(vector(at, i, SHAPE), f)
-        if turns:
-            r += dot(spin_of(t, vector(at, i, TURN)), about)
-        if system.bodies[b, STIFFENS] > 0.0:  # the track between its origin and the carriage grows shorter as it bends
+        r = dot(vector(work.modes, i, SHAPE), f)
+        if system.bodies[b, STIFFENS] > 0.0:
             for j in range(n):
-                r -= foreshortening_at(system, b, s, i * widest + j) * x.y[first + j] * f[0]
-        out[first + i] += r
+                r = r - foreshortening_at(system, b, i * widest + j, work) * lanes_at(x.y, (first + j,)) * f[0]
+        add_to(out, first + i, r)
+
+
+@called
+def turn_modes(system, c, x, work, about, out):
+    """A torque of a carriage on the modes at its place, and on its way as the track turns along it."""
+    b, at = system.riders[c, RIDDEN], work.modes
+    n, first, k = system.tree[b, MODES], system.tree[b, FIRST], system.riders[c, PLACE_COORDINATE]
+    t = combined_there(at, TURN, n, x.y, first)
+    for i in range(n):
+        add_to(out, first + i, dot(spin_of(t, vector(at, i, TURN)), about))
+    if k >= 0:
+        add_to(out, k, dot(spin_of(t, combined_there(at, TURN_SLOPE, n, x.y, first)), about))
 
 
 @called
@@ -425,13 +493,14 @@ def attitude(system, lane, c, along, x, work):
     b, at = system.riders[c, RIDDEN], work.modes
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     _, ds, dds = along
-    slope = combined(at, 0, TURN_SLOPE, n, x.y, first)
-    t = combined(at, 0, TURN, n, x.y, first)
-    dt = add(combined(at, 0, TURN, n, x.u, first), times(ds, slope))
-    ddt = add(combined(at, 0, TURN, n, x.a, first), times(2.0 * ds, combined(at, 0, TURN_SLOPE, n, x.u, first)))
-    ddt = add(ddt, add(times(ds * ds, combined(at, 0, TURN_CURVE, n, x.y, first)), times(dds, slope)))
+    slope = combined_there(at, TURN_SLOPE, n, x.y, first)
+    t = combined_there(at, TURN, n, x.y, first)
+    dt = add(combined_there(at, TURN, n, x.u, first), times(ds, slope))
+    ddt = combined_there(at, TURN, n, x.a, first)
+    ddt = add(ddt, times(2.0 * ds, combined_there(at, TURN_SLOPE, n, x.u, first)))
+    ddt = add(ddt, add(times(ds * ds, combined_there(at, TURN_CURVE, n, x.y, first)), times(dds, slope)))
     E, own, own_change = rotation(t), spin_of(t, dt), spin_change_of(t, dt, ddt)
-    arm = turned_out(E, (0.0, 0.0, lane.carriages[c, HEIGHT]))
+    arm = times(carried(lane, c, HEIGHT), (E[0][2], E[1][2], E[2][2]))
     w = vector(work.frames, b, SPIN)
     whole, whole_change = add(w, own), add(add(vector(work.frames, b, ANGULAR), own_change), cross(w, own))
     torque = add(inertia_times(E, lane, c, whole_change), cross(whole, inertia_times(E, lane, c, whole)))
@@ -439,13 +508,14 @@ def attitude(system, lane, c, along, x, work):
 
 
 @called
-def inertia_force(system, work, b, mass, d, rate, change):
-    """Force that a mass at a place d of a frame needs, less its weight, by (13)."""
+def acceleration_at(system, work, b, d, rate, change):
+    """Acceleration of a place d of a frame, less gravity, by (13)."""
+    acc = add(vector(work.frames, b, ACCELERATION), change)
     if system.tree[b, RESTS]:
-        return times(mass, add(vector(work.frames, b, ACCELERATION), change))
+        return acc
     w, al = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR)
-    acc = add(vector(work.frames, b, ACCELERATION), add(cross(al, d), cross(w, cross(w, d))))
-    return times(mass, add(acc, add(times(2.0, cross(w, rate)), change)))
+    acc = add(acc, add(cross(al, d), cross(w, cross(w, d))))
+    return add(acc, times(2.0, cross(w, rate)))
 
 
 @called
@@ -458,13 +528,14 @@ def inertia_times(E, lane, c, w):
 @called
 def along_track(lane, c, ds, f, tangent):
     """Drive force and friction along the coordinate of a carriage, N: viscous, and Coulomb's, smoothed by tanh."""
-    stretch = np.sqrt(dot(tangent, tangent))
-    found = lane.carriages[c, DRIVE] - lane.carriages[c, VISCOUS] * ds * stretch
-    if lane.carriages[c, COULOMB] > 0.0:
+    stretch = root(dot(tangent, tangent))
+    found = carried(lane, c, DRIVE) - carried(lane, c, VISCOUS) * ds * stretch
+    coulomb = carried(lane, c, COULOMB)
+    if not everywhere(coulomb <= 0.0):
         along = dot(f, tangent) / stretch
         normal = dot(f, f) - along * along
-        if normal > 0.0:
-            found -= lane.carriages[c, COULOMB] * np.sqrt(normal) * np.tanh(ds * stretch / lane.carriages[c, SLIP])
+        size = root(choose(normal > 0.0, normal, 0.0))
+        found = found - coulomb * size * hyperbolic_tangent(ds * stretch / carried(lane, c, SLIP))
     return found * stretch
 
 
@@ -484,15 +555,15 @@ def gather(system, lane, b, x, work, out):
     p, row = system.tree[b, PARENT], b * system.track.shape[4]
     if p < 0:
         return
-    E0 = matrix(system.bodies, b, TURNED)
+    E0 = shared_matrix(system.bodies, b, TURNED)
     F, T = turned_out(E0, F), turned_out(E0, T)
     n, first = system.tree[p, MODES], system.tree[p, FIRST]
     if n:
         E, t = matrix(work.frames, b, HANGING_TURNED), vector(work.frames, b, HANGING)
         F, T = turned_out(E, F), turned_out(E, T)
         for i in range(n):
-            turning = spin_of(t, vector(system.modes, row + i, HANGING_TURN))
-            out[first + i] += dot(vector(system.modes, row + i, HANGING_SHAPE), F) + dot(turning, T)
+            turning = spin_of(t, shared_vector(system.modes, row + i, HANGING_TURN))
+            add_to(out, first + i, dot(shared_vector(system.modes, row + i, HANGING_SHAPE), F) + dot(turning, T))
     add_vector(work.frames, p, FORCE, F)
     add_vector(work.frames, p, TORQUE, add(T, cross(vector(work.frames, b, HANGING_PLACE), F)))
 
@@ -503,12 +574,13 @@ def joint_forces(system, lane, j, x, work, wrench, out):
     about a motion."""
     F, T = wrench
     k, kind, m = system.joint_table[j, COORDINATE], system.joint_table[j, KIND], system.joint_table[j, MOTION]
+    stiffness, damping = lanes_at(lane.joints, (j, 0)), lanes_at(lane.joints, (j, 1))
     if kind == SPHERICAL:
         for i in range(3):
-            out[k + i] += T[i] + lane.joints[j, 1] * x.u[k + i]
+            add_to(out, k + i, T[i] + damping * lanes_at(x.u, (k + i,)))
         return
-    value, rate = x.y[k], x.u[k]
+    value, rate = lanes_at(x.y, (k,)), lanes_at(x.u, (k,))
     if m >= 0:
-        value, rate = value - work.motions[m, 0], rate - work.motions[m, 1]
-    own = dot(vector(system.axes, j, 0), T) if kind == REVOLUTE else dot(vector(system.axes, j, 0), F)
-    out[k] += own + lane.joints[j, 0] * value + lane.joints[j, 1] * rate
+        value, rate = value - lanes_at(work.motions, (m, 0)), rate - lanes_at(work.motions, (m, 1))
+    own = dot(shared_vector(system.axes, j, 0), T if kind == REVOLUTE else F)
+    add_to(out, k, own + stiffness * value + damping * rate)

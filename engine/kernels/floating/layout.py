@@ -8,7 +8,7 @@ what is sprung. n is the largest number of modes of a body.
 
 from typing import NamedTuple
 
-from engine.kernels.layout import FloatArray, IntArray
+from engine.kernels.layout import BoolArray, FloatArray, IntArray
 
 #: Kinds of joints. A spherical joint has three coordinates, a rotation vector within each step.
 REVOLUTE, PRISMATIC, SPHERICAL = 0, 1, 2
@@ -49,7 +49,7 @@ class System(NamedTuple):
     tree (B, TREE), bodies (B, BODY), modes (B n, MODE), pairs (B n n, PAIR): bodies, each after its parent.
     joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
     track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
-    5 in equal cells; foreshortening (B, cells, 6, n n): G likewise.
+    5 in equal cells; bends (B, 6, n): which of them are not zero; foreshortening (B, cells, 6, n n): G likewise.
     riders (C, 4). points (P, 3 + 3 n), pointed (P): places whose position over
     the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
@@ -63,6 +63,7 @@ class System(NamedTuple):
     joint_table: IntArray
     axes: FloatArray
     track: FloatArray
+    bends: BoolArray
     foreshortening: FloatArray
     riders: IntArray
     pointed: IntArray
@@ -72,7 +73,7 @@ class System(NamedTuple):
 
 
 class Coordinates(NamedTuple):
-    """Coordinates, velocities and accelerations of one lane, (N) each."""
+    """Coordinates, velocities and accelerations of a block of lanes, (N, LANES) each."""
 
     y: FloatArray
     u: FloatArray
@@ -80,11 +81,11 @@ class Coordinates(NamedTuple):
 
 
 class Lane(NamedTuple):
-    """Numbers of one variant, or with a first axis of all.
+    """Numbers of variants: their axis is the first one, L; in blocks it is the first and, in each, the last.
 
     gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or about
     the given motion. carriages (C, CARRIAGE). motions (M, pieces, PIECE). events (E): ascending times (s) at which a
-    motion goes on as another piece, infinite where there are fewer. start (2, N): coordinates and velocities.
+    motion goes on as another piece, infinite from the last on. start (2, N): coordinates and velocities. step: s.
     """
 
     gravity: FloatArray
@@ -94,6 +95,7 @@ class Lane(NamedTuple):
     motions: FloatArray
     events: FloatArray
     start: FloatArray
+    step: FloatArray
 
 
 class Weights(NamedTuple):
@@ -106,8 +108,9 @@ class Weights(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a march leaves of L lanes: stations (S): ascending numbers of those whose signals are kept; statistics
-    (L, signals, STATISTICS) of all stations, history (L, S, signals); codes and last stations (L)."""
+    """What a march leaves of blocks of lanes: stations (S): ascending numbers of those whose signals are kept;
+    statistics (blocks, signals, STATISTICS, LANES) of all stations, history (blocks, S, signals, LANES); codes and last
+    stations (blocks, LANES)."""
 
     stations: IntArray
     statistics: FloatArray

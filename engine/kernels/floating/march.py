@@ -1,14 +1,16 @@
 """Implicit steps of bodies whose frames move: Newmark's formulas or generalized-alpha (Arnold and Bruels 2007; on the
 rotation group Bruels and Cardona 2010), Newton's method in each step.
 
-The tangent is made of differences of the residual, and kept for as many steps as the iteration converges fast.
+The tangent is made of differences of the residual, and kept for as many steps as the iteration converges fast. Lanes
+go side by side, and each decides for itself: a lane that is done, or has failed, stays where it is while others go on,
+so that its numbers do not hang on its neighbours.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from engine.kernels.floating.equations import Work, follow_frame, residual, room
+from engine.kernels.floating.equations import Work, follow_frame, residual, room, three_at
 from engine.kernels.floating.layout import (
     COORDINATE,
     DIVERGED,
@@ -33,16 +35,19 @@ from engine.kernels.floating.layout import (
 )
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.observe import observe, observe_whole
-from engine.kernels.floating.vectors import after, keep_matrix, matrix, rotation
+from engine.kernels.floating.vectors import after, dot, keep_matrix, matrix, rotation
 from engine.kernels.jit import called, kernel, piece
-from engine.kernels.layout import FloatArray, IntArray
+from engine.kernels.layout import LANES, FloatArray
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
 
 PART = 1e-3  # of the largest acceleration so far, by which accelerations are moved for differences
-#: A correction, and what it leaves, over the largest acceleration so far, at which the iteration ends. What is
-#: observed is of before the last correction.
-SMALL, ENOUGH = 1e-7, 1e-10
+#: A correction, and what is left after one more, over the largest acceleration so far, at which the iteration ends.
+SMALL, ENOUGH = 1e-6, 1e-10
 STALLED = 0.5  # a small correction that is no smaller than so much of the one before is rounding
-SLOW = 0.05  # a correction over the one before it, from which on the tangent is made anew
+SLOW = 0.1  # a correction over the one before it, from which on the tangent of a lane is made anew
+#: Steps, for each residual that a tangent takes, after which those of all lanes are made anew: an eighth of a residual
+#: for each step, which saves one correction in four of a mass that slides.
+KEPT = 8
 MOST_ITERATIONS = 25
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
@@ -50,144 +55,196 @@ JUMP = 1e-12  # of a rate: below it is rounding
 
 
 class State(NamedTuple):
-    """One lane under way: where it is, and where it is tried to be at the end of the step; all (N): accelerations of
-    generalized-alpha, those of the step before, the residual, and how heavy each coordinate is, kg^(1/2) or alike."""
+    """A block of lanes under way: where it is, and where it is tried to be at the end of the step; all (N, LANES):
+    accelerations of generalized-alpha, those of the step before, the residual, and how heavy each coordinate is,
+    kg^(1/2) or alike."""
 
     now: Coordinates
     tried: Coordinates
     inner: FloatArray
     before: FloatArray
+    earlier: FloatArray
     residual: FloatArray
     weight: FloatArray
 
 
 class Solver(NamedTuple):
-    """The tangent's factors, and how it goes: memory holds the largest weighted acceleration so far, the rate of
-    convergence, and 1 where the tangent is of use."""
+    """Factors of the tangents (N, N, LANES) that are in use and of new ones; motions before and after an event; how it
+    goes with each lane, (MEMORY, LANES): see the rows below."""
 
     work: Work
     other: FloatArray
     matrix: FloatArray
-    order: IntArray
+    fresh: FloatArray
+    before: FloatArray
+    after: FloatArray
     memory: FloatArray
 
 
-SCALE, RATE, FRESH = 0, 1, 2
+class Room(NamedTuple):
+    """What the march of a block of lanes works in; signals (signals, LANES)."""
+
+    state: State
+    solver: Solver
+    signals: FloatArray
+
+
+# rows of Solver.memory: largest weighted acceleration so far, 1 where the tangent is of use, the last correction, 1
+# where the lane's iteration has ended, its code; time at which the lane stands, and the time of its next event
+SCALE, FRESH, LAST, DONE, CODE, TIME, EVENT, MEMORY = 0, 1, 2, 3, 4, 5, 6, 7
+
+
+@called
+def of(memory, row):
+    """A row of the memory."""
+    return lanes_at(memory, (row,))
+
+
+@called
+def put_where(who, table, index, value):
+    """Store a row in some lanes."""
+    put_lanes(table, index, choose(who, value, lanes_at(table, index)))
 
 
 @called
 def tangent(system, lane, state, of_y, of_u, solver):
-    """Derivative of the residual by the accelerations, coordinates and velocities following by of_y and of_u: the
-    residual is linear in accelerations, and nearly so in what a step makes of them."""
-    x, M = state.tried, solver.matrix
-    N = x.y.size
+    """Derivative of the residual by the accelerations, coordinates and velocities following by of_y and of_u, into the
+    fresh matrix: the residual is linear in accelerations, and nearly so in what a step makes of them."""
+    x, M = state.tried, solver.fresh
+    N = M.shape[0]
     residual(system, lane, x, solver.work, solver.other)
     for k in range(N):
-        by = PART * solver.memory[SCALE] / state.weight[k]
-        y, u, a = x.y[k], x.u[k], x.a[k]
-        x.y[k], x.u[k], x.a[k] = y + of_y * by, u + of_u * by, a + by
+        by = PART * or_one(of(solver.memory, SCALE)) / lanes_at(state.weight, (k,))
+        y, u, a = lanes_at(x.y, (k,)), lanes_at(x.u, (k,)), lanes_at(x.a, (k,))
+        put_lanes(x.y, (k,), y + of_y * by)
+        put_lanes(x.u, (k,), u + of_u * by)
+        put_lanes(x.a, (k,), a + by)
         residual(system, lane, x, solver.work, state.residual)
         for i in range(N):
-            M[i, k] = (state.residual[i] - solver.other[i]) / by
-        x.y[k], x.u[k], x.a[k] = y, u, a
+            put_lanes(M, (i, k), (lanes_at(state.residual, (i,)) - lanes_at(solver.other, (i,))) / by)
+        put_lanes(x.y, (k,), y)
+        put_lanes(x.u, (k,), u)
+        put_lanes(x.a, (k,), a)
 
 
 @called
-def factor(M, order):
-    """LU factors of a matrix in its place, rows exchanged by ``order``; whether it is regular."""
-    N = order.size
+def factor(M):
+    """LU factors of matrices in their place, without exchanges, as masses lead; 1 in the lanes where they are
+    regular, else 0."""
+    N, regular = M.shape[0], all_lanes(1.0)
     for k in range(N):
-        pivot = k
+        pivot = lanes_at(M, (k, k))
+        regular = choose(pivot * pivot > 0.0, regular, 0.0)
         for i in range(k + 1, N):
-            if abs(M[i, k]) > abs(M[pivot, k]):
-                pivot = i
-        order[k] = pivot
-        if not abs(M[pivot, k]) > 0.0:
-            return False
-        if pivot != k:
-            for j in range(k, N):
-                M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
-        for i in range(k + 1, N):
-            M[i, k] /= M[k, k]
+            part = lanes_at(M, (i, k)) / pivot
+            put_lanes(M, (i, k), part)
             for j in range(k + 1, N):
-                M[i, j] -= M[i, k] * M[k, j]
-    return True
+                put_lanes(M, (i, j), lanes_at(M, (i, j)) - part * lanes_at(M, (k, j)))
+    return regular
 
 
 @called
-def solve(M, order, x):
-    """x by the factors, in its place."""
-    N = order.size
-    for k in range(N):
-        pivot = order[k]
-        x[k], x[pivot] = x[pivot], x[k]
-        for i in range(k + 1, N):
-            x[i] -= M[i, k] * x[k]
+def solve(M, x):
+    """x (N, LANES) by the factors, in its place."""
+    N = M.shape[0]
+    for k in range(1, N):
+        found = lanes_at(x, (k,))
+        for j in range(k):
+            found = found - lanes_at(M, (k, j)) * lanes_at(x, (j,))
+        put_lanes(x, (k,), found)
     for back in range(N):
         k = N - 1 - back
+        found = lanes_at(x, (k,))
         for j in range(k + 1, N):
-            x[k] -= M[k, j] * x[j]
-        x[k] /= M[k, k]
+            found = found - lanes_at(M, (k, j)) * lanes_at(x, (j,))
+        put_lanes(x, (k,), found / lanes_at(M, (k, k)))
 
 
 @called
-def solve_accelerations(system, lane, state, solver):
-    """Accelerations as they follow from the state, in which the equations are linear; whether there are such."""
-    x = state.now
-    x.a[:] = 0.0
-    if not factor_masses(system, lane, state, solver):
-        return False
+def solve_accelerations(system, lane, who, state, solver):
+    """Accelerations of some lanes as they follow from the state, in which the equations are linear; lanes in which
+    there are none do not converge."""
+    x, memory = state.tried, solver.memory
+    regular = factor_masses(system, lane, who, state, solver)
     for _ in range(2):
         residual(system, lane, x, solver.work, state.residual)
-        solve(solver.matrix, solver.order, state.residual)
-        for k in range(x.a.size):
-            x.a[k] -= state.residual[k]
-            solver.memory[SCALE] = max(solver.memory[SCALE], state.weight[k] * abs(x.a[k]))
+        solve(solver.fresh, state.residual)
+        for k in range(x.a.shape[0]):
+            a = lanes_at(x.a, (k,)) - lanes_at(state.residual, (k,))
+            put_lanes(x.a, (k,), a)
+            heavy = lanes_at(state.weight, (k,)) * size_of(a)
+            put_where(who & (heavy > of(memory, SCALE)), memory, (SCALE,), heavy)
     residual(system, lane, x, solver.work, state.residual)
-    state.inner[:] = x.a
-    state.before[:] = x.a
-    return True
+    for k in range(x.a.shape[0]):
+        a = lanes_at(x.a, (k,))
+        put_where(who, state.now.a, (k,), a)
+        put_where(who, state.inner, (k,), a)
+        put_where(who, state.before, (k,), a)
+        put_where(who, state.earlier, (k,), a)
+    put_where(who & (regular < 0.5), memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
 
 
-@piece
-def factor_masses(system, lane, state, solver):
-    """Factors of the mass matrix in place of those of the tangent, and how heavy each coordinate is; whether it is
+@called
+def factor_masses(system, lane, who, state, solver):
+    """Factors of the mass matrix into the fresh matrix, and of some lanes how heavy each coordinate is; 1 where it is
     regular. What is tried stands at the state, without accelerations."""
-    g = lane.gravity
-    kept = solver.memory[SCALE]
-    solver.memory[SCALE], state.weight[:] = 1.0, 1.0
-    state.tried.y[:], state.tried.u[:], state.tried.a[:] = state.now.y, state.now.u, 0.0
-    tangent(system, lane, state, 0.0, 0.0, solver)
-    weight = np.sqrt((g[0] ** 2 + g[1] ** 2 + g[2] ** 2) * system.bodies[:, MASS].sum())
-    solver.memory[SCALE], solver.memory[FRESH] = max(kept, weight), 0.0
-    for k in range(state.weight.size):
-        state.weight[k] = np.sqrt(abs(solver.matrix[k, k]))
-    return factor(solver.matrix, solver.order)
+    memory, N = solver.memory, state.weight.shape[0]
+    kept, zero = of(memory, SCALE), all_lanes(0.0)
+    g = three_at(lane.gravity, 0)
+    put_lanes(memory, (SCALE,), all_lanes(1.0))
+    for k in range(N):
+        put_lanes(state.tried.y, (k,), lanes_at(state.now.y, (k,)))
+        put_lanes(state.tried.u, (k,), lanes_at(state.now.u, (k,)))
+        put_lanes(state.tried.a, (k,), zero)
+        put_where(who, state.weight, (k,), all_lanes(1.0))
+    tangent(system, lane, state, zero, zero, solver)
+    mass = 0.0
+    for b in range(system.bodies.shape[0]):
+        mass += system.bodies[b, MASS]
+    weight = root(mass * dot(g, g))
+    put_lanes(memory, (SCALE,), choose(who & (weight > kept), weight, kept))
+    put_where(who, memory, (FRESH,), zero)
+    for k in range(N):
+        own = lanes_at(solver.fresh, (k, k))
+        put_where(who, state.weight, (k,), root(size_of(own)))
+    return factor(solver.fresh)
 
 
-@piece
-def strike(system, lane, before, state, solver):
+@called
+def copy(one, other):
+    """Motions (M, 3, LANES) into others."""
+    for m in range(one.shape[0]):
+        for k in range(3):
+            put_lanes(other, (m, k), lanes_at(one, (m, k)))
+
+
+@called
+def strike(system, lane, who, state, solver):
     """Velocities jump where a given motion's rate does, so that no momentum is lost: an impulse is to velocities what a
-    force is to accelerations. before (M, 3): the motions on the other side."""
-    motions = solver.work.motions
-    jumps = False
+    force is to accelerations. What is given on the other side stands in solver.before."""
+    before = solver.before
+    motions, after_it, jumping = solver.work.motions, solver.after, all_lanes(0.0)
     for m in range(motions.shape[0]):
-        jumps = jumps or abs(motions[m, 1] - before[m, 1]) > JUMP * (abs(before[m, 1]) + abs(motions[m, 1]))
-    if not jumps:
+        one, other = lanes_at(before, (m, 1)), lanes_at(motions, (m, 1))
+        gap, size = (other - one) * (other - one), one * one + other * other
+        jumping = choose(who & (gap > JUMP * JUMP * size), 1.0, jumping)
+    if everywhere(jumping < 0.5):
         return
-    factor_masses(system, lane, state, solver)
-    after_it = motions.copy()
-    motions[:] = before
-    motions[:, 2] = 0.0
+    factor_masses(system, lane, who, state, solver)
+    copy(motions, after_it)
+    copy(before, motions)
+    for m in range(motions.shape[0]):
+        put_lanes(motions, (m, 2), all_lanes(0.0))
     residual(system, lane, state.tried, solver.work, solver.other)
-    motions[:, 2] = after_it[:, 1] - before[:, 1]
+    for m in range(motions.shape[0]):
+        put_lanes(motions, (m, 2), lanes_at(after_it, (m, 1)) - lanes_at(before, (m, 1)))
     residual(system, lane, state.tried, solver.work, state.residual)
-    motions[:] = after_it
-    for k in range(state.residual.size):
-        state.residual[k] -= solver.other[k]
-    solve(solver.matrix, solver.order, state.residual)
-    for k in range(state.residual.size):
-        state.now.u[k] -= state.residual[k]
+    copy(after_it, motions)
+    for k in range(state.residual.shape[0]):
+        put_lanes(state.residual, (k,), lanes_at(state.residual, (k,)) - lanes_at(solver.other, (k,)))
+    solve(solver.fresh, state.residual)
+    for k in range(state.residual.shape[0]):
+        put_where(jumping > 0.5, state.now.u, (k,), lanes_at(state.now.u, (k,)) - lanes_at(state.residual, (k,)))
 
 
 @called
@@ -196,199 +253,306 @@ def turn_bases(joints, base, y):
     for j in range(joints.shape[0]):
         if joints[j, KIND] == SPHERICAL:
             k = joints[j, COORDINATE]
-            keep_matrix(base, j, 0, after(matrix(base, j, 0), rotation((y[k], y[k + 1], y[k + 2]))))
-            y[k], y[k + 1], y[k + 2] = 0.0, 0.0, 0.0
+            keep_matrix(base, j, 0, after(matrix(base, j, 0), rotation(three_at(y, k))))
+            for i in range(3):
+                put_lanes(y, (k + i,), all_lanes(0.0))
 
 
 @called
 def advance(state, scheme, h):
     """Coordinates and velocities by the accelerations that are tried: Newmark's formulas with those of
     generalized-alpha, (1 - m) inner_new + m inner = (1 - f) a_new + f a."""
-    beta, gamma, m, f = scheme
-    x, new, inner = state.now, state.tried, state.inner
-    for k in range(inner.size):
-        own = ((1.0 - f) * new.a[k] + f * x.a[k] - m * inner[k]) / (1.0 - m)
-        new.y[k] = x.y[k] + h * x.u[k] + h * h * ((0.5 - beta) * inner[k] + beta * own)
-        new.u[k] = x.u[k] + h * ((1.0 - gamma) * inner[k] + gamma * own)
-
-
-@called
-def take(state, scheme):
-    """What is tried becomes the state."""
-    m, f = scheme.alpha_m, scheme.alpha_f
+    beta, gamma = scheme.beta, scheme.gamma
     x, new = state.now, state.tried
-    for k in range(state.inner.size):
-        own = ((1.0 - f) * new.a[k] + f * x.a[k] - m * state.inner[k]) / (1.0 - m)
-        x.y[k], x.u[k] = new.y[k], new.u[k]
-        state.before[k], x.a[k], state.inner[k] = x.a[k], new.a[k], own
+    for k in range(state.inner.shape[0]):
+        own, inner, u = inner_of(state, scheme, k), lanes_at(state.inner, (k,)), lanes_at(x.u, (k,))
+        put_lanes(new.y, (k,), lanes_at(x.y, (k,)) + h * u + h * h * ((0.5 - beta) * inner + beta * own))
+        put_lanes(new.u, (k,), u + h * ((1.0 - gamma) * inner + gamma * own))
 
 
 @called
-def correct(state, solver):
-    """One correction of the accelerations; its size over the largest so far."""
-    solve(solver.matrix, solver.order, state.residual)
-    change, scale, a = 0.0, solver.memory[SCALE], state.tried.a
-    for k in range(a.size):
-        a[k] -= state.residual[k]
-        scale = max(scale, state.weight[k] * abs(a[k]))
-        change += (state.weight[k] * state.residual[k]) ** 2
-    solver.memory[SCALE] = scale
-    return np.sqrt(change) / scale if change > 0.0 else change
+def inner_of(state, scheme, k):
+    """The acceleration of generalized-alpha that follows from the one that is tried."""
+    m, f = scheme.alpha_m, scheme.alpha_f
+    new, old, inner = lanes_at(state.tried.a, (k,)), lanes_at(state.now.a, (k,)), lanes_at(state.inner, (k,))
+    return ((1.0 - f) * new + f * old - m * inner) / (1.0 - m)
+
+
+@called
+def take(who, state, scheme):
+    """What is tried becomes the state of some lanes."""
+    x, new = state.now, state.tried
+    for k in range(state.inner.shape[0]):
+        own = inner_of(state, scheme, k)
+        put_where(who, x.y, (k,), lanes_at(new.y, (k,)))
+        put_where(who, x.u, (k,), lanes_at(new.u, (k,)))
+        put_where(who, state.earlier, (k,), lanes_at(state.before, (k,)))
+        put_where(who, state.before, (k,), lanes_at(x.a, (k,)))
+        put_where(who, x.a, (k,), lanes_at(new.a, (k,)))
+        put_where(who, state.inner, (k,), own)
+
+
+@called
+def correct(who, state, solver):
+    """One correction of the accelerations of some lanes; its size over the largest so far."""
+    solve(solver.matrix, state.residual)
+    change, scale, a = all_lanes(0.0), of(solver.memory, SCALE), state.tried.a
+    for k in range(a.shape[0]):
+        by, weight = lanes_at(state.residual, (k,)), lanes_at(state.weight, (k,))
+        new = lanes_at(a, (k,)) - by
+        put_where(who, a, (k,), new)
+        heavy = weight * size_of(new)
+        scale = choose(who & (heavy > scale), heavy, scale)
+        change = change + (weight * by) * (weight * by)
+    put_lanes(solver.memory, (SCALE,), scale)
+    return root(change) / or_one(scale)
+
+
+@called
+def size_of(row):
+    """Without sign."""
+    return choose(row < 0.0, -1.0 * row, row)
+
+
+@called
+def or_one(row):
+    """1 where it is 0."""
+    return choose(row > 0.0, row, 1.0)
+
+
+@called
+def renew(system, lane, scheme, h, state, solver):
+    """New tangents, and their factors, for the lanes that need them."""
+    memory, M, new = solver.memory, solver.matrix, solver.fresh
+    stale = (of(memory, FRESH) < 0.5) & (of(memory, DONE) < 0.5)
+    if everywhere((of(memory, FRESH) > 0.5) | (of(memory, DONE) > 0.5)):
+        return
+    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
+    tangent(system, lane, state, scheme.beta * of_new * h * h, scheme.gamma * of_new * h, solver)
+    regular = factor(new)
+    for i in range(M.shape[0]):
+        for j in range(M.shape[0]):
+            put_where(stale, M, (i, j), lanes_at(new, (i, j)))
+    put_where(stale, memory, (FRESH,), all_lanes(1.0))
+    put_where(stale, memory, (LAST,), all_lanes(np.inf))
+    singular = stale & (regular < 0.5)
+    put_where(singular, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    put_where(singular, memory, (DONE,), all_lanes(1.0))
+
+
+@called
+def judge(change, memory):
+    """Whose iteration ends with a correction of that size, and whose tangent is too old."""
+    last, going = of(memory, LAST), of(memory, DONE) < 0.5
+    rate = choose((last < np.inf) & (last > 0.0), change / last, SLOW)
+    ends = (change * rate * rate <= ENOUGH) | (change > STALLED * last)
+    put_where(going & (rate > SLOW), memory, (FRESH,), all_lanes(0.0))
+    put_where(going, memory, (LAST,), change)
+    put_where(going & (change <= SMALL) & ends, memory, (DONE,), all_lanes(1.0))
+    lost = choose(change < np.inf, 0.0, 1.0) > 0.5  # NaN too
+    put_where(going & lost, memory, (CODE,), all_lanes(1.0 * DIVERGED))
+    put_where(going & lost, memory, (DONE,), all_lanes(1.0))
 
 
 @called
 def step(system, lane, scheme, h, state, solver):
-    """Newton's method for one step, from accelerations that go on as they did; a code."""
-    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
-    of_y, of_u = scheme.beta * of_new * h * h, scheme.gamma * of_new * h
-    for k in range(state.before.size):
-        state.tried.a[k] = 2.0 * state.now.a[k] - state.before[k]
-    before, memory = np.inf, solver.memory
+    """Newton's method for one step of the lanes that are not done, from accelerations that go on as they did. Each
+    ends with one correction more, which is not judged: what is observed is of before it."""
+    memory = solver.memory
+    for k in range(state.before.shape[0]):
+        now, before, earlier = lanes_at(state.now.a, (k,)), lanes_at(state.before, (k,)), lanes_at(state.earlier, (k,))
+        put_lanes(state.tried.a, (k,), 3.0 * (now - before) + earlier)
+    put_lanes(memory, (LAST,), all_lanes(np.inf))
     for _ in range(MOST_ITERATIONS):
         advance(state, scheme, h)
-        if memory[FRESH] == 0.0:
-            tangent(system, lane, state, of_y, of_u, solver)
-            if not factor(solver.matrix, solver.order):
-                return NOT_CONVERGED
-            memory[FRESH], memory[RATE], before = 1.0, 1.0, np.inf
+        renew(system, lane, scheme, h, state, solver)
         residual(system, lane, state.tried, solver.work, state.residual)
-        change = correct(state, solver)
-        if not change < np.inf:
-            return DIVERGED
-        if before < np.inf and before > 0.0:
-            memory[RATE] = change / before
-        small = change <= SMALL
-        if small and (change * memory[RATE] <= ENOUGH or change > STALLED * before):
-            advance(state, scheme, h)
-            return SOUND
-        if change > SLOW * before:
-            memory[FRESH] = 0.0
-        before = change
-    return NOT_CONVERGED
+        judge(correct(of(memory, DONE) < 0.5, state, solver), memory)
+        if everywhere(of(memory, DONE) > 0.5):
+            break
+    put_where(of(memory, DONE) < 0.5, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    advance(state, scheme, h)
+    residual(system, lane, state.tried, solver.work, state.residual)
+    correct(sound(memory), state, solver)
+    advance(state, scheme, h)
 
 
-@piece
-def go_on(system, lane, scheme, start, end, state, solver):
-    """From one time to another (s) without an event between them; a code."""
-    motions_at(lane.motions, end, 0.5 * (start + end), solver.work.motions)
-    code = step(system, lane, scheme, end - start, state, solver)
-    if code == SOUND:
-        take(state, scheme)
-    return code
+@called
+def sound(memory):
+    """Lanes with which nothing has happened."""
+    return of(memory, CODE) < SOUND + 0.5
 
 
-@piece
-def pass_event(system, lane, time, later, state, solver):
-    """A given motion goes on as another piece: velocities and accelerations jump with it; whether that could be."""
-    work = solver.work
-    before = work.motions.copy()
+@called
+def go_on(system, lane, scheme, who, end, state, solver):
+    """Some lanes, those that are sound, go to another time (s) without an event between."""
+    memory = solver.memory
+    goes, start = who & sound(memory), of(memory, TIME)
+    put_lanes(memory, (DONE,), choose(goes, all_lanes(0.0), 1.0))
+    end = choose(goes, end, start)
+    middle = choose(goes, 0.5 * (start + end), start - 2.0 * near_of(lane))
+    motions_at(lane.motions, end, middle, solver.work.piece, solver.work.motions)
+    step(system, lane, scheme, end - start, state, solver)
+    arrived = goes & sound(memory)
+    take(arrived, state, scheme)
+    put_where(arrived, memory, (TIME,), end)
+
+
+@called
+def near_of(lane):
+    """How near to a station an event falls on it, s."""
+    return NEAR * lanes_at(lane.step, (0,))
+
+
+@called
+def pass_events(system, lane, who, end, state, solver):
+    """Given motions of some lanes go on as other pieces: velocities and accelerations jump with them. end: of the
+    step, s."""
+    work, time = solver.work, of(solver.memory, TIME)
+    copy(work.motions, solver.before)
     turn_bases(system.joint_table, work.base, state.now.y)
-    motions_at(lane.motions, time, later, work.motions)
-    strike(system, lane, before, state, solver)
-    return solve_accelerations(system, lane, state, solver)
+    motions_at(lane.motions, time, choose(who, 0.5 * (time + end), time), work.piece, work.motions)
+    strike(system, lane, who, state, solver)
+    solve_accelerations(system, lane, who, state, solver)
 
 
 @called
-def room_to_march(system, lane):
-    """State and solver of a lane at its start, accelerations not known yet."""
-    N = lane.start.shape[1]
-    rows = np.zeros((10, N))
-    now, tried = Coordinates(rows[0], rows[1], rows[2]), Coordinates(rows[3], rows[4], rows[5])
-    now.y[:], now.u[:] = lane.start[0], lane.start[1]
-    state = State(now, tried, rows[6], rows[7], rows[8], rows[9])
-    work = room(system, lane)
-    turn_bases(system.joint_table, work.base, now.y)
-    motions_at(lane.motions, 0.0, 0.0, work.motions)
-    for b in range(system.tree.shape[0]):  # those that rest are followed once
-        follow_frame(system, lane, b, now, work)
-    return state, Solver(work, np.zeros(N), np.zeros((N, N)), np.zeros(N, np.int64), np.zeros(3))
+def next_events(events, who, memory):
+    """Each lane's next event behind the last one, of events (E, LANES); infinite where there is none."""
+    found = all_lanes(np.inf)
+    for e in range(events.shape[0] - 1, -1, -1):
+        event = lanes_at(events, (e,))
+        found = choose(event > of(memory, EVENT), event, found)
+    put_where(who, memory, (EVENT,), found)
+
+
+@called
+def go_through(system, lane, scheme, number, state, solver):
+    """All lanes through a step, over the events that come before its end."""
+    memory, h, near = solver.memory, lanes_at(lane.step, (0,)), near_of(lane)
+    start, end = (number - 1.0) * h, float(number) * h
+    if number % (KEPT * (lane.start.shape[1] + 1)) == 0:
+        put_lanes(memory, (FRESH,), all_lanes(0.0))
+    while not everywhere(of(memory, EVENT) >= end - near):
+        event = of(memory, EVENT)
+        who = event < end - near
+        apart = who & (event > of(memory, TIME) + near)
+        put_where(apart, memory, (FRESH,), all_lanes(0.0))  # of another step
+        go_on(system, lane, scheme, apart, event, state, solver)
+        pass_events(system, lane, who & sound(memory), end, state, solver)
+        next_events(lane.events, who, memory)
+    shorter = of(memory, TIME) > start + near
+    go_on(system, lane, scheme, h > 0.0, end, state, solver)
+    put_where(shorter, memory, (FRESH,), all_lanes(0.0))
 
 
 @piece
-def march_lane(system, lane, scheme, steps, h, number_of_lane, record):
-    """One lane from its start to the end, its signals into the record. Returns how it went, and the last station."""
-    statistics, history = record.statistics[number_of_lane], record.history[number_of_lane]
-    state, solver = room_to_march(system, lane)
-    signals, kept, event = np.zeros(statistics.shape[0]), 0, 0
-    if not solve_accelerations(system, lane, state, solver):
-        return NOT_CONVERGED, 0
-    for number in range(steps + 1):
-        now, end = (number - 1) * h, number * h
-        while number and event < lane.events.size and lane.events[event] < end - NEAR * h:
-            passing, code = lane.events[event], SOUND
-            if passing > now + NEAR * h:
-                solver.memory[FRESH] = 0.0  # of another step
-                code = go_on(system, lane, scheme, now, passing, state, solver)
-                now = passing
-            event += 1
-            if code == SOUND and not pass_event(system, lane, now, 0.5 * (now + end), state, solver):
-                code = NOT_CONVERGED
-            if code != SOUND:
-                return code, number - 1
-        if number:
-            code = go_on(system, lane, scheme, now, end, state, solver)
-            if code != SOUND:
-                return code, number - 1
-            if now > (number - 1) * h:
-                solver.memory[FRESH] = 0.0
-        watched = observe(system, lane, state.now, solver.work, signals)
-        count(signals, watched, number, 0.5 if number in (0, steps) else 1.0, statistics)
-        if kept < record.stations.size and record.stations[kept] == number:
-            observe_whole(system, lane, state.now, solver.work, signals[watched:])
-            history[kept] = signals
-            kept += 1
-        turn_bases(system.joint_table, solver.work.base, state.now.y)
-        if has_left(system, state.now.y):
-            return OVER_THE_END, number
-        if is_meaningless(system, state.now.y):
-            return DIVERGED, number
-    return SOUND, steps
+def room_to_march(system, lane, record):
+    """Room for a block of lanes."""
+    N, M = lane.start.shape[1], lane.motions.shape[0]
+    rows = np.zeros((11, N, LANES))
+    now, tried = Coordinates(rows[0], rows[1], rows[2]), Coordinates(rows[3], rows[4], rows[5])
+    state = State(now, tried, rows[6], rows[7], rows[8], rows[9], rows[10])
+    two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
+    memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
+    solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
+    return Room(state, solver, signals)
 
 
 @called
-def has_left(system, y):
-    """Whether a carriage has slid over an end of its track."""
+def start(system, lane, state, solver):
+    """A block of lanes at its start, with the accelerations there."""
+    work, memory = solver.work, solver.memory
+    for k in range(state.weight.shape[0]):
+        put_lanes(state.now.y, (k,), lanes_at(lane.start, (0, k)))
+        put_lanes(state.now.u, (k,), lanes_at(lane.start, (1, k)))
+    turn_bases(system.joint_table, work.base, state.now.y)
+    motions_at(lane.motions, all_lanes(0.0), all_lanes(0.0), work.piece, work.motions)
+    for b in range(system.tree.shape[0]):  # those that rest are followed once
+        follow_frame(system, lane, b, state.now, work)
+    everyone = lanes_at(lane.step, (0,)) > 0.0
+    put_lanes(memory, (EVENT,), near_of(lane))
+    next_events(lane.events, everyone, memory)
+    solve_accelerations(system, lane, everyone, state, solver)
+
+
+@called
+def march_block(system, lane, scheme, steps, block, room, record):
+    """One block of lanes from the start to the end, its signals and codes into the record."""
+    state, solver, signals = room
+    work, memory, kept = solver.work, solver.memory, 0
+    start(system, lane, state, solver)
+    for number in range(steps + 1):
+        if number:
+            go_through(system, lane, scheme, number, state, solver)
+        goes = sound(memory)
+        if everywhere(of(memory, CODE) > SOUND + 0.5):
+            break
+        note_last(memory, number, block, record.last)
+        watched = observe(system, lane, state.now, work, signals)
+        count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
+        if kept < record.stations.size and record.stations[kept] == number:
+            observe_whole(system, lane, state.now, work, signals, watched)
+            for k in range(signals.shape[0]):
+                put_lanes(record.history, (block, kept, k), choose(goes, lanes_at(signals, (k,)), np.nan))
+            kept += 1
+        turn_bases(system.joint_table, work.base, state.now.y)
+        check(system, state.now.y, memory)
+    for j in range(LANES):
+        record.codes[block, j] = int(memory[CODE, j])
+
+
+@called
+def note_last(memory, number, block, last):
+    """The station at which sound lanes have arrived."""
+    for j in range(LANES):
+        if memory[CODE, j] < SOUND + 0.5:
+            last[block, j] = number
+
+
+@called
+def check(system, y, memory):
+    """Whether a carriage of a lane has slid over an end of its track, or a body bends by many times its length."""
     for c in range(system.riders.shape[0]):
         k = system.riders[c, PLACE_COORDINATE]
-        if k >= 0 and not 0.0 <= y[k] <= system.bodies[system.riders[c, RIDDEN], LENGTH]:
-            return True
-    return False
-
-
-@called
-def is_meaningless(system, y):
-    """Whether a body bends by many times its length."""
+        if k >= 0:
+            s, length = lanes_at(y, (k,)), system.bodies[system.riders[c, RIDDEN], LENGTH]
+            put_where(sound(memory) & ((s < 0.0) | (s > length)), memory, (CODE,), all_lanes(1.0 * OVER_THE_END))
     for b in range(system.tree.shape[0]):
         most = MOST_BENT * system.bodies[b, LENGTH] * np.sqrt(system.bodies[b, MASS])  # modal masses are 1
         for k in range(system.tree[b, FIRST], system.tree[b, FIRST] + system.tree[b, MODES]):
-            if not abs(y[k]) <= most:
-                return True
-    return False
+            bent = choose(size_of(lanes_at(y, (k,))) <= most, 0.0, 1.0)  # NaN too
+            put_where(sound(memory) & (bent > 0.5), memory, (CODE,), all_lanes(1.0 * DIVERGED))
 
 
 @called
-def count(signals, watched, number, weight, statistics):
-    """The first signals of a station go into the statistics."""
+def count(who, signals, watched, number, weight, statistics, block):
+    """The first signals of a station go into the statistics of some lanes."""
+    at = all_lanes(float(number))
     for j in range(watched):
-        value = signals[j]
-        if value > statistics[j, LARGEST]:
-            statistics[j, LARGEST], statistics[j, LARGEST_AT] = value, number
-        if value < statistics[j, SMALLEST]:
-            statistics[j, SMALLEST], statistics[j, SMALLEST_AT] = value, number
-        statistics[j, SQUARES] += weight * value * value
+        value = lanes_at(signals, (j,))
+        larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
+        put_where(larger, statistics, (block, j, LARGEST), value)
+        put_where(larger, statistics, (block, j, LARGEST_AT), at)
+        smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
+        put_where(smaller, statistics, (block, j, SMALLEST), value)
+        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+        squares = lanes_at(statistics, (block, j, SQUARES))
+        put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
 
 
 @kernel
-def march(system, lanes, scheme, steps, h, record):
-    """All lanes, each with its step h (L) in s, into the record."""
-    for k in range(h.size):
+def march(system, lanes, scheme, steps, record):
+    """All blocks of lanes in so many steps, into the record."""
+    for block in range(lanes.step.shape[0]):
         lane = Lane(
-            lanes.gravity[k],
-            lanes.damping[k],
-            lanes.joints[k],
-            lanes.carriages[k],
-            lanes.motions[k],
-            lanes.events[k],
-            lanes.start[k],
+            lanes.gravity[block],
+            lanes.damping[block],
+            lanes.joints[block],
+            lanes.carriages[block],
+            lanes.motions[block],
+            lanes.events[block],
+            lanes.start[block],
+            lanes.step[block],
         )
-        record.codes[k], record.last[k] = march_lane(system, lane, scheme, steps, h[k], k, record)
+        march_block(system, lane, scheme, steps, block, room_to_march(system, lane, record), record)

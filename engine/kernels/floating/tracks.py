@@ -1,52 +1,88 @@
 """Shapes of a body at places of its track that depend on the state, from polynomials in cells."""
 
-from engine.kernels.floating.layout import LENGTH
+from engine.kernels.floating.layout import LENGTH, MODES
 from engine.kernels.jit import called
+from engine.kernels.layout import LANES
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 
 # columns of what is known of each mode at a place: displacement and its first two derivatives by the place, likewise of
 # the rotation
 SHAPE, SLOPE, CURVE, TURN, TURN_SLOPE, TURN_CURVE, AT_PLACE = 0, 3, 6, 9, 12, 15, 18
+# rows of a gathered polynomial behind its six coefficients: places, and where in their cells they are (0 to 1)
+POWERS, AT, WITHIN, GATHERED = 6, 6, 7, 8
 
 
 @called
-def cell_at(system, b, s):
-    """The cell of a place, where in it that is (0 to 1), and cells per metre; the outermost cells go on."""
-    cells = system.track.shape[1]
-    rate = cells / system.bodies[b, LENGTH]
-    cell = min(max(int(s * rate), 0), cells - 1)
-    return cell, s * rate - cell, rate
+def enter_cells(system, b, s, cells, gathered):
+    """The cell of each lane's place, and where in it that is; the outermost cells go on. Returns cells per metre."""
+    count = system.track.shape[1]
+    rate = count / system.bodies[b, LENGTH]
+    put_lanes(gathered, (AT,), s * rate)
+    for j in range(LANES):
+        at = gathered[AT, j]
+        inside = at if at > 0.0 else 0.0  # NaN too
+        cells[j] = int(min(inside, count - 1.0))
+        gathered[WITHIN, j] = at - cells[j]
+    return rate
 
 
 @called
-def shapes_at(system, b, s, modes, components, out):
-    """The columns above of each mode, into out (n, AT_PLACE), of the first ``components`` of 6."""
-    cell, x, rate = cell_at(system, b, s)
-    for i in range(modes):
-        for component in range(components):
-            c = system.track[b, cell, :, component, i]
-            c0, c1, c2, c3, c4, c5 = c[0], c[1], c[2], c[3], c[4], c[5]
-            k = component if component < 3 else TURN + component - 3
-            out[i, k] = c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
-            out[i, k + SLOPE] = rate * (c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5))))
-            out[i, k + CURVE] = rate * rate * (2.0 * c2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5)))
+def shapes_at(system, b, s, components, work):
+    """The columns above of each mode, into work.modes (n, AT_PLACE, LANES), of the first ``components`` of 6."""
+    c, rate = work.gathered, enter_cells(system, b, s, work.cells, work.gathered)
+    x = lanes_at(c, (WITHIN,))
+    for component in range(components):
+        k = component if component < 3 else TURN + component - 3
+        for i in range(system.tree[b, MODES]):
+            if not system.bends[b, component, i]:
+                put_lanes(work.modes, (i, k), all_lanes(0.0))
+                put_lanes(work.modes, (i, k + SLOPE), all_lanes(0.0))
+                put_lanes(work.modes, (i, k + CURVE), all_lanes(0.0))
+                continue
+            for j in range(LANES):
+                for power in range(POWERS):
+                    c[power, j] = system.track[b, work.cells[j], power, component, i]
+            c1, c2, c3 = lanes_at(c, (1,)), lanes_at(c, (2,)), lanes_at(c, (3,))
+            c4, c5 = lanes_at(c, (4,)), lanes_at(c, (5,))
+            shape = lanes_at(c, (0,)) + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
+            slope = rate * (c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * (5.0 * c5)))))
+            curve = rate * rate * (2.0 * c2 + x * (6.0 * c3 + x * (12.0 * c4 + x * (20.0 * c5))))
+            put_lanes(work.modes, (i, k), shape)
+            put_lanes(work.modes, (i, k + SLOPE), slope)
+            put_lanes(work.modes, (i, k + CURVE), curve)
 
 
 @called
-def foreshortening_at(system, b, s, pair):
-    """G of a pair of modes at a place, 1/(kg m): up to there the track is shorter by half of sum G_ij q_i q_j."""
-    cell, x, _ = cell_at(system, b, s)
-    found = 0.0
-    for power in range(6):
-        found = found * x + system.foreshortening[b, cell, 5 - power, pair]
+def foreshortening_at(system, b, pair, work):
+    """G of a pair of modes at the place whose cells were entered last, 1/(kg m): up to there the track is shorter by
+    half of sum G_ij q_i q_j."""
+    c, x, found = work.gathered, lanes_at(work.gathered, (WITHIN,)), all_lanes(0.0)
+    for power in range(POWERS - 1, -1, -1):
+        for j in range(LANES):
+            c[power, j] = system.foreshortening[b, work.cells[j], power, pair]
+        found = found * x + lanes_at(c, (power,))
     return found
 
 
 @called
 def combined(table, first_row, column, modes, q, first):
-    """sum_i of three columns times coordinates q, the first of which has that number."""
-    x, y, z = 0.0, 0.0, 0.0
+    """sum_i of three columns, which all lanes share, times coordinates q, the first of which has that number."""
+    x, y, z = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
     for i in range(modes):
-        x += table[first_row + i, column] * q[first + i]
-        y += table[first_row + i, column + 1] * q[first + i]
-        z += table[first_row + i, column + 2] * q[first + i]
+        own = lanes_at(q, (first + i,))
+        x = x + table[first_row + i, column] * own
+        y = y + table[first_row + i, column + 1] * own
+        z = z + table[first_row + i, column + 2] * own
+    return x, y, z
+
+
+@called
+def combined_there(at, column, modes, q, first):
+    """sum_i of three columns of modes at a place (n, AT_PLACE, LANES) times coordinates q."""
+    x, y, z = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    for i in range(modes):
+        own = lanes_at(q, (first + i,))
+        x = x + lanes_at(at, (i, column)) * own
+        y = y + lanes_at(at, (i, column + 1)) * own
+        z = z + lanes_at(at, (i, column + 2)) * own
     return x, y, z

@@ -1,10 +1,11 @@
-"""Vectors and rotations in space, as tuples of three and of three rows."""
+"""Vectors and rotations in space, as tuples of three and of three rows: of numbers that all lanes share, or of rows of
+lanes (`engine.kernels.vector`)."""
 
 from math import factorial
 
-import numpy as np
-
 from engine.kernels.jit import called
+from engine.kernels.sines import PI, sin_cos
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
 
 #: Terms of the series of `coefficients`, (-1)^k / (2 k + 1, 2 or 3)!, highest first: what is left out is below 1e-17
 #: for x < 0.3. Of the last two the derivatives.
@@ -72,40 +73,55 @@ def row_of(e, D):
 
 
 @called
-def vector(table, i, k):
-    """Three columns of a row."""
+def shared_vector(table, i, k):
+    """Three columns of a row of a table that all lanes share."""
     return table[i, k], table[i, k + 1], table[i, k + 2]
 
 
 @called
+def shared_matrix(table, i, k):
+    """Nine columns of a row of a table that all lanes share."""
+    return shared_vector(table, i, k), shared_vector(table, i, k + 3), shared_vector(table, i, k + 6)
+
+
+@called
+def no_vector():
+    """Zeros in every lane."""
+    return all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+
+
+@called
+def vector(table, i, k):
+    """Three columns of a row of a table of lanes."""
+    return lanes_at(table, (i, k)), lanes_at(table, (i, k + 1)), lanes_at(table, (i, k + 2))
+
+
+@called
 def matrix(table, i, k):
-    """Nine columns of a row."""
-    return (
-        (table[i, k], table[i, k + 1], table[i, k + 2]),
-        (table[i, k + 3], table[i, k + 4], table[i, k + 5]),
-        (table[i, k + 6], table[i, k + 7], table[i, k + 8]),
-    )
+    """Nine columns of a row of a table of lanes."""
+    return vector(table, i, k), vector(table, i, k + 3), vector(table, i, k + 6)
 
 
 @called
 def keep_vector(table, i, k, a):
     """A vector into three columns of a row."""
-    table[i, k], table[i, k + 1], table[i, k + 2] = a[0], a[1], a[2]
+    put_lanes(table, (i, k), a[0])
+    put_lanes(table, (i, k + 1), a[1])
+    put_lanes(table, (i, k + 2), a[2])
 
 
 @called
 def add_vector(table, i, k, a):
     """A vector added to three columns of a row."""
-    table[i, k] += a[0]
-    table[i, k + 1] += a[1]
-    table[i, k + 2] += a[2]
+    keep_vector(table, i, k, add(vector(table, i, k), a))
 
 
 @called
 def keep_matrix(table, i, k, E):
     """A matrix into nine columns of a row."""
-    for j in range(3):
-        keep_vector(table, i, k + 3 * j, E[j])
+    keep_vector(table, i, k, E[0])
+    keep_vector(table, i, k + 3, E[1])
+    keep_vector(table, i, k + 6, E[2])
 
 
 @called
@@ -117,7 +133,7 @@ def axial(H):
 @called
 def series(terms, x):
     """A power series, the highest power first."""
-    found = 0.0
+    found = all_lanes(0.0)
     for term in terms:
         found = found * x + term
     return found
@@ -126,13 +142,24 @@ def series(terms, x):
 @called
 def coefficients(x):
     """sin(t)/t, (1 - cos t)/t^2, (t - sin t)/t^3 for x = t^2, and the derivatives of the last two by x."""
-    if x < 0.3:
-        return series(FIRST, x), series(SECOND, x), series(THIRD, x), series(SECOND_RATE, x), series(THIRD_RATE, x)
-    t = np.sqrt(x)
-    a = np.sin(t) / t
-    b = (1.0 - np.cos(t)) / x
-    c = (1.0 - a) / x
-    return a, b, c, 0.5 * (a - 2.0 * b) / x, 0.5 * (b - 3.0 * c) / x
+    a, b, c = series(FIRST, x), series(SECOND, x), series(THIRD, x)
+    db, dc = series(SECOND_RATE, x), series(THIRD_RATE, x)
+    near = x < 0.3
+    if everywhere(near):
+        return a, b, c, db, dc
+    x = choose(near, 1.0, x)
+    t = root(x)
+    sine, cosine = sin_cos(t / PI)
+    far_a = sine / t
+    far_b = (1.0 - cosine) / x
+    far_c = (1.0 - far_a) / x
+    return (
+        choose(near, a, far_a),
+        choose(near, b, far_b),
+        choose(near, c, far_c),
+        choose(near, db, 0.5 * (far_a - 2.0 * far_b) / x),
+        choose(near, dc, 0.5 * (far_b - 3.0 * far_c) / x),
+    )
 
 
 @called
