@@ -78,10 +78,10 @@ class ElasticBody:
         x = np.linspace(0.0, self.length, CELLS + 1)
         nodes, weights = np.polynomial.legendre.leggauss(6)
         inner = (x[:-1, None] + 0.5 * (nodes + 1.0) * (self.length / CELLS)).reshape(-1)
-        rates = self._bent(inner)[0].reshape(CELLS, nodes.size, n, n)
+        rates = self.bent(inner)[0].reshape(CELLS, nodes.size, n, n)
         within = np.einsum("g,cgij->cij", weights, rates) * (0.5 * self.length / CELLS)
         whole = np.concatenate([np.zeros((1, n, n)), np.cumsum(within, axis=0)])
-        values = np.stack([whole, *self._bent(x)])
+        values = np.stack([whole, *self.bent(x)])
         return hermite(values, self.length / CELLS).reshape(CELLS, 6, n * n)
 
     def stiffening(self) -> tuple[Array, Array]:
@@ -95,11 +95,11 @@ class ElasticBody:
         ends = np.concatenate([[0.0], x])
         spans = np.diff(ends)
         inner = (ends[:-1, None] + 0.5 * (nodes + 1.0) * spans[:, None]).reshape(-1)
-        rates = self._bent(inner)[0].reshape(x.size, nodes.size, n, n)
+        rates = self.bent(inner)[0].reshape(x.size, nodes.size, n, n)
         whole = np.cumsum(np.einsum("g,x,xgij->xij", weights, 0.5 * spans, rates), axis=0)
         return np.einsum("x,xij->ij", dm, whole), np.einsum("x,x,xij->ij", dm, x, whole)
 
-    def _bent(self, x: Array) -> tuple[Array, Array]:
+    def bent(self, x: Array) -> tuple[Array, Array]:
         """(S, N, N) twice: v_i' v_j' + w_i' w_j', and its derivative."""
         one, two = self.fields(x, (1, 2))
         across = slice(Y, Z + 1)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 OWN_KEYS = re.compile(
     r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?"
     r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|inertia\.\d|height)|carriage\.\w+\.motion\.(?!cycles$).+"
+    r"|load\.\w+\.(force|torque)(_per_metre)?\.\d|load\.\w+\.course\..+|spring\.\w+\.(stiffness|damping|length)"
     r"|frame\.\w+\.joints\.\d+\.(start|rate(\.\d)?|velocity\.\d|stiffness|damping|motion\..+)"
 )
 
@@ -58,7 +59,9 @@ def lanes(model: FloatingModel, values: VariantValues, step: Array) -> Lane:
     for c, name in enumerate(model.study.carriage):
         _carriage(model, numbers, name, start, carriages[:, c])
     motions = _motions(model, numbers)
-    return Lane(gravity, _damping(model, values), joints, carriages, motions, _events(motions), start, step[:, None])
+    loads, links = _loads(model, numbers), _links(model, numbers)
+    events, damping = _events(motions), _damping(model, values)
+    return Lane(gravity, damping, joints, carriages, motions, events, start, loads, links, step[:, None])
 
 
 def in_blocks(table: Array) -> Array:
@@ -109,6 +112,24 @@ def _carriage(model: FloatingModel, numbers: Numbers, name: str, start: Array, o
             own[:, column] = numbers.of(f"{key}.motion.{word}")
 
 
+def _loads(model: FloatingModel, numbers: Numbers) -> Array:
+    """(V, Q, 6): force and torque of every load at its grip."""
+    found = np.zeros((numbers.values.size, len(model.loads), 6))
+    for q, load in enumerate(model.loads):
+        for k, key in (*enumerate(load.force), *enumerate(load.torque, 3)):
+            found[:, q, k] = numbers.of(key)
+    return found
+
+
+def _links(model: FloatingModel, numbers: Numbers) -> Array:
+    """(V, K, 3): stiffness, damping and free length of every spring between places."""
+    found = np.zeros((numbers.values.size, len(model.links), 3))
+    for k, name in enumerate(model.study.spring):
+        for column, word in enumerate(("stiffness", "damping", "length")):
+            found[:, k, column] = numbers.of(f"spring.{name}.{word}")
+    return found
+
+
 def _damping(model: FloatingModel, values: VariantValues) -> Array:
     """(V, B n): 2 zeta omega."""
     n = max(1, *(body.omega.size for body in model.bodies.values()))
@@ -144,4 +165,8 @@ def _pieces(model: FloatingModel, numbers: Numbers, key: str) -> Array:
         joint = model.frame(name).joints[int(rest[1])]
         assert isinstance(joint, AxisJoint) and joint.motion is not None
         return joint.motion.pieces(lambda word: numbers.of(f"{key}.{word}"))
+    if table == "load":
+        course = model.study.load[name].course
+        assert course is not None
+        return course.pieces(lambda word: numbers.of(f"{key}.{word}"))
     return model.study.carriage[name].motion.pieces(lambda word: numbers.of(f"{key}.{word}"))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.floating.elastic import ABOUT_X, CELLS, ElasticBody, Y, Z, elastic_body
+from engine.floating.grips import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
@@ -45,7 +46,7 @@ class FloatingModel:
     """One scene with frames that move. bodies: in the order of the tree, by name; modes: of bending, where left open.
 
     motions: dotted keys of what is given in time, in order; size: number of coordinates; places, springs: coordinates
-    of carriages that slide and of sprung masses, by carriage.
+    of carriages that slide and of sprung masses, by carriage; loads; links: the ends of springs between places.
     """
 
     study: Study
@@ -56,6 +57,8 @@ class FloatingModel:
     springs: dict[str, int]
     motions: tuple[str, ...]
     size: int
+    loads: tuple[LoadAt, ...]
+    links: tuple[tuple[Grip, Grip], ...]
 
     def frame(self, name: str) -> Frame:
         """How a body's frame moves."""
@@ -136,7 +139,9 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
             springs[name], size = size, size + 1
     if size == 0:
         raise BadInput("nothing here can move by itself", where=study.source.where("frame"), expected="a joint, a mode")
-    found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size)
+    loads, links = tuple(loads_of(study, bodies)), tuple(springs_of(study, bodies))
+    motions += dict.fromkeys(load.course for load in loads if load.course)
+    found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)
     _check_held(found)
     return found
 
@@ -289,10 +294,12 @@ def _system(model: FloatingModel) -> System:
         tree[b] = parent, model.first[name], N, joint, joint + own, int(parent < 0 and own == 0)
         joint += own
         _fill_integrals(body, numbers[b], modes[b, :N], pairs[b, :N, :N])
-        _hang(model, name, numbers[b], modes[b])
+        _hang(model, name, numbers[b], modes[b], pairs[b])
         if N:
             track[b, ..., :N] = body.track()
             shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
+    loads = list(enumerate(model.loads))
+    grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
     return System(
         tree,
         numbers,
@@ -304,6 +311,12 @@ def _system(model: FloatingModel) -> System:
         np.any(track != 0.0, axis=(1, 2)),
         shorter.reshape(B, CELLS, 6, n * n),
         _riders(model, names),
+        *grip_tables(list(model.bodies.values()), grips, n),
+        np.array(
+            [(q, int(load.in_body), model.motions.index(load.course) if load.course else -1) for q, load in loads],
+            dtype=np.int64,
+        ).reshape(-1, 3),
+        len(model.loads) + np.arange(2 * len(model.links)).reshape(-1, 2),
         np.arange(B, dtype=np.int64),
         _ends(model, n),
         *_readings(model),
@@ -331,7 +344,7 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
     pairs[:, :, columns.STIFFENING], pairs[:, :, columns.STIFFENING + 1] = whole, along
 
 
-def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array) -> None:
+def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, pairs: Array) -> None:
     """Where a body hangs."""
     from scipy.spatial.transform import Rotation
 
@@ -348,6 +361,7 @@ def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array) -> None
         N = parent.omega.size
         modes[:N, columns.HANGING_SHAPE : columns.HANGING_SHAPE + 3] = fields[:3].T
         modes[:N, columns.HANGING_TURN : columns.HANGING_TURN + 3] = fields[3:].T
+        pairs[:N, :N, columns.HANGING_SHORTER] = shorter_at(parent, np.array([at]))[0]
 
 
 def _riders(model: FloatingModel, names: list[str]) -> Counts:

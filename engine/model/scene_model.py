@@ -249,8 +249,9 @@ def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
 
 
 def check_stands(study: Study) -> None:
-    """Refuse bodies whose frames move and carriages that slide by themselves. Raises BadInput."""
+    """Refuse what belongs to bodies whose frames move, and carriages that slide by themselves. Raises BadInput."""
     movers = [f"frame.{name}" for name in study.frame]
+    movers += [f"{table}.{name}" for table in ("load", "spring") for name in getattr(study, table)]
     movers += [f"carriage.{name}.motion" for name, carriage in study.carriage.items() if carriage.motion.slides]
     if movers:
         what = f"in studies of the kind {study.kind} bodies stand, and carriages go where they are told"

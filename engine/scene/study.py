@@ -17,6 +17,7 @@ from engine.bodies.modal.description import Recorded, Spots
 from engine.bodies.modal.section_doubts import Doubt
 from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.frames import GROUND, Frame
+from engine.scene.loads import Load, Spring
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
@@ -65,6 +66,8 @@ class Scene(Trains):
     initial: Literal["rest", "equilibrium"] | None = None
     body: dict[str, AnyBody] = Field(default_factory=dict)
     frame: dict[str, Frame] = Field(default_factory=dict)
+    load: dict[str, Load] = Field(default_factory=dict)
+    spring: dict[str, Spring] = Field(default_factory=dict)
     carriage: dict[str, AnyCarriage] = Field(default_factory=dict)
     sensor: dict[str, Sensor] = Field(default_factory=dict)
     envelope: dict[str, Envelope] = Field(default_factory=dict)
@@ -285,6 +288,9 @@ def checks(study: Study) -> Iterator[Check]:
         yield from body.checks(f"body.{name}")
     for name, frame in study.frame.items():
         yield from frame.checks(name)
+    for table in (study.load, study.spring):
+        for name, own in table.items():
+            yield from own.checks(name)
     for name, carriage in study.carriage.items():
         yield from carriage.checks(f"carriage.{name}")
     for name, sensor in study.sensor.items():
@@ -348,6 +354,8 @@ def _check_names(study: Study) -> None:
     tables: dict[str, Iterable[str]]
     tables = {
         "body": study.body,
+        "load": study.load,
+        "spring": study.spring,
         "train": study.train,
         "carriage": study.carriage,
         "sensor": study.sensor,
@@ -359,7 +367,7 @@ def _check_names(study: Study) -> None:
             where = study.source.where(f"{table}.{name}")
             if not NAME.fullmatch(name):
                 raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
-            if table != "body" and name in RESERVED:
+            if table not in ("body", "load", "spring") and name in RESERVED:
                 raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
     sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
     envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
@@ -379,6 +387,12 @@ def _check_references(study: Study) -> None:
         _must_exist(study, f"frame.{name}", name, "body")
         if frame.on != GROUND:
             _must_exist(study, f"frame.{name}.on", frame.on, "body")
+    for name, load in study.load.items():
+        _must_exist(study, f"load.{name}.on", load.on, "body")
+    for name, spring in study.spring.items():
+        for number, end in enumerate(spring.ends):
+            if end.on != GROUND:
+                _must_exist(study, f"spring.{name}.ends.{number}.on", end.on, "body")
     for name, carriage in study.carriage.items():
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():

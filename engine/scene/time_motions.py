@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from engine.study_file.spec import KindOf, Spec, kinds
-from engine.study_file.units import Angle, AngularRate, Frequency, Length, Speed, Time, fault
+from engine.study_file.units import Angle, AngularRate, Dimensionless, Frequency, Length, Rate, Speed, Time, fault
 from results_schema.arrays import Array
 
 #: Columns of a piece: start (s); coefficients of a polynomial of degree 5 in the time since then, constant first;
@@ -22,7 +22,7 @@ Number = Callable[[str], Array]  # (V,) of a key of the motion, for every varian
 
 
 class TimeMotion(Spec):
-    """Base of the motions of joints."""
+    """Base of the motions of joints, and of the courses of loads, which are factors without a unit."""
 
     if TYPE_CHECKING:
 
@@ -44,8 +44,8 @@ class Steady(TimeMotion):
     """start + rate t."""
 
     kind: Literal["steady"]
-    start: float = 0.0
-    rate: float
+    start: Dimensionless = 0.0
+    rate: Rate
 
     def pieces(self, number: Number) -> Array:
         found = blank(number("rate"), 1)
@@ -57,8 +57,8 @@ class Swing(TimeMotion):
     """centre + amplitude sin(2 pi f t)."""
 
     kind: Literal["swing"]
-    centre: float = 0.0
-    amplitude: float
+    centre: Dimensionless = 0.0
+    amplitude: Dimensionless
     frequency: Frequency = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
@@ -91,7 +91,7 @@ class Points(TimeMotion):
 
     kind: Literal["waypoints"]
     times: Annotated[tuple[Time, ...], Strict(False), Field(min_length=2, max_length=1000)]
-    values: tuple[float, ...]
+    values: Annotated[tuple[Dimensionless, ...], Strict(False), Field(min_length=2, max_length=1000)]
 
     @model_validator(mode="after")
     def _ascending(self) -> Points:
@@ -176,8 +176,10 @@ SLIDING = kinds(
     SpinUpSlide,
     PointsSlide,
 )
+COURSES = kinds("course of a load", "wanderlast.courses", TimeMotion, Steady, Swing, Points)
 AnyTurning = Annotated[TimeMotion, KindOf("motion of a joint that turns", TURNING)]
 AnySliding = Annotated[TimeMotion, KindOf("motion of a joint that slides", SLIDING)]
+AnyCourse = Annotated[TimeMotion, KindOf("course of a load", COURSES)]
 
 
 def spline_pieces(number: Number, count: int, key: str) -> Array:

@@ -22,6 +22,7 @@ from engine.floating.model import FloatingModel, build
 from engine.kernels.floating import equations
 from engine.kernels.floating.layout import Coordinates, Lane
 from engine.kernels.floating.motions import motions_at
+from engine.kernels.floating.work import room
 from engine.kernels.layout import LANES
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
@@ -181,7 +182,7 @@ def left_of(module: ModuleType, model: FloatingModel, y: np.ndarray, u: np.ndarr
     """What is left of the equations, by the kernels of a module, in the second lane; others stand elsewhere."""
     table = lanes(model, VariantValues(model.study, {}, 1), np.ones(1))
     lane = Lane(*(in_blocks(part)[0] for part in table))
-    work, out = module.room(model.system, lane), np.zeros((y.size, LANES))
+    work, out = room(model.system, lane), np.zeros((y.size, LANES))
     now = np.zeros(LANES)
     motions_at(lane.motions, now, now, work.piece, work.motions)
     scaled = np.arange(LANES, dtype=np.float64)

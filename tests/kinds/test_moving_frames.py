@@ -89,6 +89,8 @@ def test_open_modes_are_found() -> None:
 
 
 def test_every_kind_that_keeps_bodies_still_refuses_frames() -> None:
+    with pytest.raises(BadInput, match=r"load\.push"):
+        kind_of(Study(kind="eigenfrequencies", body={"arm": ARM}, load={"push": {"on": "arm", "force": [0, 0, 1]}}))
     data = {key: value for key, value in sliding_mass().data.items() if key not in ("schema_version", "question")}
     with pytest.raises(BadInput, match="carriages go where they are told") as refused:
         kind_of(Study(**(data | {"kind": "trajectory"})))
@@ -104,6 +106,7 @@ LOAD = {"kind": "mass", "on": "beam", "mass": 1.0, "motion": {"kind": "free", "s
 REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
 PRISMATIC = {"kind": "prismatic", "axis": [0, 1, 0]}
 STEADY = {"kind": "steady", "rate": "1 deg/s"}
+TOP = {"position": [0, 0, 1]}
 
 
 @pytest.mark.parametrize(
@@ -123,6 +126,15 @@ STEADY = {"kind": "steady", "rate": "1 deg/s"}
         ({"frame": {"beam": {"joints": [REVOLUTE | {"rate": "1 Hz"}]}}}, r"rate of turning \(rad s-1\)"),
         ({"frame": {"beam": {"joints": [PRISMATIC | {"start": "1 deg"}]}}}, r"a length \(m\)"),
         ({"frame": {"beam": {"joints": [PRISMATIC | {"motion": STEADY}]}}}, "a speed"),
+        ({"load": {"p": {"on": "other", "force": [0, 0, 1]}}}, "no such body"),
+        ({"load": {"p": {"on": "beam"}}}, "a load without a force"),
+        ({"load": {"p": {"on": "beam", "at": 20.0, "force": [0, 0, 1]}}}, "a load off its body"),
+        ({"load": {"p": {"on": "beam", "force_per_metre": [0, 0, 1]}}}, "does not fit this load"),
+        ({"load": {"p": {"on": "beam", "between": [3, 2], "force_per_metre": [0, 0, 1]}}}, "begins at the one"),
+        ({"load": {"p": {"on": "beam", "force": [0, 0, "1 N m"]}}}, r"a force \(N\)"),
+        ({"spring": {"s": {"ends": [{"on": "beam"}, {}], "length": 1.0}}}, "on a body or over the ground"),
+        ({"spring": {"s": {"ends": [{"on": "beam", "at": -1}, TOP], "length": 1.0}}}, r"ends\.0\.at"),
+        ({"spring": {"s": {"ends": [{"on": "that"}, TOP], "length": 1.0}}}, "no such body"),
         ({"frame": {"beam": {"lateral_modes": 2}}}, "lateral_second_moment"),
         ({"sensor": {"under": {"under": "load", "quantity": "velocity"}}}, "only the displacement"),
     ],
@@ -189,3 +201,35 @@ def test_a_job_without_histories() -> None:
     found = studies.run(study)
     assert found["load_position_max"].notnull().all()
     assert found.sizes["history"] < 90
+
+
+def test_numbers_of_loads_and_springs_may_be_swept() -> None:
+    """Each variant has its own, with units; one by one they are the same."""
+    tables: dict[str, object] = {
+        "body": {"arm": ARM | {"modes": 2}},
+        "load": {
+            "push": {
+                "on": "arm",
+                "between": [2, "800 cm"],
+                "force_per_metre": [0, 0, "2 N/m"],
+                "torque_per_metre": [0, "1 N m/m", 0],
+                "course": {"kind": "swing", "amplitude": 1.0, "frequency": 0.3},
+            }
+        },
+        "spring": {"prop": {"ends": [{"on": "arm"}, {"position": [10, 0, 1]}], "length": 1, "stiffness": "20 N/m"}},
+        "sensor": {"tip": {"body": "arm", "at": 10.0}},
+    }
+    sweep = {
+        "push": {"of": "load.push.force_per_metre.2", "values": ["1 N/m", "3 N/m"]},
+        "often": {"of": "load.push.course.frequency", "values": [0.2, 0.5]},
+        "soft": {"of": "spring.prop.stiffness", "values": [0.0, "1 kN/m"]},
+    }
+    study = Study(kind="moving-frames", gravity=0.0, question={"duration": 4.0}, sweep=sweep, **tables)
+    found = studies.run(study)
+    assert (found["status"] == Status.OK).all()
+    for place in np.ndindex(2, 2, 2):
+        own = {axis["of"]: axis["values"][k] for axis, k in zip(sweep.values(), place, strict=True)}
+        alone = studies.run(
+            Study(kind="moving-frames", gravity=0.0, question={"duration": 4.0}, **tables).with_values(own)
+        )
+        assert found["tip_max"].values[place] == pytest.approx(float(alone["tip_max"]), rel=1e-9)

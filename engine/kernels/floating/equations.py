@@ -5,10 +5,6 @@ Frames are followed from the ground outward, forces gathered back inward (recurs
 Gravity is an acceleration of the ground upward.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
 from engine.kernels.floating.layout import (
     COORDINATE,
     COULOMB,
@@ -19,6 +15,7 @@ from engine.kernels.floating.layout import (
     FIRST_JOINT,
     FIRST_ORDER,
     HANGING_SHAPE,
+    HANGING_SHORTER,
     HANGING_TURN,
     HEIGHT,
     INERTIA,
@@ -31,7 +28,6 @@ from engine.kernels.floating.layout import (
     ORIGIN,
     OWN_MASS,
     PARENT,
-    PIECE,
     PLACE,
     PLACE_COORDINATE,
     PLACE_MOTION,
@@ -53,10 +49,9 @@ from engine.kernels.floating.layout import (
     TURNED,
     VISCOUS,
 )
+from engine.kernels.floating.loads import link_forces, load_forces
 from engine.kernels.floating.tracks import (
-    AT_PLACE,
     CURVE,
-    GATHERED,
     SHAPE,
     SLOPE,
     TURN,
@@ -88,72 +83,30 @@ from engine.kernels.floating.vectors import (
     turned_out,
     vector,
 )
-from engine.kernels.jit import called, piece
-from engine.kernels.layout import LANES, FloatArray, IntArray
+from engine.kernels.floating.work import (
+    ACCELERATION,
+    ANGULAR,
+    ATTITUDE,
+    CONTACT,
+    FORCE,
+    HANGING,
+    HANGING_PLACE,
+    HANGING_TURNED,
+    JOINT_SHIFT,
+    JOINT_TURNED,
+    POSITION,
+    SPIN,
+    TORQUE,
+    TOUCHED,
+    VELOCITY,
+    add_to,
+    three_at,
+)
+from engine.kernels.jit import called
 from engine.kernels.sines import hyperbolic_tangent
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
 
 NOTHING = (0.0, 0.0, 0.0)
-
-# columns of Work.frames: attitude to the ground and position over it; velocity, spin, acceleration less gravity and
-# angular acceleration, resolved in the frame; force, and torque about its origin, that the body needs; the place where
-# it hangs on its parent, the rotation vector there and its matrix
-ATTITUDE, POSITION, VELOCITY, SPIN, ACCELERATION, ANGULAR, FORCE, TORQUE = 0, 9, 12, 15, 18, 21, 24, 27
-HANGING_PLACE, HANGING, HANGING_TURNED, FRAME = 30, 33, 36, 45
-# columns of Work.joints: its rotation, or its shift
-JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
-# columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
-CONTACT, TOUCHED, CONTACTS = 0, 3, 6
-
-
-class Work(NamedTuple):
-    """Room for a block of lanes, the last axis of each, of frames (B, FRAME), joints (J, JOINT), contacts (C,
-    CONTACTS), modes at a place (n, AT_PLACE) and first moments of a body's modes (n, 9); the motions (M, 3) as given
-    now: value, rate and acceleration; base (J, 9): attitudes of spherical joints at the start of the step; cells, and
-    gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion."""
-
-    frames: FloatArray
-    joints: FloatArray
-    contacts: FloatArray
-    modes: FloatArray
-    moments: FloatArray
-    motions: FloatArray
-    base: FloatArray
-    cells: IntArray
-    gathered: FloatArray
-    piece: FloatArray
-
-
-@piece
-def room(system, lane):
-    """Work for a block of lanes, the joints not turned yet."""
-    widest = system.track.shape[4]
-    base = np.zeros((system.axes.shape[0], 9, LANES))
-    base[:, 0], base[:, 4], base[:, 8] = 1.0, 1.0, 1.0
-    return Work(
-        np.zeros((system.tree.shape[0], FRAME, LANES)),
-        np.zeros((system.axes.shape[0], JOINT, LANES)),
-        np.zeros((system.riders.shape[0], CONTACTS, LANES)),
-        np.zeros((widest, AT_PLACE, LANES)),
-        np.zeros((widest, 9, LANES)),
-        np.zeros((lane.motions.shape[0], 3, LANES)),
-        base,
-        np.zeros(LANES, np.int64),
-        np.zeros((GATHERED, LANES)),
-        np.zeros((PIECE + 1, LANES)),
-    )
-
-
-@called
-def add_to(out, k, row):
-    """A row of lanes added to another."""
-    put_lanes(out, (k,), lanes_at(out, (k,)) + row)
-
-
-@called
-def three_at(x, k):
-    """Rows k to k + 2."""
-    return lanes_at(x, (k,)), lanes_at(x, (k + 1,)), lanes_at(x, (k + 2,))
 
 
 @called
@@ -172,6 +125,10 @@ def residual(system, lane, x, work, out):
             body_forces(system, lane, b, x, work, out)
     for c in range(system.riders.shape[0]):
         carriage_forces(system, lane, c, x, work, out)
+    for q in range(system.load_table.shape[0]):
+        load_forces(system, lane, q, x, work, out)
+    for k in range(system.links.shape[0]):
+        link_forces(system, lane, k, x, work, out)
     for b in range(bodies - 1, -1, -1):
         if not system.tree[b, RESTS]:
             gather(system, lane, b, x, work, out)
@@ -564,6 +521,10 @@ def gather(system, lane, b, x, work, out):
         for i in range(n):
             turning = spin_of(t, shared_vector(system.modes, row + i, HANGING_TURN))
             add_to(out, first + i, dot(shared_vector(system.modes, row + i, HANGING_SHAPE), F) + dot(turning, T))
+            if system.bodies[p, STIFFENS] > 0.0:  # the track up to there grows shorter as it bends
+                for j in range(n):
+                    shorter = system.pairs[(row + i) * system.track.shape[4] + j, HANGING_SHORTER]
+                    add_to(out, first + i, -shorter * lanes_at(x.y, (first + j,)) * F[0])
     add_vector(work.frames, p, FORCE, F)
     add_vector(work.frames, p, TORQUE, add(T, cross(vector(work.frames, b, HANGING_PLACE), F)))
 

@@ -27,8 +27,8 @@ MASS, MOMENT, SECOND, PLACE, TURNED, LENGTH, ORIGIN, STIFFENS, BODY = 0, 1, 4, 1
 # the parent, of the place where body b hangs
 TRANSLATION, FIRST_ORDER, HANGING_SHAPE, HANGING_TURN, MODE = 0, 3, 12, 15, 18
 # columns of System.pairs, row (b n + i) n + j: integral of phi_i phi_j^T dm; stiffness; int G dm and int x G dm with
-# G(x) = int_0^x (v_i' v_j' + w_i' w_j'); modal mass
-SECOND_ORDER, STIFFNESS, STIFFENING, MODAL_MASS, PAIR = 0, 9, 10, 12, 13
+# G(x) = int_0^x (v_i' v_j' + w_i' w_j'); modal mass; G, of modes of the parent, where body b hangs
+SECOND_ORDER, STIFFNESS, STIFFENING, MODAL_MASS, HANGING_SHORTER, PAIR = 0, 9, 10, 12, 13, 14
 # columns of System.joint_table: kind, first coordinate or -1 where its motion is given, the number of that motion or
 # -1; a joint with both is controlled towards the motion
 KIND, COORDINATE, MOTION = 0, 1, 2
@@ -39,6 +39,12 @@ RIDDEN, PLACE_COORDINATE, PLACE_MOTION, SPRUNG_COORDINATE = 0, 1, 2, 3
 OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB, SLIP, CARRIAGE = (
     0, 1, 4, 5, 6, 7, 8, 9, 10, 11, 12,
 )  # fmt: skip
+# columns of System.grips: weight, and place times weight; of System.grip_modes, row p n + i: displacement times weight,
+# and rotation, by mode i of its body; of System.load_table: grip, whether it is resolved in the body's axes, and the
+# number of the motion that is its factor or -1
+WEIGHT, ARM, GRIPS = 0, 1, 4
+PUSHED, TWISTED, GRIP_MODE = 0, 3, 6
+GRIP, IN_BODY, COURSE = 0, 1, 2
 # columns of a piece of a motion: its start (s), a polynomial of degree 5, and amplitude, rate and phase of a sine
 PIECE = 10
 
@@ -50,7 +56,9 @@ class System(NamedTuple):
     joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
     track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
     5 in equal cells; bends (B, 6, n): which of them are not zero; foreshortening (B, cells, 6, n n): G likewise.
-    riders (C, 4). points (P, 3 + 3 n), pointed (P): places whose position over
+    riders (C, 4). gripped (P): bodies of grips, -1 for the ground; grips (P, GRIPS), grip_modes (P n, GRIP_MODE);
+    grip_shorter (P, n n): G there times weight. load_table (Q, 3); links (K, 2): grips between which springs are.
+    points (P, 3 + 3 n), pointed (P): places whose position over
     the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations.
@@ -66,6 +74,12 @@ class System(NamedTuple):
     bends: BoolArray
     foreshortening: FloatArray
     riders: IntArray
+    gripped: IntArray
+    grips: FloatArray
+    grip_modes: FloatArray
+    grip_shorter: FloatArray
+    load_table: IntArray
+    links: IntArray
     pointed: IntArray
     points: FloatArray
     readings: FloatArray
@@ -85,7 +99,8 @@ class Lane(NamedTuple):
 
     gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or about
     the given motion. carriages (C, CARRIAGE). motions (M, pieces, PIECE). events (E): ascending times (s) at which a
-    motion goes on as another piece, infinite from the last on. start (2, N): coordinates and velocities. step: s.
+    motion goes on as another piece, infinite from the last on. start (2, N): coordinates and velocities. loads (Q, 6):
+    forces and torques. links (K, 3): stiffness, damping, free length. step: s.
     """
 
     gravity: FloatArray
@@ -95,6 +110,8 @@ class Lane(NamedTuple):
     motions: FloatArray
     events: FloatArray
     start: FloatArray
+    loads: FloatArray
+    links: FloatArray
     step: FloatArray
 
 

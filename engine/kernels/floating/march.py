@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.kernels.floating.equations import Work, follow_frame, residual, room, three_at
+from engine.kernels.floating.equations import follow_frame, residual
 from engine.kernels.floating.layout import (
     COORDINATE,
     DIVERGED,
@@ -36,6 +36,7 @@ from engine.kernels.floating.layout import (
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.observe import observe, observe_whole
 from engine.kernels.floating.vectors import after, dot, keep_matrix, matrix, rotation
+from engine.kernels.floating.work import Work, room, three_at
 from engine.kernels.jit import called, kernel, piece
 from engine.kernels.layout import LANES, FloatArray
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
@@ -553,6 +554,8 @@ def march(system, lanes, scheme, steps, record):
             lanes.motions[block],
             lanes.events[block],
             lanes.start[block],
+            lanes.loads[block],
+            lanes.links[block],
             lanes.step[block],
         )
         march_block(system, lane, scheme, steps, block, room_to_march(system, lane, record), record)

@@ -1,21 +1,7 @@
 """What is observed of a block of lanes at a station: readings of sensors, carriages, points, frames, energy and
 momentum."""
 
-from engine.kernels.floating.equations import (
-    ATTITUDE,
-    CONTACT,
-    POSITION,
-    SPIN,
-    TOUCHED,
-    VELOCITY,
-    add_to,
-    carried,
-    has_attitude,
-    inertia_times,
-    ridden,
-    second_moments,
-    three_at,
-)
+from engine.kernels.floating.equations import carried, has_attitude, inertia_times, ridden, second_moments
 from engine.kernels.floating.layout import (
     COORDINATE,
     FIRST,
@@ -34,6 +20,7 @@ from engine.kernels.floating.layout import (
     STIFFNESS,
     TRANSLATION,
 )
+from engine.kernels.floating.loads import between
 from engine.kernels.floating.tracks import SHAPE, SLOPE, TURN, TURN_SLOPE, combined, combined_there, shapes_at
 from engine.kernels.floating.vectors import (
     add,
@@ -51,8 +38,9 @@ from engine.kernels.floating.vectors import (
     turned_out,
     vector,
 )
+from engine.kernels.floating.work import ATTITUDE, CONTACT, POSITION, SPIN, TOUCHED, VELOCITY, add_to, three_at
 from engine.kernels.jit import called
-from engine.kernels.vector import all_lanes, lanes_at, put_lanes
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes, root
 
 #: Signals of a carriage: place, speed and acceleration along its track; its acceleration resolved in the frame of its
 #: body (3); the contact force, positive where it presses along z; place of its sprung mass. Of a point: place (3). Of a
@@ -158,6 +146,10 @@ def whole(system, lane, x, work, out, first):
             if m >= 0:
                 value = value - lanes_at(work.motions, (m, 0))
             add_to(out, first + 1, 0.5 * lanes_at(lane.joints, (j, 0)) * value * value)
+    for k in range(system.links.shape[0]):
+        d, _, _ = between(system, k, x, work)
+        longer = root(dot(d, d)) - lanes_at(lane.links, (k, 2))
+        add_to(out, first + 1, 0.5 * lanes_at(lane.links, (k, 0)) * longer * longer)
 
 
 @called

@@ -1,0 +1,125 @@
+"""Places of bodies at which loads act and springs hold, as the tables that kernels take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.kernels.floating import layout as columns
+from results_schema.arrays import Array, Counts
+
+if TYPE_CHECKING:
+    from engine.floating.elastic import ElasticBody
+    from engine.scene.loads import SpringEnd
+    from engine.scene.study import Study
+
+FORCES, TORQUES = 40, 12  # places by Gauss of what is evenly along a part of a track
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """Places x (S,) m of a body's track, on which what acts is shared out by weights (S,); the ground has one place,
+    position (3,) m. body: its number, -1 for the ground."""
+
+    body: int
+    x: Array
+    weights: Array
+    position: Array
+
+
+class GripTables(NamedTuple):
+    """gripped (P): bodies; grips (P, GRIP), modes (P n, GRIP_MODE), shorter (P, n n)."""
+
+    gripped: Counts
+    grips: Array
+    modes: Array
+    shorter: Array
+
+
+class LoadAt(NamedTuple):
+    """What of a load acts at one grip. course: the dotted key of its factor in time, or ""; force, torque: dotted keys
+    of three numbers each, or none where it has none."""
+
+    grip: Grip
+    in_body: bool
+    course: str
+    force: tuple[str, ...]
+    torque: tuple[str, ...]
+
+
+def at_place(body: int, x: float) -> Grip:
+    """One place of a body."""
+    return Grip(body, np.array([x]), np.ones(1), np.zeros(3))
+
+
+def loads_of(study: Study, bodies: dict[str, ElasticBody]) -> Iterator[LoadAt]:
+    """The loads of a study, in order: what is along a part as one grip for the force, and one for every place by Gauss
+    for the torque, as rotations of places do not add up."""
+    for name, load in study.load.items():
+        body = list(bodies).index(load.on)
+        course = f"load.{name}.course" if load.course is not None else ""
+        force, torque = (
+            tuple(f"load.{name}.{key}.{axis}" for axis in range(3)) if getattr(load, key) is not None else ()
+            for key in load.keys
+        )
+        in_body = load.axes == "body"
+        if load.between is None:
+            at = bodies[load.on].length if load.at is None else load.at
+            yield LoadAt(at_place(body, at), in_body, course, force, torque)
+            continue
+        if force:
+            yield LoadAt(Grip(body, *_gauss(*load.between, FORCES), np.zeros(3)), in_body, course, force, ())
+        if torque:
+            for x, weight in zip(*_gauss(*load.between, TORQUES), strict=True):
+                grip = Grip(body, np.array([x]), np.array([weight]), np.zeros(3))
+                yield LoadAt(grip, in_body, course, (), torque)
+
+
+def _gauss(start: float, end: float, count: int) -> tuple[Array, Array]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    half = 0.5 * (end - start)
+    return start + half * (nodes + 1.0), half * weights
+
+
+def springs_of(study: Study, bodies: dict[str, ElasticBody]) -> Iterator[tuple[Grip, Grip]]:
+    """The two grips of every spring."""
+
+    def grip(end: SpringEnd) -> Grip:
+        if end.position is not None:
+            return Grip(-1, np.zeros(1), np.ones(1), np.array(end.position))
+        return at_place(list(bodies).index(end.on), bodies[end.on].length if end.at is None else end.at)
+
+    return ((grip(spring.ends[0]), grip(spring.ends[1])) for spring in study.spring.values())
+
+
+def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int) -> GripTables:
+    """The tables of `engine.kernels.floating.layout.System` of some grips."""
+    table, modes = np.zeros((len(grips), columns.GRIPS)), np.zeros((len(grips), n, columns.GRIP_MODE))
+    pairs = np.zeros((len(grips), n, n))
+    for p, grip in enumerate(grips):
+        table[p, columns.WEIGHT] = grip.weights.sum()
+        table[p, columns.ARM : columns.ARM + 3] = grip.position
+        if grip.body < 0:
+            continue
+        table[p, columns.ARM] = grip.weights @ grip.x
+        body = bodies[grip.body]
+        if N := body.omega.size:
+            fields = np.einsum("s,sai->ia", grip.weights, body.fields(grip.x, (0,))[0])
+            modes[p, :N, columns.PUSHED : columns.PUSHED + 3] = fields[:, :3]
+            # rotations belong to one place, whatever its weight
+            modes[p, :N, columns.TWISTED : columns.TWISTED + 3] = fields[:, 3:] / grip.weights.sum()
+            pairs[p, :N, :N] = np.einsum("s,sij->ij", grip.weights, shorter_at(body, grip.x))
+    gripped = np.array([grip.body for grip in grips], dtype=np.int64)
+    return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs.reshape(len(grips), n * n))
+
+
+def shorter_at(body: ElasticBody, x: Array) -> Array:
+    """(S, N, N): G(x) = int_0^x (v_i' v_j' + w_i' w_j') at places; zero where it is not asked for."""
+    N = body.omega.size
+    if not body.stiffens:
+        return np.zeros((x.size, N, N))
+    parts = (_gauss(0.0, place, FORCES) for place in x)
+    return np.stack([np.einsum("g,gij->ij", weights, body.bent(nodes)[0]) for nodes, weights in parts])

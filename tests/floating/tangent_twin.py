@@ -1,0 +1,80 @@
+"""The tangent of Newton's method beside central differences of the residual.
+
+python -m tests.floating.tangent_twin, with kernels that are not compiled. At the random states of `loads_twin`: what a
+change of the accelerations does to the residual, by itself and through the coordinates and velocities that follow from
+it in a step. Then each way is switched off in turn.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from engine.floating.lanes import in_blocks, lanes
+from engine.floating.model import FloatingModel, build
+from engine.kernels.floating import march
+from engine.kernels.floating.equations import residual
+from engine.kernels.floating.layout import STATISTICS, Coordinates, Lane, Record
+from engine.kernels.floating.motions import motions_at
+from engine.kernels.layout import LANES
+from engine.scene.variants import VariantValues
+from tests.floating import loads_twin, residual_twin
+
+STEP, BETA, GAMMA = 0.02, 0.25, 0.5
+AGREE, DIFFER = 1e-4, 1e-3  # of the largest entry of each column
+AT = 1  # the lane that is compared
+
+TERMS = {
+    "what follows in coordinates": ("put_lanes(x.y, (k,), y + of_y * by)", "pass"),
+    "what follows in velocities": ("put_lanes(x.u, (k,), u + of_u * by)", "pass"),
+    "accelerations": ("put_lanes(x.a, (k,), a + by)", "pass"),
+}
+
+
+def mutated(old: str, new: str) -> ModuleType:
+    """The march's module with another text."""
+    source = Path(march.__file__).read_text(encoding="utf-8")
+    assert old in source, old
+    module = ModuleType("mutated")
+    exec(compile(source.replace(old, new), "mutated", "exec"), module.__dict__)
+    return module
+
+
+def both(module: ModuleType, model: FloatingModel, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """The tangent (N, N) by the module, and by central differences of the residual."""
+    table = lanes(model, VariantValues(model.study, {}, 1), np.full(1, STEP))
+    lane, N = Lane(*(in_blocks(part)[0] for part in table)), model.size
+    blank = np.zeros((1, 1, STATISTICS, LANES))
+    state, solver, _ = module.room_to_march(model.system, lane, Record(np.zeros(1), blank, blank, blank, blank))
+    motions_at(lane.motions, np.zeros(LANES), np.zeros(LANES), solver.work.piece, solver.work.motions)
+    for part, values in zip(state.tried, residual_twin.state(model, seed), strict=True):
+        part[:] = values[:, None]
+    state.weight[:], solver.memory[module.SCALE] = 1.0, 0.1
+    ways = BETA * STEP**2, GAMMA * STEP, 1.0
+    module.tangent(model.system, lane, state, *(np.full(LANES, way) for way in ways[:2]), solver)
+    wanted, out = np.zeros((N, N)), np.zeros((N, LANES))
+    for k in range(N):
+        for sign in (1.0, -1.0):
+            x = Coordinates(*(part.copy() for part in state.tried))
+            for part, way in zip(x, ways, strict=True):
+                part[k] += sign * way * 1e-3
+            residual(model.system, lane, x, solver.work, out)
+            wanted[:, k] += sign * out[:, AT] / 2e-3
+    return solver.fresh[:, :, AT], wanted
+
+
+def main() -> None:
+    model = build(loads_twin.study())
+    for name, module in (("tangent", march), *((name, mutated(*term)) for name, term in TERMS.items())):
+        gap = 0.0
+        for seed in (1, 2):
+            found, wanted = both(module, model, seed)
+            gap = max(gap, (np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())
+        print(f"{'' if module is march else 'without '}{name}: {gap:.1e}")
+        assert gap < AGREE if module is march else gap > DIFFER, name
+
+
+if __name__ == "__main__":
+    main()
