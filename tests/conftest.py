@@ -7,11 +7,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Generator
+from pathlib import Path
 
 import pytest
 
 for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for processes that tests start
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def _failed(report: pytest.CollectReport | pytest.TestReport) -> None:

@@ -16,6 +16,7 @@ from engine.scene.sweep import expand
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput
 from tests.bodies.frames import AREA, DENSITY, LENGTH, MODULUS, SECOND_MOMENT, straight
+from tests.engine.build import beam
 from tests.scene.mutations import HOW, How, Mutation, mutations, survives
 
 BRIDGE: dict[str, Any] = {
@@ -206,17 +207,7 @@ def put(table: dict[str, Any], keys: list[str], value: Any) -> None:
         table[keys[-1]] = value
 
 
-UNIFORM: dict[str, Any] = {
-    "kind": "beam",
-    "length": LENGTH,
-    "area": AREA,
-    "second_moment": SECOND_MOMENT,
-    "youngs_modulus": MODULUS,
-    "density": DENSITY,
-    "supports": "pinned-pinned",
-    "modes": 5,
-    "own_weight": True,
-}
+UNIFORM = beam(length=LENGTH, area=AREA, second_moment=SECOND_MOMENT, youngs_modulus=MODULUS, density=DENSITY)
 
 
 def passage(body: dict[str, Any], mass: float, speed: float) -> Study:
@@ -231,9 +222,9 @@ def passage(body: dict[str, Any], mass: float, speed: float) -> Study:
 
 
 def test_a_passage_over_a_straight_frame_is_one_over_a_beam() -> None:
-    beam = UNIFORM
     frame = straight({"a": "pinned", "b": ["z"]}, elements=24, modes=5, plane="xz", own_weight=True)
-    expected, found = (engine.run(passage(body, 600.0, 8.0)) for body in (beam, frame))
+    uniform = UNIFORM | {"modes": 5, "own_weight": True}
+    expected, found = (engine.run(passage(body, 600.0, 8.0)) for body in (uniform, frame))
     assert int(found.status) == 0
     for name in ("midspan_max", "midspan_min", "below_max", "midspan_rms", "table_contact_force_max"):
         np.testing.assert_allclose(float(found[name]), float(expected[name]), rtol=1e-4, err_msg=name)
@@ -284,16 +275,7 @@ def _with(table: Any, path: tuple[Any, ...], value: float) -> Any:
 def test_dampers_at_nodes_are_those_of_the_beam() -> None:
     """Both ends and the middle on springs with dampers; the sweep of a damper shares one reduction."""
     ends, middle = {"stiffness": 1e6, "damping": 300.0}, {"stiffness": 1e3, "damping": 2000.0}
-    beam = {
-        "kind": "beam",
-        "length": LENGTH,
-        "area": AREA,
-        "second_moment": SECOND_MOMENT,
-        "youngs_modulus": MODULUS,
-        "density": DENSITY,
-        "supports": [ends | {"at": 0.0}, middle | {"at": LENGTH / 2.0}, ends | {"at": LENGTH}],
-        "modes": 7,
-    }
+    supports = [ends | {"at": 0.0}, middle | {"at": LENGTH / 2.0}, ends | {"at": LENGTH}]
     frame = straight({"a": ["x"]}, elements=12, modes=7, plane="xz")
     frame["node"]["m"] = [LENGTH / 2.0, 0.0, 0.0]
     half = frame["member"].pop("span")
@@ -304,7 +286,10 @@ def test_dampers_at_nodes_are_those_of_the_beam() -> None:
         for name, one in (("a", ends), ("m", middle), ("b", ends))
     }
     found = []
-    for table, key in ((beam, "supports.1.damping"), (frame, "spring.m.damping.2")):
+    for table, key in (
+        (UNIFORM | {"supports": supports, "modes": 7}, "supports.1.damping"),
+        (frame, "spring.m.damping.2"),
+    ):
         data = passage(table, 600.0, 8.0).data
         sweep = {"damping": {"of": f"body.bed.{key}", "values": [0.0, 500.0, 4000.0]}}
         study = Study(**(data | {"sweep": sweep, "solver": data["solver"] | {"steps": 4000}}))

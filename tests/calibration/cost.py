@@ -24,20 +24,12 @@ from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from tests.calibration.scenes import draw, judged, planned
+from tests.engine.build import steel
 
 MODES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 CUTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # steps in one of the grid's
 REFERENCE = Numerics("full", FOX_GOODWIN, True, 64), 2048  # 65,536 steps over a passage
-BED: dict[str, Any] = {
-    "kind": "beam",
-    "length": 15.0,
-    "area": 0.01,
-    "second_moment": 8.33e-6,
-    "youngs_modulus": "210 GPa",
-    "density": 7850.0,
-    "supports": "pinned-pinned",
-    "damping_ratio": 0.02,
-}
+BED = steel(15.0, damping_ratio=0.02)
 
 
 def passages(size: int, seed: int, tolerance: float, quantity: str) -> Study:

@@ -13,6 +13,7 @@ from studies.at_rest.findings import frequency_errors, reading_errors
 from studies.commands import catalogue
 from studies.reporting import answers
 from studies.results.results import Results
+from tests.engine.build import steel
 from tests.studies import at_rest as small
 from tests.studies.at_rest import KINDS, MASS, TABLE
 
@@ -167,15 +168,7 @@ def test_bad_questions_are_refused(kind: str, question: str, words: str) -> None
 AWAY = {"kind": "cruise", "start": 3.7, "end": 4.5, "speed": 1.0}
 PUSH = {"on": "bed", "kind": "force", "force": 5.0, "motion": AWAY}
 PULL = {"of": "gravity", "values": [1.0, 2.0]}
-LOOSE = {
-    "kind": "beam",
-    "length": 4.0,
-    "area": 0.01,
-    "second_moment": 8e-6,
-    "youngs_modulus": 2e11,
-    "density": 7850.0,
-    "supports": "free-free",
-}
+LOOSE = steel(4.0, supports="free-free")
 
 
 @pytest.mark.parametrize(

@@ -14,19 +14,11 @@ import pytest
 
 import engine
 import studies
+from tests.engine.build import beam
 from tests.naive import indices
 from tests.reference import values
 
-UNIT_BODY: dict[str, Any] = {
-    "kind": "beam",
-    "length": 1.0,
-    "area": 1.0,
-    "second_moment": 1.0,
-    "youngs_modulus": 1.0,
-    "density": 1.0,
-    "supports": "pinned-pinned",
-    "modes": 6,
-}
+UNIT_BODY = beam(modes=6)
 MODES_ONLY = {"static_correction": False, "fidelity": "full", "tolerance": 2e-5}
 
 

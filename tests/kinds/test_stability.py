@@ -21,16 +21,9 @@ from studies.protocol.parts import Work
 from studies.reporting import report
 from studies.results.results import Results
 from tests.bodies import frames
+from tests.engine.build import beam
 
-BEAM: dict[str, Any] = {
-    "kind": "beam",
-    "length": 1.0,
-    "area": 1.0,
-    "second_moment": 1.0,
-    "youngs_modulus": 1.0,
-    "density": 1.0,
-    "supports": "pinned-pinned",
-}
+BEAM = beam(modes="auto")
 CRUISE = {"kind": "cruise", "start": 0.0, "end": 1.0, "speed": 0.785}
 MASS = {"on": "beam", "kind": "mass", "mass": 0.5, "motion": CRUISE}
 SMALL: dict[str, Any] = {

@@ -24,6 +24,7 @@ from tests.studies import at_rest, imported, scenes
 from tests.studies.small import SMALL, write
 
 Captured = pytest.CaptureFixture[str]
+pytestmark = pytest.mark.usefixtures("here")
 Change = Callable[[dict[str, Any], Archive], None]
 
 ON_THE_MOVE: dict[str, dict[str, Any]] = {
@@ -49,13 +50,6 @@ from studies.commands.cli import main
 codes = [main(["info", name]) or main(["report", name, "-o", f"{name}-page"]) for name in names]
 print("\\n" + json.dumps(codes))
 """
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def audited(folder: Path, names: Sequence[str]) -> tuple[list[int], str]:

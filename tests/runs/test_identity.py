@@ -35,18 +35,13 @@ from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files, in_process
 from tests.commands.test_cli_interrupted import after_parts, assert_same_results
+from tests.engine.build import steel
 from tests.protocol.test_measuring import after_pieces
 from tests.studies import at_rest, imported
 from tests.studies.small import SCENES, SMALL, write
 
 Captured = pytest.CaptureFixture[str]
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def stiffen(path: Path) -> None:
@@ -297,8 +292,7 @@ print("\\n" + json.dumps([name for name in names if name]))
 @pytest.mark.parametrize("kind", ["double-peak", "influence", "stability"])
 def test_fault_43_the_key_covers_every_source_that_a_run_loads(kind: str, here: Path) -> None:
     """Fault 43: the engine's sources and those of the studies, for marched, measuring and resting kinds alike."""
-    bed = {"kind": "beam", "length": 15.0, "area": 0.01, "second_moment": 8e-6, "youngs_modulus": 2.1e11}
-    bed |= {"density": 7850.0, "supports": "pinned-pinned", "modes": 3, "damping_ratio": 0.02}
+    bed = steel(15.0, modes=3, damping_ratio=0.02)
     shuttle = {"kind": "sinusoidal", "centre": 7.5, "amplitude": 3.0, "frequency": 0.3, "cycles": 2}
     car = {"car": {"on": "bed", "kind": "mass", "mass": 50.0, "motion": shuttle}}
     imported.write(here, bed, kind, **({"carriage": car} if kind == "double-peak" else {}))
