@@ -23,8 +23,28 @@ Flags = NDArray[np.bool_]
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 
 
+class OfContact:
+    """What is read of a force: the ties' own, and nothing of the modes."""
+
+    carriage: int
+    contact: int | None
+
+    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
+        return []
+
+    def missed(self, model: SceneModel, along: Along) -> Array:
+        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
+
+    def offset(self, model: SceneModel, along: Along) -> Array:
+        return np.zeros(along[0].s.size)
+
+    def rides(self, model: SceneModel) -> int:
+        """The rider whose place it is."""
+        return self.carriage if self.contact is None else self.contact
+
+
 @dataclass(frozen=True, eq=False)
-class ContactForce:
+class ContactForce(OfContact):
     """The force (N) between a carriage (its number) and its body, or at one contact of a body that rides (the number of
     its rider)."""
 
@@ -38,22 +58,9 @@ class ContactForce:
         body = model.carriages[self.carriage].body
         return ContactSensor("", "contact_force", body, 0.0, self.carriage, self.carriage, self.contact)
 
-    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
-        return []
-
-    def missed(self, model: SceneModel, along: Along) -> Array:
-        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
-
-    def offset(self, model: SceneModel, along: Along) -> Array:
-        return np.zeros(along[0].s.size)
-
     @property
     def offset_order(self) -> int:
         return 0
-
-    def rides(self, model: SceneModel) -> int:
-        """The rider whose place it is."""
-        return self.carriage if self.contact is None else self.contact
 
     def counted(self, model: SceneModel, along: Along) -> Flags:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
@@ -67,18 +74,12 @@ class ContactForce:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSensor(Sensor):
+class ContactSensor(OfContact, Sensor):
     """The force at one contact of a body that rides (the number of its rider), or at all contacts of a carriage
     together, as a sensor with its history. It counts wherever the carriage's contact is on its body."""
 
     carriage: int
     contact: int | None
-
-    def channels(self, model: SceneModel, along: Along) -> list[Channel]:
-        return []
-
-    def missed(self, model: SceneModel, along: Along) -> Array:
-        return np.broadcast_to(contact_row(model, self.carriage, self.contact), (along[0].s.size, model.ties))
 
     def unit_static(self, model: SceneModel, along: Along) -> Array:
         return self.missed(model, along)
@@ -89,14 +90,8 @@ class ContactSensor(Sensor):
     def unit_reading(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         return np.ones(1)
 
-    def rides(self, model: SceneModel) -> int:
-        return ContactForce(self.carriage, self.contact).rides(model)
-
     def counted(self, model: SceneModel, along: Along) -> Flags:
         return along[self.rides(model)].on
-
-    def offset(self, model: SceneModel, along: Along) -> Array:
-        return np.zeros(along[0].s.size)
 
 
 def contact_row(model: SceneModel, carriage: int, contact: int | None = None) -> Array:

@@ -23,7 +23,7 @@ from studies.at_rest.positions import Asked, all_positions
 from studies.protocol.study import question_of
 from studies.results.findings_common import first_carriage, in_words
 from studies.results.formatting import counted, listed, number, percent, quantity
-from studies.results.results import Results, extreme
+from studies.results.results import Results, both_ends, extreme
 
 SHOWN = 3  # frequencies that a sentence lists
 STILL = 1e-3  # relative change along the way below which a frequency counts as constant
@@ -184,15 +184,14 @@ def _sweep(results: Results) -> list[str]:
     if results.size == 1:
         return []
     first = np.asarray(results.dataset["frequency"].isel(mode=0).values)
-    ends = [extreme(sign * first) for sign in (-1.0, 1.0)]
-    if ends[0] is None or ends[1] is None:
+    ends = both_ends(first)
+    if ends is None:
         return ["No variant has values."]
     places = results.dataset["position"].values
     texts = [
         f"{number(float(first[end]), 4)} Hz{in_words(results, end[:-1])} with {results.carriage_name} at "
         f"{quantity(float(places[end[-1]]), 'm')}"
         for end in ends
-        if end is not None
     ]
     return [f"Over all {results.size:,} variants the lowest frequency lies between {' and '.join(texts)}."]
 

@@ -25,7 +25,7 @@ from studies.at_rest.labelling import BODY_PLACES, COORDINATES
 from studies.at_rest.positions import all_positions
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, percent, quantity
-from studies.results.results import Index, Results, extreme
+from studies.results.results import Index, Results, both_ends
 
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
@@ -134,8 +134,8 @@ KIND = Influence()
 def _span(results: Results, sensor: str) -> str:
     """Between which readings a sensor moves, and where."""
     found = np.asarray(results.dataset[sensor].values)
-    ends = [extreme(sign * found) for sign in (-1.0, 1.0)]
-    if ends[0] is None or ends[1] is None:
+    ends = both_ends(found)
+    if ends is None:
         return f"{sensor}: no variant has values."
     places, units = results.dataset["position"].values, results.sensors[sensor]
     largest = float(np.nanmax(np.abs(found)))
@@ -146,7 +146,6 @@ def _span(results: Results, sensor: str) -> str:
         f"{quantity(float(found[end]), units, 4, beside=largest)}{in_words(results, end[:-1])} with "
         f"{results.carriage_name} at {quantity(float(places[end[-1]]), 'm')}"
         for end in ends
-        if end is not None
     ]
     span = float(np.nanmax(found) - np.nanmin(found)) / largest
     return (
@@ -172,14 +171,13 @@ def _contacts(results: Results) -> list[str]:
         return []
     found = results.dataset["contact_force"]
     values, places = np.asarray(found.values), results.dataset["position"].values
-    ends = [extreme(sign * values) for sign in (-1.0, 1.0)]
-    if ends[0] is None or ends[1] is None:
+    ends = both_ends(values)
+    if ends is None:
         return []
     texts = [
         f"{quantity(float(values[end]), 'N', 4)} ({found['contact'].values[end[-1]]}{in_words(results, end[:-2])}, at "
         f"{quantity(float(places[end[-2]]), 'm')})"
         for end in ends
-        if end is not None
     ]
     return [f"Contact forces lie between {' and '.join(texts)}."]
 

@@ -387,6 +387,12 @@ def extreme(values: xr.DataArray | Array, by: Any = np.nanargmax) -> Index | Non
     return tuple(int(i) for i in np.unravel_index(int(by(array)), array.shape)) if array.ndim else ()
 
 
+def both_ends(values: xr.DataArray | Array) -> tuple[Index, Index] | None:
+    """Places of the smallest and of the largest value; None where there are only NaN."""
+    low, high = extreme(values, np.nanargmin), extreme(values)
+    return None if low is None or high is None else (low, high)
+
+
 def spread(count: int, most: int) -> list[int]:
     """At most `most` of `count` places, evenly spread, with both ends.
 

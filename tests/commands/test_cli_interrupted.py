@@ -48,6 +48,15 @@ def after_parts(monkeypatch: pytest.MonkeyPatch, number: int, number_of_signal: 
     monkeypatch.setattr(Gatherer, "add", add_and_signal)
 
 
+def interrupted(
+    monkeypatch: pytest.MonkeyPatch, parts: int, study: str = "small.toml", sent: int = signal.SIGINT, code: int = 130
+) -> None:
+    """A run that a signal stops after so many parts."""
+    with monkeypatch.context() as patch:
+        after_parts(patch, parts, sent)
+        assert main(["run", study]) == code
+
+
 def assert_same_results(first: xr.Dataset, second: xr.Dataset) -> None:
     """Equal to the last bit, but for the time and the machine."""
     for dataset in (first, second):
@@ -65,10 +74,8 @@ def test_a_signal_stops_and_the_next_start_goes_on(
     number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
-    with monkeypatch.context() as patch:
-        after_parts(patch, 2, number)
-        capsys.readouterr()
-        assert main(["run", "small.toml"]) == code
+    capsys.readouterr()
+    interrupted(monkeypatch, 2, sent=number, code=code)
     output = capsys.readouterr()
     assert output.out == "" and "finished work is kept" in output.err
     assert not Path("small.nc").exists() and len(list(Path("small.nc.parts").glob("*.nc"))) >= 2
@@ -83,9 +90,7 @@ def test_a_signal_stops_and_the_next_start_goes_on(
 def test_an_unfinished_run_is_told(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with monkeypatch.context() as patch:
-        after_parts(patch, 2, signal.SIGINT)
-        assert main(["run", "small.toml"]) == 130
+    interrupted(monkeypatch, 2)
     parts = sorted(Path("small.nc.parts").glob("*.nc"))
     kept = sum(xr.load_dataset(path).variants.size for path in parts[1:])
     parts[0].write_bytes(parts[0].read_bytes()[:-50])
@@ -100,9 +105,7 @@ def test_an_unfinished_run_is_told(
 def test_parts_of_another_study_need_overwrite(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with monkeypatch.context() as patch:
-        after_parts(patch, 1, signal.SIGINT)
-        assert main(["run", "small.toml"]) == 130
+    interrupted(monkeypatch, 1)
     write(here, SCENES.replace("damping_ratio = 0.02", "damping_ratio = 0.03"))
     capsys.readouterr()
     assert main(["run", "small.toml"]) == 2
@@ -112,9 +115,7 @@ def test_parts_of_another_study_need_overwrite(
 
 
 def test_a_part_that_was_damaged_meanwhile_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        after_parts(patch, 3, signal.SIGINT)
-        assert main(["run", "small.toml"]) == 130
+    interrupted(monkeypatch, 3)
     part = sorted(Path("small.nc.parts").glob("*.nc"))[0]
     part.write_bytes(part.read_bytes()[:-50])
     assert main(["run", "small.toml"]) == 0

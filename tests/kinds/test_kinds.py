@@ -55,9 +55,23 @@ def test_a_result_that_is_missing_is_noticed() -> None:
         running.compared(dataset.drop_vars("lag"), study)
 
 
-def test_asymmetry_needs_a_motion_that_comes_back() -> None:
-    with pytest.raises(BadInput, match=r'carriage.table.motion.kind: .*comes back.*"out-and-back".*"cruise"'):
-        studies.run(scenes.study("passage").with_values({"kind": "asymmetry"}))
+@pytest.mark.parametrize(
+    ("given", "changes", "extra", "words"),
+    [
+        ("passage", {"kind": "asymmetry"}, "", r'table.motion.kind: .*comes back.*"out-and-back".*"cruise"'),
+        ("passage", {"kind": "double-peak"}, "", r'motion.kind: .*repeats.*"cruise"'),
+        (
+            "asymmetry",
+            {},
+            '[sensor.rate]\nbody = "bed"\nat = 3.0\nquantity = "velocity"',
+            r"sensor.rate.quantity: .*static response.*velocity",
+        ),
+        ("trajectory", {}, '[output]\nhistories = "none"', r"output.histories: a trajectory is its histories"),
+    ],
+)
+def test_what_does_not_suit_a_kind_is_refused(given: str, changes: dict[str, str], extra: str, words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        studies.run(scenes.study(given, extra=extra).with_values(changes))
 
 
 @pytest.mark.parametrize(
@@ -72,28 +86,12 @@ def test_asymmetry_needs_half_the_stroke_at_constant_speed(sweep: str, received:
         studies.run(study)
 
 
-def test_asymmetry_refuses_what_has_no_static_response() -> None:
-    extra = '[sensor.rate]\nbody = "bed"\nat = 3.0\nquantity = "velocity"'
-    with pytest.raises(BadInput, match=r"sensor.rate.quantity: .*static response.*velocity"):
-        scenes.run("asymmetry", extra=extra)
-
-
-def test_double_peak_needs_a_motion_that_repeats() -> None:
-    with pytest.raises(BadInput, match=r'motion.kind: .*repeats.*"cruise"'):
-        studies.run(scenes.study("passage").with_values({"kind": "double-peak"}))
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_measured_is_refused(kind: str) -> None:
     text = scenes.text_of(kind)
     start, end = text.index("[sensor.midspan]"), text.index("[carriage.table.motion]")
     with pytest.raises(BadInput, match="nothing is measured"):
         studies.run(scenes.engine.load(text[:start] + text[end:]))
-
-
-def test_a_trajectory_without_histories_is_refused() -> None:
-    with pytest.raises(BadInput, match=r"output.histories: a trajectory is its histories"):
-        scenes.run("trajectory", extra='[output]\nhistories = "none"')
 
 
 def test_a_sensor_that_never_moves_has_no_indices() -> None:

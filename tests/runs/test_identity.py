@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -34,7 +33,7 @@ from studies.runs.identity import PROGRAM, run_key, sources, sources_hash
 from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files, in_process
-from tests.commands.test_cli_interrupted import after_parts, assert_same_results
+from tests.commands.test_cli_interrupted import assert_same_results, interrupted
 from tests.engine.build import steel
 from tests.protocol.test_measuring import after_pieces
 from tests.studies import at_rest, imported
@@ -251,9 +250,7 @@ def test_fault_43_parts_of_another_study_are_computed_again(
     write(here, SCENES)
     write(here, SCENES.replace("damping_ratio = 0.02", "damping_ratio = 0.3"), "damped.toml")
     for name, number in (("damped", 3), ("small", 1)):
-        with monkeypatch.context() as patch:
-            after_parts(patch, number, signal.SIGINT)
-            assert main(["run", f"{name}.toml"]) == 130
+        interrupted(monkeypatch, number, f"{name}.toml")
     assert copied("damped.nc.parts", "small.nc.parts") >= 6
     assert main(["info", "small.nc"]) == 2
     told = capsys.readouterr().err
@@ -328,9 +325,7 @@ def test_fault_43_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.Mo
 def test_fault_43_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fault 43: the key stands in the part itself, not only in the folder's file."""
     write(here, SCENES)
-    with monkeypatch.context() as patch:
-        after_parts(patch, 1, signal.SIGINT)
-        assert main(["run", "small.toml"]) == 130
+    interrupted(monkeypatch, 1)
     key, name = Path("small.nc.parts/key").read_text(encoding="utf-8").splitlines()
     assert name == "small.toml" and key == run_key(engine.load("small.toml"))
     for path in Path("small.nc.parts").glob("*.nc"):
