@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from results_schema.errors import ArchiveError
+from results_schema.late import xr
 from results_schema.statuses import lost
 from results_schema.variables import Variable, axes, expand
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _TEXT_KINDS = "UTO"
 _COUNT_SHOWN = 3

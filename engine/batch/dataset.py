@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,9 @@ from engine.model.scene_model import SceneModel
 from engine.scene.sweep import Cases
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.store.rows import Rows
 from results_schema.variables import Variable, axes, declarations, expand, sensor_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -29,8 +27,6 @@ SHAPE_STATIONS = 201  # of the mode shapes in the archive
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     """The dataset of a study's results; variables that are not declared for `plan.results` are left out, except those
     that the study's own summary is made of (`<sensor>_static`)."""
-    import xarray as xr
-
     study = plan.study
     sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
     envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
@@ -63,8 +59,6 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
 
 def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
     """The bodies of an unswept scene, by group: frequencies, damping and mode shapes on the track, length and mass."""
-    import xarray as xr
-
     values = VariantValues(model.study, {}, 1)
     declared = {variable.name: variable for variable in declarations("/model")}
     found = {}

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Group
 from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.linear_algebra import one_thread
-from engine.march.march import prepare
+from engine.march.march import March, prepare
 from engine.march.richardson import march_pair, march_scheme
 from engine.march.stepper import Halted as Gone
 from engine.march.tables import SceneTables
@@ -27,12 +27,8 @@ from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput, Interrupted
+from results_schema.late import xr
 from results_schema.store.rows import Chunk, Collector, Rows
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.march.march import March
 
 T = TypeVar("T")
 Halted = Callable[[], bool]

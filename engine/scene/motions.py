@@ -15,6 +15,7 @@ from engine.scene.time_motions import AMPLITUDE, CONSTANT, PHASE, RATE, START, N
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
+from results_schema.late import interpolate
 
 
 class Cruise(Motion):
@@ -338,9 +339,7 @@ def _ascending(*times: Any) -> Any:
 
 def _spline_at_rest(times: Array, positions: Array) -> Any:
     """The C2 cubic spline through positions (K,) or (K, V) at ascending times (K,), of zero slope at both ends."""
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(times, positions, bc_type="clamped")
+    return interpolate.CubicSpline(times, positions, bc_type="clamped")
 
 
 def _spline_range(times: Array, positions: Array) -> tuple[Array, Array]:

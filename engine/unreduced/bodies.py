@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,10 +28,7 @@ from engine.scene.variants import VariantValues
 from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, rows_of
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
-
+from results_schema.late import sparse
 
 BEAM_ELEMENTS = 64
 MOST_SUPPORTS = 50
@@ -66,7 +63,7 @@ class RigidTrack:
 class Damping(NamedTuple):
     """C = viscous + loads diag(rates) loads^T: (n, n) sparse; (n, k) and (k,) of modes."""
 
-    viscous: csc_array
+    viscous: sparse.csc_array
     loads: Array
     rates: Array
 
@@ -92,8 +89,8 @@ class FullBody:
 
     name: str
     length: float
-    stiffness: csc_array
-    mass: csc_array
+    stiffness: sparse.csc_array
+    mass: sparse.csc_array
     rigid: Array
     pull: Array
     damping: Damping
@@ -234,24 +231,22 @@ def _gauge(place: FrameSpot, loads: Array, numbers: Mapping[str, int]) -> FullGa
 
 def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> Damping:
     """The damping of the reduced body: of the modes that it keeps, none of the others, or Rayleigh's; and dampers."""
-    from scipy.sparse import csc_array
-
     body: Body = study.body[name]
     values = VariantValues(study, {}, 1)
     numbers, loads = point_loads(frame, assembly)
     points = [(loads[:, numbers[str(at)]], rate) for _, at, rate in frame.dampers() if rate > 0.0]
     rows = np.array([row for row, _ in points]).reshape(len(points), len(assembly.free))
     rates = np.array([rate for _, rate in points])
-    wide = csc_array(rows)
-    viscous = (wide.T * rates[None, :]) @ wide if points else csc_array(assembly.stiffness.shape)
+    wide = sparse.csc_array(rows)
+    viscous = (wide.T * rates[None, :]) @ wide if points else sparse.csc_array(assembly.stiffness.shape)
     if body.rayleigh is not None:
         by_mass, by_stiffness = body.rayleigh.rayleigh
         viscous = viscous + by_mass * assembly.mass + by_stiffness * assembly.stiffness
-        return Damping(csc_array(viscous), np.zeros((len(assembly.free), 0)), np.zeros(0))
+        return Damping(sparse.csc_array(viscous), np.zeros((len(assembly.free), 0)), np.zeros(0))
     omega, shapes = _kept(body, frame, assembly, flexibility)
     rates = values.damping_rates(name, omega)[:, 0]
     damped = rates > 0.0
-    return Damping(csc_array(viscous), assembly.mass @ shapes[:, damped], rates[damped])
+    return Damping(sparse.csc_array(viscous), assembly.mass @ shapes[:, damped], rates[damped])
 
 
 def _kept(body: Body, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> tuple[Array, Array]:
@@ -266,19 +261,17 @@ def _kept(body: Body, frame: Frame, assembly: Assembly, flexibility: Flexibility
 
 
 def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:
-    from scipy.sparse import csc_array
-
     rates = VariantValues(study, {}, 1).damping_rates(name, np.zeros(2))[:, 0]
     mass = np.array([body.mass, body.inertia])
-    nothing: Any = csc_array((2, 2))
+    nothing: Any = sparse.csc_array((2, 2))
     return FullBody(
         name=name,
         length=body.length,
         stiffness=nothing,
-        mass=csc_array(np.diag(mass)),
+        mass=sparse.csc_array(np.diag(mass)),
         rigid=np.diag(1.0 / np.sqrt(mass)),
         pull=np.array([body.mass, 0.0]),
-        damping=Damping(csc_array(np.diag(rates * mass)), np.zeros((2, 0)), np.zeros(0)),
+        damping=Damping(sparse.csc_array(np.diag(rates * mass)), np.zeros((2, 0)), np.zeros(0)),
         flexibility=None,
         track=RigidTrack(body.centre_of_mass),
         points={},

@@ -24,6 +24,7 @@ from engine.unreduced.rows import Along, Readings, readings, rider_of, softness,
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.statics import level_readings, level_state, statics_at
 from results_schema.arrays import Array, Counts
+from results_schema.late import sparse
 
 BETA, GAMMA = 0.25, 0.5
 REGAIN = 0.05  # per step: the rate at which a rigid contact takes back its gap
@@ -163,10 +164,8 @@ class _Factor:
     """Answers A x = p for A = M + gamma h C + beta h^2 K, or M alone for h = 0; modal damping is of low rank."""
 
     def __init__(self, model: Unreduced, h: float, others: Array) -> None:
-        from scipy.sparse import csc_array
-
         matrix = model.mass + GAMMA * h * model.viscous + BETA * h**2 * model.stiffness
-        self._lu = symmetric_lu(csc_array(matrix))
+        self._lu = symmetric_lu(sparse.csc_array(matrix))
         self._loads = model.modal_loads if h > 0.0 else model.modal_loads[:, :0]
         self._soft = self._lu.solve(self._loads) if self._loads.shape[1] else self._loads
         small = self._loads.T @ self._soft

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from engine.scene.carriages import Carriage, Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
 from results_schema.arrays import Array
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
+from results_schema.late import sparse
 
 Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass along its track
 
@@ -82,17 +80,17 @@ class Unreduced:
         return tuple(c.riding_body for c in self.study.carriage.values() if c.riding_body is not None)
 
     @cached_property
-    def stiffness(self) -> csc_array:
+    def stiffness(self) -> sparse.csc_array:
         """(n, n) of all bodies, without ties."""
         return self._stacked([body.stiffness for body in self.bodies.values()], np.zeros(len(self.sprung)))
 
     @cached_property
-    def mass(self) -> csc_array:
+    def mass(self) -> sparse.csc_array:
         """(n, n) of all bodies and sprung masses."""
         return self._stacked([body.mass for body in self.bodies.values()], self._sprung_masses)
 
     @cached_property
-    def viscous(self) -> csc_array:
+    def viscous(self) -> sparse.csc_array:
         """(n, n) of dampers and Rayleigh damping."""
         return self._stacked([body.damping.viscous for body in self.bodies.values()], np.zeros(len(self.sprung)))
 
@@ -136,10 +134,10 @@ class Unreduced:
                 found[self.part(name), felt] = body.flexibility.solve(here[:, felt])
         return found
 
-    def _stacked(self, parts: Sequence[Any], last: Array) -> csc_array:
-        from scipy.sparse import block_diag, csc_array
-
-        return csc_array(block_diag([*parts, *(csc_array([[value]]) for value in last)], format="csc"))
+    def _stacked(self, parts: Sequence[Any], last: Array) -> sparse.csc_array:
+        return sparse.csc_array(
+            sparse.block_diag([*parts, *(sparse.csc_array([[value]]) for value in last)], format="csc")
+        )
 
 
 def unreduced_model(

@@ -18,6 +18,7 @@ from engine.unreduced.rows import Along, at_positions, nowhere, readings, softne
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.track import Rows
 from results_schema.arrays import Array, Counts
+from results_schema.late import sparse
 
 UNRESISTED = 1e-9  # of the largest: below it no contact resists a rigid-body motion
 BALANCED = 1e-7  # of the weight: more is a load that no contact carries
@@ -232,15 +233,13 @@ def _frequencies(model: Unreduced, solver: StaticSolver, along: Along, count: in
 
 def _mass_with_carriages(model: Unreduced, along: Along) -> Any:
     """(n, n) sparse: masses in contact ride with their bodies."""
-    from scipy.sparse import csc_array
-
     found = model.mass
     rows = tie_rows(model, along)
     for j, tie in enumerate(model.ties):
         if tie.link in ("mass", "push") and along.on[0, tie.rider]:
-            row = csc_array(Rows(rows.freedoms[:, j], rows.values[:, j]).columns(model.size))
+            row = sparse.csc_array(Rows(rows.freedoms[:, j], rows.values[:, j]).columns(model.size))
             found = found + tie.mass * (row @ row.T)
-    return csc_array(found)
+    return sparse.csc_array(found)
 
 
 def _largest(flexibility: Any, mass: Any, count: int) -> Array:

@@ -10,19 +10,17 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from results_schema.errors import ArchiveError
+from results_schema.late import xr
 from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.reading import SCHEMA_VERSION, checked, groups_of, read_tables, verify
 from results_schema.store.tables import CONTENTS, DIGEST, from_dataset, seal, to_dataset
 from results_schema.store.writing import write_tables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 REQUIRED_ATTRIBUTES = ("Conventions", "title", "history", "schema_version", "study_kind", "study", "study_sha256")
 

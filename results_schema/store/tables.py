@@ -11,12 +11,11 @@ import hashlib
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    import xarray as xr
+from results_schema.late import xr
 
 CONTENTS = "contents"
 DIGEST = "contents_sha256"
@@ -85,8 +84,6 @@ def _column(name: str, variable: xr.Variable, is_coordinate: bool) -> Column:
 
 def to_dataset(table: Table) -> xr.Dataset:
     """A table as a dataset; text becomes fixed-width unicode."""
-    import xarray as xr
-
     variables = {
         name: xr.Variable(
             column.dims, column.data.astype(str) if column.is_text else column.data, dict(column.attributes)

@@ -7,31 +7,25 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.distinct_models import base_scene, scenes, structure
-from engine.model.station_path import frozen
+from engine.model.scene_model import SceneModel
+from engine.model.station_path import Along, frozen
 from engine.scene.carriages import MAX_CONTACTS
+from engine.scene.study import Study
 from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
-from results_schema.status import Status
+from results_schema.late import xr
+from results_schema.status import Fidelity, Status
 from studies.at_rest.labelling import Gathering, asked_coordinates
 from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
 from studies.protocol.parts import Piece, Work
 from studies.protocol.study import PiecedKind, question_of
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Along
-    from engine.scene.study import Study
-    from engine.scene.variants import VariantValues
-    from results_schema.status import Fidelity
 
 Named = Mapping[str, NDArray[Any]]
 
@@ -192,8 +186,6 @@ def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) ->
 
 def _plain(arrays: Named) -> xr.Dataset:
     """Arrays with dimensions of no meaning, as a piece."""
-    import xarray as xr
-
     return xr.Dataset(
         {name: ([f"{name}_{axis}" for axis in range(array.ndim)], array) for name, array in arrays.items()}
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.distinct_models import base_scene
+from results_schema.late import xr
 from results_schema.variable import outputs
 from results_schema.variables import Variable, axes, expand
 from studies.at_rest.positions import Asked, Positions, positions_of
@@ -17,8 +18,6 @@ from studies.protocol.study import question_of
 from studies.results.results import sensor_units
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.study import Study
     from studies.at_rest.at_rest import AtRestKind
 
@@ -59,8 +58,6 @@ class Gathering:
 
     def dataset(self) -> xr.Dataset:
         """Everything, labelled."""
-        import xarray as xr
-
         from engine.batch.dataset import coordinates
 
         variables = {**self._grid(), **self._shapes(), **self._mode_counts(), **self._unreduced()}

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.results.results import Index, Results, extreme
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.study import Study
 
 (DYNAMIC_AMPLIFICATION,) = outputs("""
@@ -44,8 +43,6 @@ def largest(results: Results, values: Array) -> Index | None:
 
 def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """The dataset with `dynamic_amplification`, from `<sensor>_max`, `_min` and `_static`, and its errors."""
-    import xarray as xr
-
     ratios = []
     for sensor in study.sensor:
         largest, smallest = (abs(dataset[f"{sensor}_{side}"]) for side in ("max", "min"))
@@ -67,8 +64,6 @@ def derived_from(study: Study) -> Mapping[str, tuple[str, ...]]:
 def with_derived_errors(dataset: xr.Dataset, derived: Mapping[str, tuple[str, ...]]) -> xr.Dataset:
     """The dataset with errors of results that a study derives from others: the largest of theirs, with the tolerance of
     the first."""
-    import xarray as xr
-
     if "estimated_error" not in dataset:
         return dataset
     errors = dataset[["estimated_error", "tolerance"]]

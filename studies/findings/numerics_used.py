@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.late import xr
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 MODEL, MODES, STEPS, SCHEME = "fidelity_used", "modes_used", "steps_used", "scheme_used"
 WORK, ERROR = "work", "error_estimate"

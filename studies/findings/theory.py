@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import interpolate, xr
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.model.scene_model import SceneModel
 
 CYCLE_POINTS = 720
@@ -25,8 +24,6 @@ _PLACES = ("centre", "amplitude")
 
 def first_omega(results: Results) -> xr.DataArray | float:
     """Lowest elastic natural frequency (rad/s) of the first carriage's body, over the axes that change that body."""
-    import xarray as xr
-
     recorded = results.recorded(results.carriage.on)
     if recorded is not None:
         stored = recorded["first_frequency"]
@@ -139,11 +136,11 @@ def _rigid_modes(results: Results) -> int:
 
 def _first_shape(results: Results, places: Array) -> Array:
     """(S,) shape of the first elastic mode of the first carriage's body at places (S,), kg^(-1/2)."""
-    from scipy.interpolate import CubicSpline
-
     recorded, number = results.recorded(results.carriage.on), _rigid_modes(results)
     if recorded is not None:
-        return np.asarray(CubicSpline(recorded["position"].values, recorded["mode_shape"].values[number])(places))
+        return np.asarray(
+            interpolate.CubicSpline(recorded["position"].values, recorded["mode_shape"].values[number])(places)
+        )
     return np.asarray(_model(results, {}).leading_body.modal.shape(places, 0)[:, number])
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.late import xr
 from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import AXES, MARCH, axes, declare
@@ -22,8 +23,6 @@ from studies.results.formatting import MINUS, counted, listed, number, percent
 from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.observation.cycle_reduction import Compared, Cycle
     from engine.scene.study import Study
 
@@ -123,8 +122,6 @@ class DoublePeak(Kind):
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
         dataset = with_amplification(dataset, study)
-        import xarray as xr
-
         ratio = xr.DataArray(theory.frequency_ratio(Results(dataset, study)))
         found = {
             "peak": ("peak", np.arange(1, PEAKS + 1, dtype=np.int64), _axis("peak")),

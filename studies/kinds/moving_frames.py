@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
 
+from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Time
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.variables import declare
 from studies.moving import findings
 from studies.moving.parts import gather
 from studies.moving.variables import RESULTS
+from studies.protocol.parts import Piece
 from studies.protocol.study import PiecedKind, question_of
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.scene.study import Study
-    from studies.protocol.parts import Piece
-    from studies.results.results import Results
+from studies.results.results import Results
 
 declare("moving-frames", *RESULTS)
 

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Dimensionless
 from results_schema.arrays import Mask
+from results_schema.late import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, exceeds, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.scene.study import Study
-
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from results_schema.late import xr
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
 from studies.maps.map_scene import Ground
@@ -17,8 +18,6 @@ from studies.protocol.parts import Piece, usual
 from studies.protocol.study import PiecedKind, question_of
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
@@ -50,8 +49,6 @@ class Stability(PiecedKind):
         return [Piece(one.name, one.words, partial(one.compute, ground, asked), one.seconds) for one in chosen]
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
-        import xarray as xr
-
         modes, steps = (
             max(int(np.max(piece.attrs[name])) for piece in pieces.values()) for name in ("most_modes", "most_steps")
         )

@@ -13,6 +13,7 @@ from engine.study_file.spec import Spec, ascending, distinct, one_of
 from engine.study_file.units import fault
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.status import Fidelity, Status
 from results_schema.variables import axes, declare
 from studies.precision import checks
@@ -26,8 +27,6 @@ from studies.results.findings_common import check_sensors, first_carriage
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
     from studies.precision.ladders import Ladder
@@ -183,8 +182,6 @@ _PARTS: Mapping[str, tuple[str, float]] = {
 
 
 def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
-    import xarray as xr
-
     from studies.precision.precision import COMPARED, MARCHED, QUANTITIES
 
     def stacked(part: str, name: str) -> Array:

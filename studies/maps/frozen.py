@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, dataset_of
+from studies.protocol.parts import Work
 from studies.results.formatting import counted, number, percent
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.protocol.parts import Work
-
 
 STEPS = 2000  # per passage
 SLOWEST, FASTEST = 0.3, 1.2  # speed ratio times the root of the mass ratio

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, Strict
 
 from engine.study_file.spec import Spec, distinct
+from results_schema.late import xr
 from results_schema.variables import Variable, axes
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.maps.map_scene import Ground
-    from studies.protocol.parts import Work
-
+from studies.maps.map_scene import Ground
+from studies.protocol.parts import Work
 
 Part = Annotated[float, Field(gt=0, le=100)]
 Parts = Annotated[tuple[Part, ...], Strict(False), Field(min_length=1, max_length=40), AfterValidator(distinct)]
@@ -72,8 +68,6 @@ def dataset_of(
     What is infinite becomes NaN. marched: the largest numbers of modes and steps, kept as the attributes most_modes and
     most_steps.
     """
-    import xarray as xr
-
     known = axes() | {variable.name: variable for variable in declared}
     coords = {name: known[name].holding(found, (name,)) for name, found in along.items()}
     data = {name: known[name].holding(_finite(found)) for name, found in values.items()}

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import LABELS, METHODS, Method
+from studies.protocol.parts import Work
 from studies.results.formatting import listed, number
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.protocol.parts import Work
-
 
 FIRST_STEPS = 20
 FREQUENCY_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # omega h

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import METHODS, Method, generalized, hht
+from studies.protocol.parts import Work
 from studies.results.formatting import listed, number, percent
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.protocol.parts import Work
-
 
 MODES, STEPS, COUNTED = 8, 400, 0.98
 INERTIAL = "as inertia"

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.maps.methods import LABELS, METHODS, Method
+from studies.protocol.parts import Work
 from studies.results.formatting import listed, number
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.protocol.parts import Work
-
 
 STEPS = 50  # marched for the measured growth
 SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to where a limit is looked for

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
+from studies.protocol.parts import Work
 from studies.results.formatting import listed, number, percent
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from studies.protocol.parts import Work
-
 
 MODES, STEPS = 3, 600
 SLOWEST, FASTEST, HEAVIEST = 0.3, 1.4, 1.0  # frequency ratios, mass ratio

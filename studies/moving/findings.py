@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
-from studies.results.results import extreme
-
-if TYPE_CHECKING:
-    from studies.results.results import Results
+from studies.results.results import Results, extreme
 
 MOST_SENSORS = 4
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.late import xr
 from studies.maps.rigid import INERTIAL, STEPS
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import (
@@ -23,10 +24,6 @@ from studies.pictures.common.figures import (
     zero_line,
 )
 from studies.results.formatting import counted, number, percent
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 NOTABLE = 1.1  # overshoot from which on a scheme gets a colour
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,15 +12,13 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from results_schema.late import xr
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, shades
 from studies.precision import findings as advice
 from studies.precision.findings import QUANTITY_WORDS, scheme_words, short_time
 from studies.precision.pareto import automatic_choices, choices
 from studies.results.formatting import number
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COLUMNS = 2
 WANTED = 1e-3  # the error that the first figure's title speaks of

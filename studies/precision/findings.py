@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from results_schema.late import xr
 from results_schema.status import Status
 from studies.precision.pareto import (
     Automatic,
@@ -19,9 +19,6 @@ from studies.precision.pareto import (
     step_choices,
 )
 from studies.results.formatting import counted, listed, number, spanned
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _WORDS = {
     "average-acceleration": "average acceleration",

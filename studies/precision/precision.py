@@ -29,6 +29,7 @@ from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
+from results_schema.late import interpolate
 from results_schema.status import Status
 from studies.protocol.parts import Work
 
@@ -195,8 +196,6 @@ def marched_reference(model: SceneModel, steps: int, work: Work) -> Reference:
     They are marches of Fox-Goodwin, whose phases are the best, or where those would be near its limit of average
     acceleration.
     """
-    from scipy.interpolate import CubicSpline
-
     swiftest = with_scheme(model, "fox-goodwin")
     near = model.omega.max() * ModalEquations(model).time_scale / (steps // 2) > SAFE * swiftest.scheme.stability_limit
     tables = tables_of(with_scheme(model, "average-acceleration") if near else swiftest, steps)
@@ -208,7 +207,7 @@ def marched_reference(model: SceneModel, steps: int, work: Work) -> Reference:
     _, along = tables.coarser.timeline.moments(counts)
     known = [np.isfinite(column) for column in readings.T]
     curves = [
-        CubicSpline(along[here], column[here], extrapolate=False)
+        interpolate.CubicSpline(along[here], column[here], extrapolate=False)
         for column, here in zip(readings.T, known, strict=True)
     ]
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from results_schema.arrays import Counts
 from results_schema.errors import Interrupted, OutputFailed
+from results_schema.late import xr
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations, expand
@@ -22,8 +23,6 @@ from studies.protocol.stopping import Stop
 from studies.results.results import Results, envelope_units, sensor_units
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.batch.execution import Progress
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind

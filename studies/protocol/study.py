@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.pieces import Pieces, lacks, no_row_of
 from results_schema.validate import validate
 from results_schema.variables import expand
@@ -20,7 +21,6 @@ from studies.protocol.parts import Memory, Variants, Work
 from studies.results.results import envelope_units, sensor_units
 
 if TYPE_CHECKING:
-    import xarray as xr
     from numpy.typing import NDArray
 
     from engine.observation.cycle_reduction import Reduction

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from results_schema.late import xr
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
 from studies.results.findings_common import told_envelopes, told_statuses
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from studies.pictures.common.figures import Figure
 
 

@@ -6,18 +6,16 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.status import Status, label
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 class Change(NamedTuple):
@@ -61,8 +59,6 @@ class Comparison:
 
 def compare(first: Results, second: Results) -> Comparison:
     """Compare two archives where their sweeps agree. Raises BadInput where these have other axes."""
-    import xarray as xr
-
     if first.dims != second.dims:
         what = "the archives have different axes, so there is nothing to compare"
         raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")

@@ -19,6 +19,7 @@ from markupsafe import Markup, escape
 
 from engine.study_file.document import Beside
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.archive import Archive, open_archive
@@ -38,7 +39,6 @@ from studies.runs.datasets import archive_of
 from studies.runs.unreduced import GROUP, told_unreduced
 
 if TYPE_CHECKING:
-    import xarray as xr
     from jinja2 import Template
 
     from engine.scene.study import Study

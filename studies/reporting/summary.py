@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from results_schema.late import xr
 from results_schema.status import Status, label
 from results_schema.variables import expand
 from studies.findings.numerics_used import ERROR, WORK, is_marched
@@ -18,8 +19,6 @@ from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.study import Study
     from studies.results.results import Results
     from studies.runs.runner import Outcome

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.store import files
 from studies.results.results import Axis, Results
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
 
 MOST_COLUMNS = 64  # of one result
 WRITERS = {".csv": "to_csv", ".parquet": "to_parquet"}
@@ -54,7 +54,6 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
     forces of carriages that are forces. Raises BadInput for a name that is none.
     """
     import pandas as pd
-    import xarray as xr
 
     dataset = _chosen(results, chosen) if chosen else _without_constants(results)
     rows = (*results.dims, *(("position",) if "position" in dataset.dims else ()))

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.late import xr
 from results_schema.status import LOST, Status, label
 from results_schema.variables import sensor_unit
 from studies.results.formatting import Scale, axis_title, number, quantity, spanned
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
 
@@ -251,8 +250,6 @@ class Results:
 
     def everywhere(self, values: Any) -> Array:
         """Values that depend on some of the sweep's axes, or on none, for every variant, in the sweep's shape."""
-        import xarray as xr
-
         full = xr.broadcast(xr.DataArray(values), self.dataset["status"])[0].transpose(*self.dims)
         return np.asarray(full.values, dtype=np.float64)
 

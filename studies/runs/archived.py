@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.errors import ArchiveError, BadInput
+from results_schema.late import xr
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
 from results_schema.variables import declarations
@@ -18,8 +19,6 @@ from studies.protocol.study import Kind, kind_named
 from studies.results.results import Results, envelope_units, sensor_units
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.bodies.modal.description import Recorded
     from engine.scene.study import Study
 
@@ -53,8 +52,6 @@ def _refused(path: Path, text: str) -> ArchiveError:
 def with_first_frequency(groups: Mapping[str, xr.Dataset], results: Results) -> dict[str, xr.Dataset]:
     """The groups of bodies; that of a body out of files, under the first carriage, with its lowest elastic frequency
     over the axes that change it, which nobody could tell later without the files."""
-    import xarray as xr
-
     name = results.carriage.on
     path, body = f"{MODELS}{name}", results.study.body[name]
     if not body.names_files:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
+from results_schema.late import xr
 from results_schema.status import Status
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
@@ -21,8 +22,6 @@ from studies.results.formatting import counted, listed, percent, scientific
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.batch.audit import Audit
     from engine.batch.plan import Plan
 
@@ -70,8 +69,6 @@ def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:
 
 
 def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr.Dataset:
-    import xarray as xr
-
     names, derived = _names(plan), derived_from(plan.study)
     whole = [str(name) for name in dataset["result"].values]
     rows = [[names.index(own) for own in ([name] if name in names else derived[name])] for name in whole]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from results_schema.late import xr
 from results_schema.store import files
 from results_schema.store.archive import Archive, write_archive
 from studies.protocol.study import kind_of
@@ -15,9 +15,6 @@ from studies.results.results import Results
 from studies.runs.archived import with_first_frequency
 from studies.runs.identity import run_key
 from studies.runs.provenance import attributes
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Archive:

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations, sensor_unit
 from studies.results.formatting import counted, listed, percent
 from studies.results.results import Results, spread
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from engine.batch.plan import Plan
     from engine.unreduced.comparison import Compared
 
@@ -56,8 +55,6 @@ def _chosen(plan: Plan, dataset: xr.Dataset) -> list[int]:
 
 
 def _dataset(variants: Sequence[int], found: Sequence[Compared]) -> xr.Dataset:
-    import xarray as xr
-
     stations = max(one.elapsed.size for one in found)
     declared = {variable.name: variable for variable in declarations(GROUP)}
     quantities = found[0].quantities

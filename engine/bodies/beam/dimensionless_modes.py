@@ -25,6 +25,7 @@ from engine.bodies.beam.statics import Restraint, rigid_body_modes
 from engine.bodies.modal.modal_body import Array
 from engine.kernels.shapes import Span, beam_shapes
 from engine.linear_algebra import one_thread
+from results_schema.late import linalg
 
 _LAST_BIT = 1e-17
 SHARED = 32  # modes that a body is decomposed into at least: studies ask for few and for many of the same one
@@ -276,8 +277,6 @@ def _embedding(space: _CurvatureSpace, restraints: Sequence[Restraint]) -> Array
     Restraints: sqrt(d) t - R_c c = R_z z. As many as fix the lines z (stiff ones first) are solved for z; the
     others constrain (t, c), and an orthonormal basis of what they leave keeps the energy.
     """
-    from scipy.linalg import qr  # here, as scipy is not needed to import the engine
-
     kinds = (space.node_value, space.node_slope)
     rows = [kinds[one.order][np.searchsorted(space.nodes, one.at)] for one in restraints]
     functionals = np.array(rows).reshape(len(rows), 2 + space.size)
@@ -290,14 +289,14 @@ def _embedding(space: _CurvatureSpace, restraints: Sequence[Restraint]) -> Array
 
     rank = 2 - len(rigid_body_modes(restraints))
     weight = 1.0 / np.sqrt(compliance + 0.01)  # the beam's own compliance, 1/48 and less
-    order = qr((on_lines * weight[:, None]).T, mode="r", pivoting=True)[1] if rank else np.arange(len(rows))
+    order = linalg.qr((on_lines * weight[:, None]).T, mode="r", pivoting=True)[1] if rank else np.arange(len(rows))
     base, others = order[:rank], order[rank:]
     lines = np.linalg.pinv(on_lines[base]) @ stress[base] if rank else np.zeros((2, stress.shape[1]))
     embedding = np.vstack([lines, np.eye(space.size, stress.shape[1], k=len(soft))])
     if not len(others):
         return embedding
     constraints = stress[others] - on_lines[others] @ lines
-    basis = qr(constraints.T)[0]
+    basis = linalg.qr(constraints.T)[0]
     return np.asarray(embedding @ basis[:, len(others) :])
 
 

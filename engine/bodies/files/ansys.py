@@ -18,6 +18,7 @@ from engine.bodies.files.model import Array, Counts, FileModel, checked, hashes_
 from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import Line, file_bytes, read_lines, read_paths, real, whole, written
 from results_schema.errors import BadInput
+from results_schema.late import sparse
 
 _HEAD = re.compile(r"\s*NBLOCK\s*,\s*(\d+)\s*(?:,\s*(\w*)\s*(?:,\s*(\d*)\s*(?:,\s*(\d*)\s*)?)?)?$", re.IGNORECASE)
 _FORMAT = re.compile(
@@ -82,8 +83,6 @@ def turns_of(degrees: Array) -> Array:
 
 def _matrices(path: str) -> tuple[Counts, Counts, Any, Any, Any]:
     """Node and direction of every row, which are held, stiffness and mass, of a `.full` file."""
-    from scipy.sparse import triu
-
     file_bytes(path)
     reader = extra("ansys.mapdl.reader", "ansys")
     file = foreign(path, lambda: reader.read_binary(path))
@@ -94,7 +93,7 @@ def _matrices(path: str) -> tuple[Counts, Counts, Any, Any, Any]:
         raise BadInput("stiffness or mass is missing", where=path, remedy="write the file in a modal analysis")
     const = {(int(node), int(way)) for node, way in np.asarray(file.const).reshape(-1, 2)}
     held = np.array([(int(node), int(way)) in const for node, way in rows], dtype=np.bool_)
-    whole_matrices = [matrix + triu(matrix, 1).T for matrix in (stiffness, mass)]
+    whole_matrices = [matrix + sparse.triu(matrix, 1).T for matrix in (stiffness, mass)]
     numbers, direction = np.asarray(rows, dtype=np.int64).T
     return numbers, direction, held, whole_matrices[0], whole_matrices[1]
 

@@ -12,6 +12,7 @@ import numpy as np
 from engine.bodies.files.model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
 from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
 from results_schema.errors import BadInput
+from results_schema.late import sparse
 
 _SPARSE = ("csr", "csc", "coo")
 _MODAL = ("0", "q", "modal")
@@ -46,8 +47,6 @@ def read_matrix(path: str, raw: bytes) -> Any:
 
 def _from_npz(path: str, raw: bytes) -> Any:
     """Of scipy's `save_npz`; pickles are refused, indices checked."""
-    from scipy.sparse import coo_array, csc_array, csr_array
-
     try:
         with np.load(BytesIO(raw), allow_pickle=False) as found:
             form, shape = found["format"].item(), tuple(int(size) for size in found["shape"])
@@ -59,8 +58,8 @@ def _from_npz(path: str, raw: bytes) -> Any:
             if data.dtype.kind not in "fiu" or data.ndim != 1:
                 raise BadInput("not a matrix of real numbers", where=path, received=str(data.dtype))
             if form == "coo":
-                return coo_array((data, (found["row"], found["col"])), shape=shape).tocsc()
-            kind = csr_array if form == "csr" else csc_array
+                return sparse.coo_array((data, (found["row"], found["col"])), shape=shape).tocsc()
+            kind = sparse.csr_array if form == "csr" else sparse.csc_array
             matrix = kind((data, found["indices"], found["indptr"]), shape=shape)
             matrix.check_format(full_check=True)
             return matrix.tocsc()
@@ -238,10 +237,8 @@ def _array_places(shape: tuple[int, int], symmetric: bool) -> tuple[Any, Any]:
 
 
 def _assembled(rows: Any, columns: Any, values: Any, shape: tuple[int, int], symmetric: bool) -> Any:
-    from scipy.sparse import coo_array
-
     if symmetric:
         beside = rows != columns
         values = np.concatenate([values, values[beside]])
         rows, columns = np.concatenate([rows, columns[beside]]), np.concatenate([columns, rows[beside]])
-    return coo_array((values, (rows, columns)), shape=shape).tocsc()
+    return sparse.coo_array((values, (rows, columns)), shape=shape).tocsc()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
+from results_schema.late import sparse
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -83,11 +84,9 @@ def save_model(path: Path, model: FileModel) -> None:
 
 def load_model(path: Path) -> FileModel:
     """Read what `save_model` wrote; pickles are refused."""
-    from scipy.sparse import coo_array
-
     with np.load(path, allow_pickle=False) as found:
         matrices = {
-            name: coo_array(
+            name: sparse.coo_array(
                 (found[f"{name}_value"], (found[f"{name}_row"], found[f"{name}_column"])),
                 shape=tuple(found[f"{name}_shape"].tolist()),
             ).tocsc()
@@ -130,16 +129,14 @@ def _check_rows(model: FileModel, where: str) -> None:
 
 
 def _checked_matrix(model: FileModel, name: str, where: str) -> Any:
-    from scipy.sparse import csc_array
-
-    matrix = csc_array(getattr(model, name))
+    matrix = sparse.csc_array(getattr(model, name))
     if matrix.shape != (model.size, model.size):
         size = " x ".join(str(part) for part in matrix.shape)
         what = f"the {name} matrix does not fit the degrees of freedom"
         raise BadInput(what, where=where, expected=f"{model.size} x {model.size}", received=size)
     if np.iscomplexobj(matrix.data):
         raise BadInput(f"the {name} matrix is complex", where=where, expected="real numbers")
-    matrix = csc_array(matrix, dtype=np.float64)
+    matrix = sparse.csc_array(matrix, dtype=np.float64)
     matrix.sum_duplicates()
     wrong = ~np.isfinite(matrix.data)
     if wrong.any():
@@ -154,17 +151,15 @@ def _checked_matrix(model: FileModel, name: str, where: str) -> Any:
 
 
 def _checked_recovery(model: FileModel, where: str) -> Any:
-    from scipy.sparse import csc_array
-
     if model.recovery is None:
         return None
-    found = csc_array(model.recovery)
+    found = sparse.csc_array(model.recovery)
     if found.shape[1] != model.size:
         what, expected = "the recovery matrix does not fit the degrees of freedom", f"{model.size} columns"
         raise BadInput(what, where=where, expected=expected, received=f"{found.shape[1]} columns")
     if np.iscomplexobj(found.data) or not np.isfinite(found.data).all():
         raise BadInput("the recovery matrix has entries that are not finite real numbers", where=where)
-    return csc_array(found, dtype=np.float64)
+    return sparse.csc_array(found, dtype=np.float64)
 
 
 def _symmetric(model: FileModel, matrix: Any, name: str, where: str) -> Any:
@@ -197,9 +192,7 @@ def turned(model: FileModel, turns: Array, where: str) -> FileModel:
     turns (P, 3, 3): directions of the rows of a node as rows. Raises BadInput where a turned node lacks some of its
     three displacements or rotations, or holds some of them only.
     """
-    from scipy.sparse import eye_array
-
-    turn = eye_array(model.size, format="lil")
+    turn = sparse.eye_array(model.size, format="lil")
     for node in np.flatnonzero(np.abs(turns - np.eye(3)).max(axis=(1, 2)) > 1e-12):
         for rows in model.rows_of(int(node)).reshape(2, 3):
             if (rows < 0).all():

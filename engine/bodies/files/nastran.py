@@ -18,6 +18,7 @@ from engine.bodies.files.model import Array, FileModel, checked, hashes_of, turn
 from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import file_bytes, read_lines, read_paths, written
 from results_schema.errors import BadInput
+from results_schema.late import sparse
 
 Row = tuple[int, int]  # a node and a direction 1 to 6, or a scalar point and 0
 PAIRS = (("kaa", "maa"), ("kxx", "mxx"), ("kaax", "maax"), ("kgg", "mgg"), ("k2gg", "m2gg"))
@@ -152,28 +153,22 @@ def _names(found: Any, options: Mapping[str, Any], path: str) -> tuple[str, str]
 
 def _recovery(found: dict[str, Any], options: Mapping[str, Any], path: str) -> Any:
     """The matrix with rows that give stresses, if one is asked for. Raises BadInput."""
-    from scipy.sparse import csc_array
-
     name = str(options.get("recovery") or "").lower()
     if not name:
         return None
     if name not in found:
         known = ", ".join(sorted(found)[:30]) or "no other matrix"
         raise BadInput("no such recovery matrix", where=path, expected=f"recovery = one of {known}", received=name)
-    return csc_array(found[name])
+    return sparse.csc_array(found[name])
 
 
 def _pair(found: dict[str, Any], options: Mapping[str, Any], path: str) -> tuple[Any, Any]:
-    from scipy.sparse import csc_array
-
-    stiffness, mass = (csc_array(found[name]) for name in _names(found, options, path))
+    stiffness, mass = (sparse.csc_array(found[name]) for name in _names(found, options, path))
     return stiffness, mass
 
 
 def _punched(path: str, options: Mapping[str, Any]) -> tuple[list[Row], list[str], tuple[Any, Any]]:
     """Rows, files, and stiffness and mass of DMIG cards; rows that one matrix lacks are zero there."""
-    from scipy.sparse import csc_array
-
     lines = read_lines(path, included)
     known = check_matrices(cards_of(lines))
     names = _names(known, options, path)
@@ -185,5 +180,7 @@ def _punched(path: str, options: Mapping[str, Any]) -> tuple[list[Row], list[str
         rows = sorted({(int(node), int(way)) for table in tables for node, way in table.index})
         if any(table.shape[0] != table.shape[1] for table in tables):
             raise BadInput("a matrix that is not square", where=path)
-        matrices = [csc_array(np.asarray(table.reindex(index=rows, columns=rows).fillna(0.0))) for table in tables]
+        matrices = [
+            sparse.csc_array(np.asarray(table.reindex(index=rows, columns=rows).fillna(0.0))) for table in tables
+        ]
     return rows, read_paths(lines), (matrices[0], matrices[1])

@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from engine.bodies.frame.elements import Beams, consistent_mass, lumped_mass, stiffness
 from engine.bodies.frame.geometry import DIRECTIONS, member_axes, member_ends
 from engine.bodies.modal.modal_body import Array
+from results_schema.late import sparse
 
 if TYPE_CHECKING:
-    from scipy.sparse import csc_array
-
     from engine.bodies.frame.frame import Frame
 
 Counts = NDArray[np.int64]
@@ -73,8 +72,8 @@ class Assembly:
 
     mesh: Mesh
     free: Counts
-    stiffness: csc_array
-    mass: csc_array
+    stiffness: sparse.csc_array
+    mass: sparse.csc_array
     drag: Array
     springs: Array
     rigid: Array
@@ -218,38 +217,32 @@ def spring_rows(frame: Frame, name: str, nodes: dict[str, int], mesh: Mesh) -> A
 
 def _point_masses(frame: Frame, nodes: dict[str, int], size: int) -> Any:
     """Masses with their inertia, moved from their centres to their nodes."""
-    from scipy.sparse import coo_array
-
-    found = coo_array((size, size))
+    found = sparse.coo_array((size, size))
     for body in frame.point_mass.values():
         reach = np.eye(6)
         reach[:3, 3:] = -cross_matrix(body.offset)
         block = reach.T @ np.diag([body.mass] * 3 + list(body.inertia)) @ reach
         at = 6 * nodes[body.node] + np.arange(6)
         row, column = np.meshgrid(at, at, indexing="ij")
-        found = found + coo_array((block.reshape(-1), (row.reshape(-1), column.reshape(-1))), shape=(size, size))
+        found = found + sparse.coo_array((block.reshape(-1), (row.reshape(-1), column.reshape(-1))), shape=(size, size))
     return found
 
 
 def _assembled(mesh: Mesh, local: Array) -> Any:
     """(6 P, 6 P) sparse sum of element matrices given in local axes."""
-    from scipy.sparse import coo_array
-
     turns, freedoms = mesh.turns, mesh.freedoms
     blocks = np.swapaxes(turns, 1, 2) @ local @ turns
     blocks = 0.5 * (blocks + np.swapaxes(blocks, 1, 2))
     rows = np.broadcast_to(freedoms[:, :, None], blocks.shape).reshape(-1)
     columns = np.broadcast_to(freedoms[:, None, :], blocks.shape).reshape(-1)
     size = 6 * len(mesh.points)
-    return coo_array((blocks.reshape(-1), (rows, columns)), shape=(size, size)).tocsr()
+    return sparse.coo_array((blocks.reshape(-1), (rows, columns)), shape=(size, size)).tocsr()
 
 
 def _outer(rows: Array, rates: Array) -> Any:
     """Sparse sum of rates times the outer products of rows."""
-    from scipy.sparse import csr_array
-
-    wide = csr_array(rows)
-    return (wide.T * rates[None, :]) @ wide if len(rates) else csr_array((rows.shape[1], rows.shape[1]))
+    wide = sparse.csr_array(rows)
+    return (wide.T * rates[None, :]) @ wide if len(rates) else sparse.csr_array((rows.shape[1], rows.shape[1]))
 
 
 def rigid_motions(mesh: Mesh, held: NDArray[np.bool_], springs: Array) -> Array:
@@ -282,10 +275,9 @@ def _normalised(rows: Array) -> Array:
 
 def _pieces(mesh: Mesh) -> Counts:
     """(P,) number of the piece that a point belongs to; members make pieces, springs do not."""
-    from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     size = len(mesh.points)
     one, other = mesh.pairs.T
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    graph = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -17,6 +17,7 @@ from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility, solving
 from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, Sections, held_weight
 from results_schema.errors import BadInput
+from results_schema.late import sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
@@ -265,15 +266,13 @@ def _rigid(held: HeldModel) -> str:
 
 def _grounding(held: HeldModel) -> str:
     """Forces that the unsupported model answers to unit motions, of the largest possible: 0 where all fits."""
-    from scipy.sparse import diags_array
-
     file = held.file
     if file.held.any() or not (file.owner >= 0).any():
         return "not judged: the file holds nodes"
     diagonal = np.sqrt(np.maximum(file.stiffness.diagonal(), 0.0))
     size = np.linalg.norm(diagonal[:, None] * held.motion, axis=0)
     inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
-    scaled = diags_array(inverse) @ file.stiffness @ held.motion
+    scaled = sparse.diags_array(inverse) @ file.stiffness @ held.motion
     share = np.linalg.norm(scaled, axis=0) / np.where(size > 0.0, size, 1.0)
     worst = float(share.max())
     return f"{worst:.2g} of the stiffness resists them" + (

@@ -16,6 +16,7 @@ from engine.bodies.frame.assembly import cross_matrix
 from engine.bodies.modal.flexibility import Flexibility, factorised, symmetric_lu
 from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
+from results_schema.late import linalg, sparse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -93,10 +94,8 @@ def motions(file: FileModel, unit: float) -> Array:
 
 def _in_si(file: FileModel, length: float, force: float) -> tuple[Any, Any, Any]:
     """Stiffness, mass and recovery in N and m: what the files measure in units of force and length (and seconds)."""
-    from scipy.sparse import diags_array
-
     moves = (file.owner >= 0) & (file.direction < 3)
-    scale = diags_array(np.where(moves, 1.0 / length, 1.0))
+    scale = sparse.diags_array(np.where(moves, 1.0 / length, 1.0))
     matrices = [force * length * (scale @ matrix @ scale).tocsc() for matrix in (file.stiffness, file.mass)]
     recovery = None if file.recovery is None else force / length**2 * (file.recovery @ scale).tocsc()
     return matrices[0], matrices[1], recovery
@@ -125,12 +124,10 @@ def _refuse_slack(file: FileModel, free: Counts, stiffness: Any) -> None:
 
 
 def _refuse_negative_mass(mass: Any) -> None:
-    from scipy.sparse import diags_array
-
     diagonal = mass.diagonal()
     rows = np.flatnonzero(diagonal > 0.0)
-    scale = diags_array(1.0 / np.sqrt(diagonal[rows]))
-    shifted = (scale @ mass[rows][:, rows] @ scale + _NEGATIVE * diags_array(np.ones(len(rows)))).tocsc()
+    scale = sparse.diags_array(1.0 / np.sqrt(diagonal[rows]))
+    shifted = (scale @ mass[rows][:, rows] @ scale + _NEGATIVE * sparse.diags_array(np.ones(len(rows)))).tocsc()
     try:
         factor = symmetric_lu(shifted)
     except RuntimeError:
@@ -185,9 +182,7 @@ def _refuse_massless(mass: Any, rigid: Array) -> None:
 
 def _pencil(stiffness: Array, mass: Array) -> tuple[Array, Array]:
     """Eigenvalues, ascending, and vectors of a small pair."""
-    from scipy.linalg import eigh
-
-    values, vectors = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+    values, vectors = linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
     return values, vectors
 
 

@@ -10,6 +10,7 @@ from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.model import HeldModel
 from engine.bodies.modal.modal_body import Array
 from results_schema.errors import BadInput
+from results_schema.late import interpolate, sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
@@ -39,9 +40,7 @@ def track_rows(body: Imported, held: HeldModel) -> tuple[Any, Array]:
         parts.append(node_rows(held, line.nodes, line.tangent, 0))
         columns.append(np.zeros_like(spread))
         columns[2][1::2] = stretch * spline_slopes(line.places)
-    from scipy.sparse import hstack
-
-    return hstack(parts).tocsc(), np.concatenate(columns, axis=1)
+    return sparse.hstack(parts).tocsc(), np.concatenate(columns, axis=1)
 
 
 def by_rotations(body: Imported, held: HeldModel) -> bool:
@@ -64,8 +63,6 @@ def by_rotations(body: Imported, held: HeldModel) -> bool:
 
 def node_rows(held: HeldModel, nodes: Any, direction: Array, first: int) -> Any:
     """Sparse (n, P): motion of nodes in a direction (3,), displacements (first 0) or rotations (first 3)."""
-    from scipy.sparse import csc_array
-
     place = np.full(held.file.size, -1, dtype=np.int64)
     place[held.free] = np.arange(len(held.free))
     entries = []
@@ -75,11 +72,9 @@ def node_rows(held: HeldModel, nodes: Any, direction: Array, first: int) -> Any:
             if row >= 0 and place[row] >= 0 and share != 0.0:
                 entries.append((float(share), int(place[row]), column))
     shares, at, columns = np.array(entries).reshape(-1, 3).T
-    return csc_array((shares, (at.astype(int), columns.astype(int))), shape=(len(held.free), len(nodes)))
+    return sparse.csc_array((shares, (at.astype(int), columns.astype(int))), shape=(len(held.free), len(nodes)))
 
 
 def spline_slopes(places: Array) -> Array:
     """(P, P): slopes at the nodes of the C2 spline (not-a-knot) through values there."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(places, np.eye(len(places)))(places, 1))
+    return np.asarray(interpolate.CubicSpline(places, np.eye(len(places)))(places, 1))

@@ -9,7 +9,7 @@ The reduced pair is made orthonormal: mass the identity, stiffness diagonal (see
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,7 @@ from engine.bodies.modal.flexibility import factorised
 from engine.bodies.modal.modal_body import Array
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
+from results_schema.late import sparse
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +31,16 @@ class Reduction:
 
     def modes(self, rigid: Array) -> tuple[Array, Array]:
         """omega (m,) and shapes (n, m) of all modes of the reduced pair; rigid (n, r): motions without strain."""
-        from scipy.sparse import csc_array
-
         size = len(self.stiffness)
         motion = np.zeros((size, rigid.shape[1]))
         motion[: len(self.interface)] = rigid[self.interface]
-        pair = factorised(csc_array(self.stiffness), csc_array(self.mass), motion)
+        pair = factorised(sparse.csc_array(self.stiffness), sparse.csc_array(self.mass), motion)
         omega, shapes = pair.modes(size)
         return omega, self.basis @ shapes
 
 
 def reduce_model(
-    stiffness: csc_array, mass: csc_array, interface: Counts, interior_rigid: Array, fixed_modes: int
+    stiffness: sparse.csc_array, mass: sparse.csc_array, interface: Counts, interior_rigid: Array, fixed_modes: int
 ) -> Reduction:
     """Reduce (n, n) matrices to the interface and `fixed_modes` modes of the interior.
 
@@ -72,5 +68,5 @@ def reduce_model(
     return Reduction(basis, reduced, 0.5 * (masses + masses.T), interface)
 
 
-def _part(matrix: csc_array, rows: Counts, columns: Counts) -> Any:
+def _part(matrix: sparse.csc_array, rows: Counts, columns: Counts) -> Any:
     return matrix[rows][:, columns].tocsc()

@@ -10,16 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from engine.bodies.modal.modal_body import Array
 from engine.linear_algebra import one_thread
 from results_schema.errors import BadInput, shortened
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
+from results_schema.late import linalg, sparse
 
 DENSE = 200  # degrees of freedom up to which all eigenvalues are computed
 _COLUMNS = 64  # right-hand sides solved at a time
@@ -35,8 +33,8 @@ class Flexibility:
     rigid (n, r): rigid-body modes of unit mass; kept (m,): the degrees of freedom that are not held for the solve.
     """
 
-    stiffness: csc_array
-    mass: csc_array
+    stiffness: sparse.csc_array
+    mass: sparse.csc_array
     rigid: Array
     kept: Any
     factor: Any
@@ -99,12 +97,10 @@ class Flexibility:
 
     def _refined(self, values: Array, shapes: Array) -> tuple[Array, Array]:
         """Sorted, of exactly unit mass and orthogonal: Rayleigh-Ritz in the space that was found."""
-        from scipy.linalg import eigh
-
         shapes = shapes[:, np.argsort(values)]
         flexible = self._solve(self.mass @ shapes)
         strain, mass = flexible.T @ (self.mass @ shapes), shapes.T @ (self.mass @ shapes)
-        inverse, turn = eigh(0.5 * (strain + strain.T), 0.5 * (mass + mass.T))
+        inverse, turn = linalg.eigh(0.5 * (strain + strain.T), 0.5 * (mass + mass.T))
         order = np.argsort(-inverse)
         found = shapes @ turn[:, order]
         return 1.0 / inverse[order], found / np.sqrt(np.sum(found * (self.mass @ found), axis=0))
@@ -120,9 +116,7 @@ class Flexibility:
 
     def _number_below(self, shift: float) -> int | None:
         """Elastic eigenvalues below a number; None where the factorisation does not tell."""
-        from scipy.sparse import csc_array
-
-        factor = symmetric_lu(csc_array(self.stiffness - shift * self.mass))
+        factor = symmetric_lu(sparse.csc_array(self.stiffness - shift * self.mass))
         if not np.array_equal(factor.perm_r, factor.perm_c):
             return None
         negative: Array = factor.U.diagonal() < 0.0
@@ -130,17 +124,15 @@ class Flexibility:
 
     def _all_elastic(self, count: int) -> tuple[Array, Array]:
         """The same with dense matrices, among motions without rigid part: M v = K v/omega^2 minds no singular mass."""
-        from scipy.linalg import eigh, qr
-
         stiffness, mass, rigid = self.stiffness.toarray(), self.mass.toarray(), self.rigid.shape[1]
         count = min(count, int(np.count_nonzero(np.diag(mass))) - rigid)
         last = self.size - rigid - 1
         lowest = [last - count + 1, last]
         if not rigid:
-            inverse, shapes = eigh(mass, stiffness, subset_by_index=lowest)
+            inverse, shapes = linalg.eigh(mass, stiffness, subset_by_index=lowest)
             return self._refined(-inverse, shapes)
-        apart = qr(mass @ self.rigid)[0][:, rigid:]
-        inverse, shapes = eigh(apart.T @ mass @ apart, apart.T @ stiffness @ apart, subset_by_index=lowest)
+        apart = linalg.qr(mass @ self.rigid)[0][:, rigid:]
+        inverse, shapes = linalg.eigh(apart.T @ mass @ apart, apart.T @ stiffness @ apart, subset_by_index=lowest)
         return self._refined(-inverse, apart @ shapes)
 
 
@@ -153,13 +145,11 @@ def without_rounding(motions: Array, axis: int | tuple[int, ...]) -> Array:
     return np.where(np.abs(motions) < ROUNDING * largest, 0.0, motions)
 
 
-def factorised(stiffness: csc_array, mass: csc_array, rigid: Array) -> Flexibility:
+def factorised(stiffness: sparse.csc_array, mass: sparse.csc_array, rigid: Array) -> Flexibility:
     """Flexibility of a model: matrices (n, n) and any basis (n, r) of its motions without strain."""
-    from scipy.linalg import qr
-
     count = rigid.shape[1]
     modes = of_unit_mass(rigid, mass)
-    held = qr(rigid.T, mode="r", pivoting=True)[1][:count] if count else np.zeros(0, dtype=np.int64)
+    held = linalg.qr(rigid.T, mode="r", pivoting=True)[1][:count] if count else np.zeros(0, dtype=np.int64)
     kept = np.setdiff1d(np.arange(stiffness.shape[0]), held)
     return Flexibility(stiffness, mass, modes, kept, symmetric_lu(stiffness[kept][:, kept].tocsc()))
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array, Mask
+from results_schema.late import xr
 from studies.findings.numerics_used import is_marched, known
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, on_method
 from studies.results.formatting import counted, number, percent
 from studies.results.results import PACES, Axis, Results
 from studies.runs.audit import relative_errors
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
 MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one

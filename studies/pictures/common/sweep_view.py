@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 
 from results_schema.arrays import Array, Counts, Mask
+from results_schema.late import xr
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
 from studies.results.formatting import listed
 from studies.results.results import VARIANT, Axis, Index, Results, spread, statuses
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 MOST_CURVES = 6
 DASHED = (0, (3, 2))
@@ -60,15 +57,11 @@ class View:
 
     def cut(self, values: Any) -> xr.DataArray:
         """Values over (some of) the sweep with the held dimensions taken out."""
-        import xarray as xr
-
         array = xr.DataArray(values)
         return array.isel({dim: i for dim, i in self.held.items() if dim in array.dims})
 
     def plane(self, values: Any) -> Array:
         """The same as an array (x, y) of the shown dimensions, (x,) where they are one; axes ascend on a grid."""
-        import xarray as xr
-
         axes = {axis.dim: axis for axis in (self.x, self.y) if axis is not None}
         like = self.cut(self.results.dataset["status"])
         full = xr.broadcast(self.cut(values), like)[0].transpose(*axes)

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.late import xr
 from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, on_method, zero_line
 from studies.results.formatting import counted, percent, scale_for
 from studies.results.results import Results
 from studies.runs.unreduced import compared_variants
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 MOST_SENSORS = 4
 STYLES = (("unreduced", "unreduced model", VERMILION, "-", 2.6), ("marched", "march of modes", BLUE, (0, (4, 2)), 1.2))
