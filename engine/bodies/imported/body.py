@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.line import LineShapes, LineStatics, LineStress, NoSections
+from engine.bodies.imported.line import LineRecovered, LineShapes, LineStatics, NoSections
 from engine.bodies.imported.model import HeldModel, held_model
 from engine.bodies.imported.rows import SPLINE_NODES, by_rotations, node_rows, spline_slopes, track_rows
 from engine.bodies.modal.description import AUTO_MODES, Spots
@@ -219,17 +219,27 @@ def _points(
 
 
 def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> tuple[Sections, Array]:
-    """Stress along the track where the body has a recovery matrix: means of rows at the track's nodes (P,); and (P, Q)
-    stress there per unit force at points."""
+    """Stress and strain along the track where the body has a recovery matrix: means of rows at the track's nodes, those
+    of one quantity after the other's (K P,); and (K P, Q) there per unit force at points."""
     shapes, rows, slopes, pull, loads = parts
-    if body.rows_of_stress is None:
+    if not body.recovered:
         return NoSections(), np.zeros((0, loads.shape[1]))
-    told = np.array([held.recovery[np.array(one) - 1].mean(axis=0) for one in body.rows_of_stress])
+    units = {"stress": 1.0, "strain": held.pressure}
+    means = [
+        held.recovery[np.array(one) - 1].mean(axis=0) / units[quantity]
+        for quantity, nodes in body.recovered.items()
+        for one in nodes
+    ]
+    told = np.array(means)
     moved = held.flexibility.solve(np.ascontiguousarray(told.T))
-    stress = LineStress(
-        statics=statics, values=told @ shapes, response=(rows.T @ moved).T @ slopes.T, weight=moved.T @ pull
+    sections = LineRecovered(
+        statics=statics,
+        quantities=tuple(body.recovered),
+        values=told @ shapes,
+        response=(rows.T @ moved).T @ slopes.T,
+        weight=moved.T @ pull,
     )
-    return stress, moved.T @ loads
+    return sections, moved.T @ loads
 
 
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass

@@ -34,7 +34,11 @@ _GROUP = re.compile(r"\d{1,18}(-\d{1,18})?(,\d{1,18}(-\d{1,18})?)*")
 
 FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
 NodeNumber = Annotated[int, Field(ge=1, lt=10**18)]
-StressRows = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Strict(False), Field(min_length=1, max_length=64)]
+Rows = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Strict(False), Field(min_length=1, max_length=64)]
+
+
+RowsOfNodes = tuple[Rows, ...]
+TrackRows = Annotated[RowsOfNodes, Strict(False), Field(min_length=2, max_length=MAX_TRACK)]
 
 
 class NodeTrack(Spec):
@@ -126,12 +130,12 @@ class Imported(Body):
 
     @property
     def untold(self) -> tuple[str, ...]:
-        return OF_SECTION if self.rows_of_stress is None else tuple(word for word in OF_SECTION if word != "stress")
+        return tuple(word for word in OF_SECTION if word not in self.recovered)
 
     @property
-    def rows_of_stress(self) -> tuple[tuple[int, ...], ...] | None:
-        """For each node of the track the rows of the recovery matrix whose mean is its stress; None without one."""
-        return None
+    def recovered(self) -> Mapping[str, RowsOfNodes]:
+        """Quantities that a recovery matrix tells: for each node of the track the rows whose mean it is."""
+        return {}
 
     @cached_property
     def content(self) -> str:
@@ -251,37 +255,42 @@ class Imported(Body):
 
 
 class Recovering(Imported):
-    """Base of bodies that may have a recovery matrix: stresses by the model's displacements (and modal coordinates).
+    """Base of bodies that may have a recovery matrix: stresses and strains by the model's displacements (and modal
+    coordinates).
 
-    stress_rows: for each node of the track, in order, the rows (from 1) whose mean is its stress, one per element that
-    meets there; linear in between.
+    stress_rows, strain_rows: for each node of the track, in order, the rows (from 1) whose mean is its stress or its
+    strain, one per element that meets there; linear in between.
     """
 
     recovery: FilePath | None = None
-    stress_rows: Annotated[tuple[StressRows, ...], Strict(False), Field(min_length=2, max_length=MAX_TRACK)] | None = (
-        None
-    )
+    stress_rows: TrackRows | None = None
+    strain_rows: TrackRows | None = None
 
     @property
-    def rows_of_stress(self) -> tuple[tuple[int, ...], ...] | None:
-        return self.stress_rows
+    def recovered(self) -> Mapping[str, RowsOfNodes]:
+        rows = {"stress": self.stress_rows, "strain": self.strain_rows}
+        return {quantity: own for quantity, own in rows.items() if own is not None}
 
     @model_validator(mode="after")
     def _rows(self) -> Recovering:
-        if (self.recovery is None) != (self.stress_rows is None):
+        if (self.recovery is None) != (not self.recovered):
             key = "recovery" if self.recovery is None else "stress_rows"
-            refuse((key,), "this key is missing", expected="recovery and stress_rows, or none of them")
-        if self.stress_rows is None or self.recorded is not None:
-            return self
+            refuse((key,), "this key is missing", expected="recovery with stress_rows or strain_rows, or none of them")
+        for quantity, rows in self.recovered.items():
+            if self.recorded is None:
+                self._check_rows(f"{quantity}_rows", rows)
+        return self
+
+    def _check_rows(self, key: str, nodes: RowsOfNodes) -> None:
+        """As many lists as the track has nodes, of rows that there are."""
         count, most = len(self.line.nodes), int(self.model.recovery.shape[0])
-        if len(self.stress_rows) != count:
-            expected, received = f"{count} lists, one per node of the track", str(len(self.stress_rows))
-            refuse(("stress_rows",), "not one list per node", expected=expected, received=received)
-        for node, rows in enumerate(self.stress_rows):
+        if len(nodes) != count:
+            expected, received = f"{count} lists, one per node of the track", str(len(nodes))
+            refuse((key,), "not one list per node", expected=expected, received=received)
+        for node, rows in enumerate(nodes):
             if max(rows) > most:
                 expected = f"1 to {most}"
-                refuse(("stress_rows", node), "there is no such row", expected=expected, received=str(max(rows)))
-        return self
+                refuse((key, node), "there is no such row", expected=expected, received=str(max(rows)))
 
 
 class Matrices(Recovering):

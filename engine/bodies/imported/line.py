@@ -1,4 +1,4 @@
-"""The track of an imported body between its nodes: mode shapes, statics and stress.
+"""The track of an imported body between its nodes: mode shapes, statics, stress and strain.
 
 Between two nodes the deflection is the cubic of both values and slopes (mechanics section 1). Slopes are the nodes'
 rotations about the axis across track and load; or those of the C2 spline through the values (not-a-knot), where the
@@ -91,7 +91,7 @@ def _refuse(quantity: str) -> NoReturn:
 
 
 class NoSections:
-    """An imported body has no section forces, and without a recovery matrix no stress: all of it raises BadInput."""
+    """An imported body has no section forces, and without a recovery matrix no stress or strain: BadInput."""
 
     def rows(self, quantity: str, *_: Any, **__: Any) -> NoReturn:
         """Raises BadInput."""
@@ -101,38 +101,40 @@ class NoSections:
 
 
 @dataclass(frozen=True, eq=False)
-class LineStress:
-    """Stress at the nodes of a track, linear in between: of N modes, values (P, N); per unit value and slope loads,
-    response (P, 2 P); under own weight per unit gravity, weight (P,)."""
+class LineRecovered:
+    """What a recovery matrix tells at the nodes of a track, linear in between, of K quantities one after the other: of
+    N modes, values (K P, N); per unit value and slope loads, response (K P, 2 P); under own weight per unit gravity,
+    weight (K P,)."""
 
     statics: LineStatics
+    quantities: tuple[str, ...]
     values: Array
     response: Array
     weight: Array
 
     def rows(self, quantity: str, s: ArrayLike) -> Array:
-        """Stress of every mode at the stations `s` (S,), as (S, N). Raises BadInput for another quantity."""
+        """A quantity of every mode at the stations `s` (S,), as (S, N). Raises BadInput for one that is not told."""
         return self._along(quantity, s, self.values)
 
     def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
-        """Stress at `x` per unit force at `s`, for pairs that are broadcast against each other."""
+        """A quantity at `x` per unit force at `s`, for pairs that are broadcast against each other."""
         place, load = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(s))
         left, share = self._between(quantity, place.reshape(-1))
         acting, acts = cubics(self.statics.places, load.reshape(-1), 0)
         found: Array = np.zeros(place.size)
         for end in range(_ENDS):
             column = acting[:, end]
-            stress = (1.0 - share) * self.response[left, column] + share * self.response[left + 1, column]
-            found += acts[:, end] * stress
+            told = (1.0 - share) * self.response[left, column] + share * self.response[left + 1, column]
+            found += acts[:, end] * told
         return found.reshape(place.shape)
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
-        """Stress at `x` (X,) under the body's own weight, per unit gravity."""
+        """A quantity at `x` (X,) under the body's own weight, per unit gravity."""
         refuse_loose(self.statics.rigid)
         return self.under_response(quantity, self.weight, x)
 
     def under_response(self, quantity: str, response: Array, x: ArrayLike) -> Array:
-        """Stress at `x` (X,) where it is `response` (P,) at the nodes."""
+        """A quantity at `x` (X,) where all are `response` (K P,) at the nodes."""
         return self._along(quantity, x, response[:, None])[:, 0]
 
     def _along(self, quantity: str, x: ArrayLike, values: Array) -> Array:
@@ -140,10 +142,11 @@ class LineStress:
         return np.asarray((1.0 - share[:, None]) * values[left] + share[:, None] * values[left + 1])
 
     def _between(self, quantity: str, x: ArrayLike) -> tuple[Any, Array]:
-        """The node left of every place (X,), and how far towards the next one it lies."""
-        if quantity != "stress":
+        """Among the values of a quantity that of the node left of every place (X,), and how far towards the next one
+        it lies."""
+        if quantity not in self.quantities:
             _refuse(quantity)
         places = self.statics.places
         at = track_places(x, float(places[-1]))
         left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
-        return left, (at - places[left]) / np.diff(places)[left]
+        return self.quantities.index(quantity) * len(places) + left, (at - places[left]) / np.diff(places)[left]

@@ -39,7 +39,8 @@ class HeldModel:
 
     file: the model as read; free (n,): its rows; stiffness, mass: sparse, SI; motion (N, 6): unit translations and
     rotations (about the origin) of all its rows; all_mass: mass of all rows; flexibility: factorised stiffness;
-    recovery (R, n): stress (Pa) of every row, None where there is none.
+    recovery (R, n): stress (Pa) of every row, None where there is none; pressure: the files' unit of stress in Pa, by
+    which rows of strain are too large.
     """
 
     file: FileModel
@@ -50,6 +51,7 @@ class HeldModel:
     all_mass: Any
     flexibility: Flexibility
     recovery: Any = None
+    pressure: float = 1.0
 
     @property
     def drag(self) -> Array:
@@ -76,7 +78,8 @@ def held_model(body: Imported) -> HeldModel:
     motion = motions(file, body.length_unit)
     flexibility = _factorised(file, free, inner, inertia, motion[free])
     recovery = None if recovery is None else recovery[:, free]
-    return HeldModel(file, free, inner, inertia, motion, mass, flexibility, recovery)
+    pressure = body.force_unit / body.length_unit**2
+    return HeldModel(file, free, inner, inertia, motion, mass, flexibility, recovery, pressure)
 
 
 def motions(file: FileModel, unit: float) -> Array:

@@ -153,6 +153,7 @@ EVERY_KEY = write_document(
                 },
                 "recovery": "FOLDER/recovery.mtx",
                 "stress_rows": [[1], [2, 3], [4], [5]],
+                "strain_rows": [[5], [1, 2], [4], [3]],
                 "supports": {"1": ["x", "y"], "3-4": ["rx"]},
                 "point": {"tip": {"node": 3, "direction": [0.0, 0.0, 1.0]}},
                 "gravity_direction": [0.0, 0.0, -1.0],

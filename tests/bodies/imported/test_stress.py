@@ -74,6 +74,36 @@ def test_influence_and_own_weight(recovered: dict[str, Any]) -> None:
         found.sections.rows("strain", nodes)
 
 
+def test_strain_beside_stress(recovered: dict[str, Any]) -> None:
+    """The same rows as strain, by modes, loads, own weight and points, and alone: numbers without a unit, which stay
+    where the files' unit of force makes stresses of theirs."""
+    both = recovered | {"strain_rows": recovered["stress_rows"], "point": {"middle": {"node": 10}}}
+    places, found = np.linspace(0.0, LENGTH, 37), modal(both)
+    assert found.sections is not None and found.points is not None
+    for told in (
+        lambda quantity: found.sections.rows(quantity, places),
+        lambda quantity: found.sections.influence_at(quantity, places, 0.3 * LENGTH),
+        lambda quantity: found.sections.own_weight(quantity, places),
+        lambda quantity: found.points.section_influence(quantity, "point.middle", places),
+    ):
+        scale = np.abs(told("stress")).max()
+        assert scale > 0.0
+        assert told("strain") == pytest.approx(told("stress"), abs=1e-9 * scale)
+    only = {key: value for key, value in both.items() if key != "stress_rows"}
+    alone = modal(only).sections
+    assert alone is not None
+    wanted = found.sections.rows("strain", places)
+    assert alone.rows("strain", places) == pytest.approx(wanted, abs=1e-9 * np.abs(wanted).max())
+    with pytest.raises(BadInput, match="stress is not available"):
+        alone.rows("stress", places)
+    in_kn = modal(both | {"force_unit": "1 kN"}).sections  # a thousand times the stiffness and the mass
+    assert in_kn is not None
+    for quantity, factor in (("strain", 1e-3), ("stress", 1.0)):
+        wanted = factor * found.sections.influence_at(quantity, places, 0.3 * LENGTH)
+        per_load = in_kn.influence_at(quantity, places, 0.3 * LENGTH)
+        assert per_load == pytest.approx(wanted, abs=1e-9 * np.abs(wanted).max())
+
+
 @pytest.mark.extras
 def test_element_forces_of_a_file() -> None:
     """Second source: the file's own rows times the free vibration modes by scipy, in the file's own directions."""
