@@ -6,6 +6,7 @@ from pathlib import Path
 
 from results_schema.status import flag_meanings, flag_values
 from results_schema.variables import AXES, EVERY_KIND, Variable, registered
+from studies.protocol.study import kind_named, kind_names
 
 README = Path(__file__).parents[1] / "README.md"
 RESULTS = README.parent / "docs" / "results.md"
@@ -14,8 +15,6 @@ BEGIN, END = "<!-- declarations: begin -->\n", "<!-- declarations: end -->\n"
 
 def with_declarations(text: str) -> str:
     """A text with the table of all declared results between its marks."""
-    from studies.protocol.study import kind_named, kind_names
-
     for kind in kind_names():
         kind_named(kind)
     before, rest = text.split(BEGIN)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from engine.bodies.frame.assembly import Assembly, assemble, rigid_motions
 from engine.bodies.frame.body import interface_freedoms
@@ -42,8 +43,6 @@ def parts(table: dict[str, Any]) -> tuple[Frame, Assembly]:
 
 
 def test_frequencies_of_a_portal_are_those_of_a_dense_model() -> None:
-    from scipy.linalg import eigh
-
     _, model = parts(portal())
     values = eigh(model.stiffness.toarray(), model.mass.toarray(), eigvals_only=True)
     np.testing.assert_allclose(body(portal()).omega, np.sqrt(values[:10]), rtol=1e-8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import pytest
 
@@ -89,8 +90,6 @@ def test_damaged_and_foreign_files(tmp_path: Path) -> None:
 
 
 def test_an_archive_is_no_body(tmp_path: Path) -> None:
-    import netCDF4
-
     path = tmp_path / "other.nc"
     with netCDF4.Dataset(path, "w") as dataset:
         dataset.setncatts({"schema_version": 1})

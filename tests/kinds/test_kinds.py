@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import j0
 
 import studies
 from engine.batch.execution import run
@@ -13,6 +14,7 @@ from engine.observation.cycle_reduction import Compared
 from engine.scene.variants import VariantValues
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.variables import registered
+from studies.findings import theory
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.protocol import study as running
 from studies.reporting import answers
@@ -134,8 +136,6 @@ def test_findings_of_an_asymmetry_name_the_largest_and_its_place() -> None:
 
 def test_lag_under_the_carriage_is_half_of_that_at_a_fixed_place() -> None:
     """Slow and damped, in the model itself: the closed form that the findings compare with."""
-    from studies.findings import theory
-
     extra = '[sensor.under]\nunder = "table"'
     results = Results.of(scenes.run("asymmetry", scenes.pace("asymmetry", 0.2, 0.4, 2), extra=extra))
     for sensor in ("midspan", "under"):
@@ -175,10 +175,6 @@ def test_odd_and_even_parts_are_told_no_less_than_half_of_what_histories_differ_
 
 
 def test_loaded_frequency_is_the_closed_form_of_a_shuttle() -> None:
-    from scipy.special import j0
-
-    from studies.findings import theory
-
     results = Results.of(scenes.run("double-peak"))
     found = theory.loaded_frequency(results, np.array([0.1, 0.5, 1.0]))
     expected = (1.0 + np.array([0.1, 0.5, 1.0]) * (1.0 + j0(2 * np.pi * 4.8 / 10.0))) ** -0.5

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.special import j0, j1
 
 import engine
 import studies
@@ -18,6 +19,7 @@ from studies.maps.map_scene import Ground, threshold
 from studies.maps.methods import METHODS, hht
 from studies.maps.table import MAPS
 from studies.protocol.parts import Work
+from studies.protocol.study import kind_of, question_of
 from studies.reporting import report
 from studies.results.results import Results
 from tests.bodies import frames
@@ -102,8 +104,6 @@ def test_the_parametric_tongue(mass: float, within: float) -> None:
 
 
 def test_the_one_mode_formula_of_a_pinned_beam_has_bessel_functions() -> None:
-    from scipy.special import j0, j1
-
     z = math.pi  # amplitude 1/2
     inertia = 1.0 + j0(z) + (0.5 * math.pi) ** 2 * (0.5 - j1(z) / z)
     mass = np.array([0.1, 1.0, 7.0])
@@ -191,8 +191,6 @@ def test_a_mass_tied_by_its_place_rings_and_damping_calms_it() -> None:
 
 
 def question() -> Any:
-    from studies.protocol.study import question_of
-
     return question_of(study(), KIND.settings)
 
 
@@ -272,8 +270,6 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_what_the_maps_cannot_stand_on_is_refused(name: str) -> None:
-    from studies.protocol.study import kind_of
-
     tables, where = BAD[name]
     with pytest.raises(BadInput) as caught:
         kind_of(study(**tables))

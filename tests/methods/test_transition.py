@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from engine.march.tables import SceneTables
 from engine.methods.comparison import runge_kutta, wilson_theta
@@ -161,8 +162,6 @@ def test_steps_at_a_frozen_station_equal_the_dense_twin(name: str, advance: floa
 @pytest.mark.parametrize("advance", [0.0, 0.01])
 def test_comparison_schemes_tend_to_the_same_exact_matrix(advance: float) -> None:
     """Small steps of any consistent scheme turn the frozen station's state by the matrix exponential."""
-    from scipy.linalg import expm
-
     study, model = scene()
     h = 1e-4
     twin = Twin(0.4, 0.0, lambda t: (0.37, advance / 20 / h, 0.0))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
+import xarray as xr
 
 from results_schema.errors import ArchiveError, BadInput, OutputFailed
 from results_schema.store import files
@@ -15,9 +15,6 @@ from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from studies.reporting import answers
 from studies.reporting.report import PAGE, write_report
 from tests.studies import scenes
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 KINDS = tuple(scenes.MOTIONS)
 MINUS = "\N{MINUS SIGN}"

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 import engine
 import studies
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.scene.study import Study
+from engine.scene.study import Study
 
 KINDS = ("eigenfrequencies", "influence")
 MASS = 'mass = { of = "carriage.car.mass", values = [20.0, 50.0] }'

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 import engine
 import studies
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SCHEMES = ("average-acceleration", "fox-goodwin", "richardson", "lagged-inertia", "lagged-convective")
 TEXT = f"""\

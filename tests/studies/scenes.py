@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 import engine
 import studies
+from engine.scene.study import Study
 from results_schema.status import Status
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from engine.scene.study import Study
 
 BED = """\
 [body.bed]
