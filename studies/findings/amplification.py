@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.results.results import Index, Results, extreme
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
 
 (DYNAMIC_AMPLIFICATION,) = outputs("""
     dynamic_amplification | sensor | | nan | dynamic amplification

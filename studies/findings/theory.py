@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from engine.model.scene_model import SceneModel
 from results_schema.arrays import Array
 from results_schema.late import interpolate, xr
 from studies.results.results import Results
-
-if TYPE_CHECKING:
-    from engine.model.scene_model import SceneModel
 
 CYCLE_POINTS = 720
 ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites

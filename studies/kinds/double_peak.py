@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.observation.cycle_reduction import Compared, Cycle
+from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.status import Fidelity
@@ -21,11 +22,6 @@ from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import MINUS, counted, listed, number, percent
 from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
-
-if TYPE_CHECKING:
-    from engine.observation.cycle_reduction import Compared, Cycle
-    from engine.scene.study import Study
-
 
 MOST_SENSORS = 3
 STATIONS = 8192  # of a cycle: all steps of nearly every march, so that whatever rings in it is seen as it was marched

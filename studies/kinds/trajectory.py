@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from engine.scene.study import Study
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
 from studies.results.results import Results
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
 
 MOST_SENSORS = 4
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.scene.carriages import Carriage
+from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity
 from studies.results.results import Index, Results, extreme, statuses
-
-if TYPE_CHECKING:
-    from engine.scene.carriages import Carriage
-    from engine.scene.study import Study
 
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.bodies.modal.description import Recorded
+from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.late import xr
 from results_schema.store.archive import Archive
@@ -17,10 +18,6 @@ from studies.findings.numerics_used import is_marched
 from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
 from studies.results.results import Results, envelope_units, sensor_units
-
-if TYPE_CHECKING:
-    from engine.bodies.modal.description import Recorded
-    from engine.scene.study import Study
 
 MODELS = "/model/"
 SAME = 1e-9  # relative difference of an axis's values from those of the study: other machines round otherwise
