@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.floating.elastic import ABOUT_X, CELLS, ElasticBody, Y, Z, elastic_body
+from engine.floating.bodies import elastic_body
+from engine.floating.elastic import ABOUT_X, CELLS, ElasticBody, Y, Z
 from engine.floating.grips import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
@@ -143,6 +144,7 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
     motions += dict.fromkeys(load.course for load in loads if load.course)
     found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)
     _check_held(found)
+    _check_readings(found)
     return found
 
 
@@ -251,11 +253,11 @@ def _joints(study: Study, name: str, size: int, motions: list[str]) -> Iterator[
 
 
 def _check_held(model: FloatingModel) -> None:
-    """A frame sits where the shapes of its body vanish, unless that moves freely, and a joint that is driven or
-    controlled about an axis holds the track's direction."""
+    """A frame sits where the shapes of its body vanish, unless that moves freely or has supports elsewhere, and a joint
+    that is driven or controlled about an axis holds the track's direction."""
     for name, body in model.bodies.items():
         joints = model.frame(name).joints
-        if not body.omega.size or any(isinstance(joint, Free) for joint in joints):
+        if not body.omega.size or not body.slender or any(isinstance(joint, Free) for joint in joints):
             continue
         at = body.fields(np.zeros(1), (0,))[0, 0]
         far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0, :, : Z + 1]).max()
@@ -274,6 +276,18 @@ def _check_held(model: FloatingModel) -> None:
                 where=where,
                 expected="clamped at its beginning",
                 remedy="a rigid body on the joint that carries this one, for a beam in a cradle",
+            )
+
+
+def _check_readings(model: FloatingModel) -> None:
+    """Forces and stresses are read of beams, not of frames of them."""
+    for name, sensor in model.study.sensor.items():
+        if sensor.under is None and not model.bodies[str(sensor.body)].slender and sensor.reads.derivative:
+            raise BadInput(
+                "this quantity of a frame of beams in a frame that moves is not built yet",
+                where=model.study.source.where(f"sensor.{name}.quantity"),
+                expected="displacement, velocity or acceleration",
+                received=sensor.quantity,
             )
 
 

@@ -23,8 +23,9 @@ DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection 
 
 def lacking(body: ElasticBody) -> float:
     """Stiffness that a body lacks which is not stiffened by its rotation, over its own, per square of the rate (s2):
-    the largest eigenvalue of int x G dm over diag(omega^2), G the foreshortening. 0 where none lacks."""
-    if body.stiffens or not body.omega.size:
+    the largest eigenvalue of int x G dm over diag(omega^2), G the foreshortening. 0 where none lacks, or where that is
+    not known, as of frames of beams."""
+    if body.stiffens or not body.slender or not body.omega.size:
         return 0.0
     _, along = replace(body, stiffens=True).stiffening()
     return float(np.linalg.eigvalsh(along / np.multiply.outer(body.omega, body.omega))[-1])

@@ -1,0 +1,154 @@
+"""Frames of beams as bodies whose frames move: beside a beam, finite elements, and what is conserved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from engine.bodies.frame.assembly import assemble
+from engine.bodies.frame.body import motion_of_points
+from engine.bodies.frame.frame import Frame as FrameBody
+from engine.floating.model import build
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from tests.floating.scenes import ARM, FOX_GOODWIN, history, steps
+
+STEEL = {"youngs_modulus": 2.1e11, "shear_modulus": 8.1e10, "density": 7850.0}
+BOX = STEEL | {"area": 4e-3, "second_moment": 9e-6, "second_moment_lateral": 5e-6, "torsion_constant": 8e-6}
+PORTAL = {
+    "kind": "frame",
+    "node": {"foot": [0, 0, 0], "left": [0, 0, 3], "right": [4, 0.5, 3], "end": [4, 0.5, 0]},
+    "section": {"box": BOX},
+    "member": {
+        "column": {"nodes": ["foot", "left"], "section": "box", "up": [1, 0, 0]},
+        "girder": {"nodes": ["left", "right"], "section": "box"},
+        "other": {"nodes": ["right", "end"], "section": "box", "up": [1, 0, 0]},
+    },
+    "point_mass": {"motor": {"node": "right", "mass": 40.0, "inertia": [2, 3, 2.5], "offset": [0.1, 0.2, 0.3]}},
+    "supports": {"foot": "clamped", "end": "clamped"},
+    "track": {"members": ["girder"]},
+    "damping_ratio": 0.01,
+    "modes": 8,
+    "own_weight": True,
+}
+SHAKE = {"kind": "swing", "amplitude": 0.05, "frequency": 3.0}
+
+
+def study(body: dict, frame: dict, **more: object) -> Study:
+    return Study(kind="moving-frames", body={"portal": body}, frame={"portal": frame}, **({"gravity": 9.81} | more))
+
+
+def test_integrals_are_those_of_the_finite_elements() -> None:
+    """Mass, modal masses, modal momenta along and about all axes, and the rigid body's inertia: particles beside the
+    mass matrix."""
+    scene = study(PORTAL, {"joints": [{"kind": "prismatic", "axis": [1, 0, 0], "motion": SHAKE}]})
+    body = build(scene).bodies["portal"]
+    frame = scene.body["portal"]
+    assert isinstance(frame, FrameBody)
+    assembly, motion = motion_of_points(frame)
+    shapes = motion.reshape(-1, motion.shape[2])[assembly.free]
+    axes = np.stack([[4, 0.5, 0], [0.5, -4, 0], [0, 0, -1]]) / np.array([[np.sqrt(16.25)], [np.sqrt(16.25)], [1.0]])
+    modal = np.einsum("g,gai,gaj->ij", body.weights, body.shapes, body.shapes)
+    assert modal == pytest.approx(np.eye(8), abs=1e-9)
+    momentum = np.einsum("g,gai->ai", body.weights, body.shapes)
+    assert momentum == pytest.approx(axes @ (assembly.drag.T @ shapes), rel=1e-9, abs=1e-9)
+    arms = assembly.mesh.points - [0, 0, 3]
+    about = np.zeros((len(arms), 6, 3))
+    for axis, e in enumerate(axes):
+        about[:, :3, axis], about[:, 3:, axis] = np.cross(e, arms), e
+    spin = np.einsum("g,gai->ai", body.weights, np.cross(body.places[:, :, None], body.shapes, axis=1))
+    mass = assemble(frame.model_copy(update={"supports": {}})).mass
+    assert spin == pytest.approx(about.reshape(-1, 3).T @ (mass @ motion.reshape(-1, 8)), rel=1e-9, abs=1e-9)
+    assert body.weights.sum() == pytest.approx(assembly.total_mass, rel=1e-12)
+
+
+def test_one_member_is_a_beam() -> None:
+    """A clamped arm that is swung, and turned by its weight: as the beam it is made of."""
+    section = {key: ARM[key] for key in ("area", "second_moment", "youngs_modulus", "density")}
+    member = {"nodes": ["root", "tip"], "section": "all", "elements": 32}
+    frame = {
+        "kind": "frame",
+        "node": {"root": [1, 2, 5], "tip": [11, 2, 5]},
+        "section": {"all": section | {"second_moment_lateral": 1e-3, "shear_modulus": 1e13, "torsion_constant": 1e-3}},
+        "member": {"all": member},
+        "supports": {"root": "clamped"},
+        "track": {"members": ["all"]},
+        "modes": 2,
+        "own_weight": True,
+    }
+    swing = {
+        "joints": [{"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.5, "time": 2.0}}]
+    }
+    load = {
+        "kind": "mass",
+        "on": "portal",
+        "mass": 1.0,
+        "motion": {"kind": "cruise", "start": 0.0, "end": 9.0, "speed": 3.0},
+    }
+    found = []
+    for body in (frame, ARM | {"modes": 2, "own_weight": True}):
+        model, marched = steps(study(body, swing, carriage={"load": load}), 4.0, 4000, 40, FOX_GOODWIN)
+        found.append(history(model, marched, "ends", 0, 3))
+    assert found[0] == pytest.approx(found[1], abs=2e-5)
+
+
+def test_a_shaken_base() -> None:
+    """A frame on a base that shakes, beside its modes under the base's acceleration; order 2."""
+    joint = {"kind": "prismatic", "axis": [1, 0, 0], "motion": SHAKE}
+    sensor = {"middle": {"body": "portal", "at": 2.0}}
+    scene = study(PORTAL, {"joints": [joint]}, sensor=sensor, gravity=0.0)
+    frame = scene.body["portal"]
+    assert isinstance(frame, FrameBody)
+    assembly, motion = motion_of_points(frame)
+    modal = frame.build()
+    push = (motion.reshape(-1, 8)[assembly.free].T @ assembly.drag) @ np.array([4, 0.5, 0]) / np.sqrt(16.25)
+    rate = 2.0 * np.pi * SHAKE["frequency"]
+
+    def law(t: float, state: np.ndarray) -> np.ndarray:
+        q, u = np.split(state, 2)
+        base = -SHAKE["amplitude"] * rate**2 * np.sin(rate * t)
+        return np.concatenate([u, -push * base - 0.02 * modal.omega * u - modal.omega**2 * q])
+
+    row = modal.shapes.derivatives(np.array([2.0]), (0,))[0][0]
+    errors = []
+    for count in (2000, 4000):
+        model, marched = steps(scene, 1.0, count, count // 100)
+        times = np.linspace(0.0, 1.0, 101)
+        wanted = row @ solve_ivp(law, (0, 1), np.zeros(16), "DOP853", times, rtol=1e-10, atol=1e-13).y[:8]
+        errors.append(np.abs(history(model, marched, "sensors")[:, 0] - wanted).max() / np.abs(wanted).max())
+    assert errors[-1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_free_frame_keeps_its_momentum() -> None:
+    """In space, tumbling, with a carriage on it: momentum, angular momentum and energy."""
+    free = PORTAL | {"supports": {}, "damping_ratio": 0.0}
+    joint = {"kind": "free", "rate": [0.3, -0.5, 0.4], "velocity": [0.1, 0.2, 0.3]}
+    load = {"kind": "mass", "on": "portal", "mass": 20.0, "motion": {"kind": "free", "start": 1.0, "speed": 0.3}}
+    drifts = []
+    for count in (4000, 8000):
+        model, marched = steps(study(free, {"joints": [joint]}, carriage={"load": load}, gravity=0.0), 1.0, count, 40)
+        energy = history(model, marched, "whole", 0, 2).sum(axis=1)
+        momentum = history(model, marched, "whole", 2, 6)
+        size = np.repeat([np.abs(momentum[0, :3]).max(), np.abs(momentum[0, 3:]).max()], 3)
+        drifts.append(max(np.ptp(energy) / energy[0], (np.ptp(momentum, axis=0) / size).max()))
+    assert drifts[0] < 1e-4
+    assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"supports": {}}, "supports"),
+        ({"mass_matrix": "lumped"}, "mass_matrix"),
+        (
+            {"point_mass": {"a": {"node": "left", "mass": 1.0, "inertia": [0, 0, 5]}}},
+            "point_mass.a.inertia",
+        ),
+    ],
+)
+def test_what_is_not_built_is_refused(change: dict, where: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        build(study(PORTAL | change, {"joints": [{"kind": "prismatic", "axis": [1, 0, 0], "motion": SHAKE}]}))
+    assert f"body.portal.{where}" in str(refused.value)
