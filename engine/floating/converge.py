@@ -72,13 +72,20 @@ def levels(study: Study, duration: float) -> Iterator[Level]:
     first = STATIONS * max(1, int(np.ceil(least / STATIONS)))
     scheme = scheme_of(study, duration / first * model.highest_omega)
     coarsest = first if fixed == "auto" else int(fixed)
-    every = int(np.ceil(coarsest / STATIONS))
+    every, factor = int(np.ceil(coarsest / STATIONS)), 1
     for level in range(LEVELS):
-        steps = coarsest * 2**level
         modes = FIRST_MODES * 2**level
-        if steps > MOST_STEPS or (fixed != "auto" and level > 1) or (is_open and modes > MOST_MODES):
+        if (fixed != "auto" and level > 1) or (is_open and modes > MOST_MODES):
             return
-        yield Level(build(study, modes) if is_open and level else model, steps, every * 2**level, scheme)
+        own = build(study, modes) if is_open and level else model
+        # more modes are faster ones: a scheme with a limit needs more than twice the steps for twice as many
+        limit = FAR_WITHIN * scheme.stability_limit if fixed == "auto" else np.inf
+        while coarsest * factor * limit < duration * own.highest_omega:
+            factor *= 2
+        if coarsest * factor > MOST_STEPS:
+            return
+        yield Level(own, coarsest * factor, every * factor, scheme)
+        factor *= 2
 
 
 def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:

@@ -171,7 +171,8 @@ def quaternions(rows: Array) -> Array:
 def periods(times: Array, places: Array, speeds: Array) -> Array:
     """(V,) mean times of two passes of the middle of a way, s, of histories (V, stations), cubic between two stations;
     NaN where there are less than three passes."""
-    gap = places - 0.5 * (np.nanmax(places, axis=1) + np.nanmin(places, axis=1))[:, None]
+    highest, lowest = (np.fmax.reduce(side * places, axis=1)[:, None] for side in (1.0, -1.0))
+    gap = places - 0.5 * (highest - lowest)
     side = np.sign(gap)
     own, k = np.nonzero(side[:, :-1] * side[:, 1:] <= 0.0)
     own, k = own[gap[own, k] != 0.0], k[gap[own, k] != 0.0]

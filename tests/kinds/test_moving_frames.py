@@ -16,7 +16,7 @@ from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
 from studies.protocol.study import kind_of
 from studies.results.results import Results
-from tests.floating.scenes import ARM, sliding_mass
+from tests.floating.scenes import ARM, PAPER_BEAM, sliding_mass
 
 SWEPT = {
     "mass": {"of": "carriage.load.mass", "values": [50.0, 100.0]},
@@ -184,6 +184,16 @@ def test_numbers_of_joints_have_units() -> None:
 
     wanted = ends(plain, [0.0, np.pi / 2.0, 0.0], [np.pi / 6.0, np.pi / 3.0])
     assert ends([turn, slide], [0, "90 deg", 0], ["30 deg/s", "10 rpm"]) == pytest.approx(wanted, abs=1e-12)
+
+
+def test_open_modes_hold_a_tight_tolerance() -> None:
+    """Faster modes ask a scheme with a limit for more steps: beside many modes at a hundredth of the tolerance."""
+    body = {"beam": PAPER_BEAM | {"modes": "auto"}}
+    found = studies.run(paper(body=body, solver={"tolerance": 1e-4}))
+    better = studies.run(paper(body={"beam": PAPER_BEAM | {"modes": 24}}, solver={"tolerance": 1e-6}))
+    assert (found["status"] < Status.UNRESOLVED).all()
+    for name in ("load_position_max", "load_position_min"):
+        assert found[name].values == pytest.approx(better[name].values, abs=1e-4 * 15.0)
 
 
 def test_periods_of_histories() -> None:
