@@ -8,16 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.floating.elastic import ElasticBody
+from engine.floating.lanes import lanes
+from engine.kernels.floating.layout import REVOLUTE
 from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
+from engine.scene.time_motions import AMPLITUDE, CONSTANT, PHASE, RATE, START
 from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:
     from engine.floating.march import Marched
     from engine.floating.model import FloatingModel
+    from engine.scene.variants import VariantValues
 
 #: Of its own stiffness that a body may lack by its rotation: a cantilever's lowest frequency is off by 2.5 % then, at a
 #: rate of a fifth of it.
 MISSING = 0.05
+RATES = 513  # times at which given motions are looked at beforehand
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
 
 
@@ -29,6 +34,31 @@ def lacking(body: ElasticBody) -> float:
         return 0.0
     _, along = replace(body, stiffens=True).stiffening()
     return float(np.linalg.eigvalsh(along / np.multiply.outer(body.omega, body.omega))[-1])
+
+
+def given_rates(model: FloatingModel, values: VariantValues, duration: float) -> dict[str, Array]:
+    """(V,) rad/s, the largest rate at which given motions alone turn each body, its own joints' and those of what holds
+    it; within a duration (s)."""
+    motions = lanes(model, values, np.ones(values.size)).motions
+    times = np.linspace(0.0, duration, RATES)
+    found: dict[str, Array] = {}
+    for name in model.bodies:
+        rate = found.get(model.frame(name).on, np.zeros(values.size))
+        for joint in model.joints:
+            if joint.body == name and joint.kind == REVOLUTE and joint.motion >= 0:
+                rate = rate + np.abs(rates_at(motions[:, joint.motion], times)).max(axis=1)
+        found[name] = rate
+    return found
+
+
+def rates_at(pieces: Array, times: Array) -> Array:
+    """(V, T) rates of motions in pieces (V, pieces, 10) at times (T,) s."""
+    number = (pieces[:, None, :, START] <= times[:, None]).sum(axis=2) - 1
+    own = np.take_along_axis(pieces, number[:, :, None], axis=1)
+    x = times - own[:, :, START]
+    powers = sum(k * own[:, :, CONSTANT + k] * x ** (k - 1) for k in range(1, AMPLITUDE - CONSTANT))
+    rate = own[:, :, RATE]
+    return np.asarray(powers + own[:, :, AMPLITUDE] * rate * np.cos(rate * x + own[:, :, PHASE]))
 
 
 def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:

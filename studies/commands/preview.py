@@ -99,7 +99,7 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
         f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
         f"{size(parts.disk_bytes)} on the disk."
     )
-    return Preview(tuple(table for table in tables if table.rows), cost, ())
+    return Preview(tuple(table for table in tables if table.rows), cost, tuple(parts.remarks))
 
 
 def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:

@@ -64,6 +64,11 @@ class MovingFrames(PiecedKind):
 
         return pieces(study, duration)
 
+    def remarks(self, study: Study) -> Sequence[str]:
+        from studies.moving.parts import remarks
+
+        return tuple(remarks(study, question_of(study, Question).duration))
+
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         return gather(pieces, study, self.name)
 

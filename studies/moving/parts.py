@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 from studies.protocol.parts import Piece, Work, usual
-from studies.results.results import sensor_units
+from studies.results.formatting import percent, quantity
+from studies.results.results import sensor_units, spread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +28,7 @@ PIECE_SECONDS = 8.0  # of one piece, about
 STEP_SECONDS, COORDINATE_SECONDS = 5e-7, 3e-7  # of a step, and for each coordinate besides; for sizes of pieces only
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
 NEWTON_STEPS = 4  # from a straight line, for roots to rounding
+LOOKED_AT = 32  # scenes, and variants of each, for what is said beforehand
 BLOCKS = 4  # of lanes in one job at most: those that need more steps fill the lanes anew
 COMPONENTS, QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
@@ -76,6 +78,29 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
             compute = partial(_march, scene.study, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found
+
+
+def remarks(study: Study, duration: float) -> Iterator[str]:
+    """Bodies that given motions alone turn beyond the theory, with the largest rate among some of the variants."""
+    from engine.floating.model import build
+    from engine.floating.theory import MISSING, given_rates, lacking
+    from engine.scene.sweep import expand
+    from engine.scene.variants import VariantValues
+
+    cases = expand(study)
+    worst: dict[str, tuple[float, float]] = {}
+    for scene in scenes(study, cases)[:LOOKED_AT]:
+        model, own = build(scene.study, 2), scene.variants[spread(scene.variants.size, LOOKED_AT)]
+        rates = given_rates(model, VariantValues(scene.study, cases.columns_of(own), own.size), duration)
+        for name, body in model.bodies.items():
+            rate = float(rates[name].max())
+            worst[name] = max(worst.get(name, (0.0, 0.0)), (lacking(body) * rate**2, rate))
+    for name, (missing, rate) in worst.items():
+        if missing > MISSING:
+            yield (
+                f"{name} is turned with up to {quantity(rate, 'rad s-1')}, at which it lacks {percent(missing)} of its "
+                f"stiffness, as frame.{name}.stiffening is off: such variants are beyond the theory, or diverge"
+            )
 
 
 def results_names(model: FloatingModel) -> list[str]:

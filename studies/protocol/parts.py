@@ -244,7 +244,6 @@ class Pieces:
     """Pieces by name, computed one after another. Raises BadInput where the study asks for what only variants have."""
 
     noun, words = "piece", "the pieces and the archive"
-    remarks: Sequence[str] = ()
 
     def __init__(self, kind: PiecedKind, study: Study) -> None:
         if study.output.unreduced:
@@ -255,6 +254,7 @@ class Pieces:
             raise study.source.fault("solver.audit", what, expected='0 or "auto"')
         self.kind, self.study = kind, study
         self.pieces = kind.pieces(study)
+        self.remarks = kind.remarks(study)
         self.names: Sequence[str] = [piece.name for piece in self.pieces]
         self.disk_bytes = PIECES_BYTES + 2 * sum(piece.size for piece in self.pieces)
 

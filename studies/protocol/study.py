@@ -126,6 +126,10 @@ class PiecedKind(Kind, ABC):
 
         return parts.Pieces(self, study)
 
+    def remarks(self, study: Study) -> Sequence[str]:
+        """What a user should know before believing the study."""
+        return ()
+
     @abstractmethod
     def pieces(self, study: Study) -> Sequence[Piece]:
         """The work, always the same for the same study; nothing large is computed."""

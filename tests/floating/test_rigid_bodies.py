@@ -167,7 +167,7 @@ class Chain:
 def test_a_chain_of_six_joints() -> None:
     """Skew joints, one of which slides on a spring, two damped: the end's place by another recursion and SciPy, to
     1e-9, the steps' error extrapolated away."""
-    chain, duration = Chain(6), 0.4
+    chain, duration = Chain(6), 0.2
     start = np.concatenate([chain.start, chain.rates])
     exact = solve_ivp(chain.rates_of, (0.0, duration), start, "DOP853", rtol=1e-12, atol=1e-12).y[:6, -1]
     wanted = chain.forces(exact, np.zeros(6), np.zeros(6))[1]

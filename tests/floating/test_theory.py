@@ -71,6 +71,21 @@ def test_variants_beyond_the_theory_keep_their_values() -> None:
     assert np.isnan(stiff["unstiffened_time"]).all()
 
 
+def test_check_says_so_before_anything_is_marched() -> None:
+    """The largest rate of given motions, of a body and of what holds it; nothing where it is slow, or stiffened."""
+    sweep = {"rate": {"of": "frame.arm.joints.0.motion.rate", "values": RATES}}
+    (said,) = KIND.remarks(spin_up(20.0, {}, sweep=sweep))
+    lacks = lacking(build(spin_up(20.0, {})).bodies["arm"]) * 36.0
+    assert lacks == pytest.approx(3.0, rel=0.02)
+    assert "up to 6 rad/s" in said and "lacks 300 % of its stiffness" in said
+    assert KIND.remarks(spin_up(20.0, {"stiffening": True})) == ()
+    assert KIND.remarks(spin_up(2.0, {})) == ()  # it has hardly begun to turn
+    hub = {"kind": "rigid", "length": 1.0, "mass": 1.0, "inertia": 1.0}
+    frames = {"hub": {"joints": [SPIN_UP]}, "arm": {"on": "hub"}}
+    (said,) = KIND.remarks(spin_up(20.0, {}, body={"hub": hub, "arm": ARM}, frame=frames))
+    assert said.startswith("arm is turned with up to 6 rad/s")
+
+
 def test_what_bends_far_is_marked() -> None:
     """A cantilever under its own weight alone, which bends by 2 w L^4/(8 E I) when it is let go: whatever turns."""
     for density, status in ((1300.0, Status.OK), (1600.0, Status.BEYOND_THEORY)):
