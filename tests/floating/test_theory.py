@@ -21,11 +21,11 @@ RATES = [0.4, 0.9, 6.0]  # rad/s; the arm's lowest frequency is 3.8 rad/s
 SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
 
 
-def spin_up(duration: float, frame: dict[str, object], **more: object) -> Study:
+def spin_up(duration: float, arm: dict[str, object], **more: object) -> Study:
     """The arm of Kane, Ryan and Banerjee (1987)."""
     tables: dict[str, object] = {
         "body": {"arm": ARM | {"modes": 2}},
-        "frame": {"arm": {"joints": [SPIN_UP]} | frame},
+        "frame": {"arm": {"joints": [SPIN_UP]} | arm},
         "sensor": {"tip": {"body": "arm", "at": 10.0}},
         "question": {"duration": duration},
     }
