@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from engine.bodies.beam.beam import Beam
 from engine.bodies.frame.frame import Frame as FrameBody
+from engine.bodies.imported.imported import Ansys, Matrices, Nastran
 from engine.bodies.rigid.rigid import Rigid
 from engine.floating.elastic_beam import elastic_beam, rigid_body
 from engine.floating.elastic_frame import elastic_frame
+from engine.floating.elastic_imported import elastic_imported
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]]
     Beam: elastic_beam,
     Rigid: rigid_body,
     FrameBody: elastic_frame,
+    Matrices: elastic_imported,
+    Ansys: elastic_imported,
+    Nastran: elastic_imported,
 }
 
 
@@ -31,7 +36,7 @@ def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> Ela
         raise BadInput(
             "bodies of this kind in a frame that moves are not built yet",
             where=f"{where}.kind",
-            expected="beam, frame or rigid",
+            expected="beam, frame, rigid, matrices, ansys or nastran",
             received=body.kind,
         )
     return build(body, frame, modes, where)

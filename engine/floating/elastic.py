@@ -5,11 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from engine.bodies.frame.geometry import unit
 from results_schema.arrays import Array
+from results_schema.errors import BadInput
+
+if TYPE_CHECKING:
+    from engine.scene.frames import Frame
 
 #: Cells of the tables along a track: polynomials of degree 5 are off by (k h)^6/720 of a shape of wave number k, 1e-12
 #: of the tenth mode of a beam.
@@ -31,8 +36,8 @@ class ElasticBody:
 
     mass kg, length m; omega (N,) rad/s. places (G, 3) m and weights (G,) kg; shapes (G, 3, N) there, kg^(-1/2).
     own_inertia (3,): kg m2 that the places do not have. along: what moves along the track. slender: whether all of its
-    mass lies there. bent (S,) -> (S, N, N): v_i' v_j' + w_i' w_j' along the track, and its derivative, where the track
-    grows shorter as it bends.
+    mass lies there. rolls: whether its rotation about the track is known. bent (S,) -> (S, N, N): v_i' v_j' + w_i' w_j'
+    along the track, and its derivative, where the track grows shorter as it bends.
     """
 
     length: float
@@ -45,6 +50,7 @@ class ElasticBody:
     along: Along
     stiffens: bool
     slender: bool = True
+    rolls: bool = True
 
     def fields(self, x: Array, orders: Sequence[int]) -> Array:
         """(orders, S, 6, N) derivatives by x of displacements and rotations of every mode at places (S,) m."""
@@ -91,6 +97,24 @@ class ElasticBody:
         rate = np.einsum("sai,saj->sij", one[:, across], one[:, across])
         change = np.einsum("sai,saj->sij", two[:, across], one[:, across])
         return rate, change + np.swapaxes(change, 1, 2)
+
+
+def floating_axes(tangent: Array, direction: Array) -> Array:
+    """(3, 3) rows: x along the track, z as far as can be where loads push it."""
+    x = unit(tangent)
+    z = unit(direction - (direction @ x) * x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def refuse_beam_words(frame: Frame, where: str) -> None:
+    """Raise BadInput for what is said of beams alone, for a body at a dotted key."""
+    for key in ("lateral_modes", "axial_modes", "stiffening"):
+        if getattr(frame, key):
+            raise BadInput(
+                "this body bends in all directions by its own modes, and does not stiffen as it turns",
+                where=f"frame.{where.split('.')[1]}.{key}",
+                expected="left out",
+            )
 
 
 def hermite(values: Array, width: float) -> Array:

@@ -12,9 +12,8 @@ from engine.bodies.frame.assembly import Assembly
 from engine.bodies.frame.body import motion_of_points
 from engine.bodies.frame.frame import Frame as FrameBody
 from engine.bodies.frame.frame import PointMass
-from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.track import TrackBeams, TrackPoints, line_of
-from engine.floating.elastic import AXES, ElasticBody, Z
+from engine.floating.elastic import AXES, ElasticBody, Z, floating_axes, refuse_beam_words
 from engine.scene.frames import Frame
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
@@ -108,22 +107,9 @@ def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str) 
     )
 
 
-def floating_axes(tangent: Array, direction: Array) -> Array:
-    """(3, 3) rows: x along the track, z as far as can be where loads push it."""
-    x = unit(tangent)
-    z = unit(direction - (direction @ x) * x)
-    return np.stack([x, np.cross(z, x), z])
-
-
 def _check(body: FrameBody, frame: Frame, where: str) -> None:
     """Refuse what is not built of frames in frames that move."""
-    for key in ("lateral_modes", "axial_modes", "stiffening"):
-        if getattr(frame, key):
-            raise BadInput(
-                "a frame of beams bends in all directions by its own modes, and does not stiffen as it turns",
-                where=f"frame.{where.split('.')[1]}.{key}",
-                expected="left out",
-            )
+    refuse_beam_words(frame, where)
     if body.mass_matrix != "consistent":
         raise BadInput(
             "lumped masses in a frame that moves are not built yet",

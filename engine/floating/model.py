@@ -145,6 +145,7 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
     found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)
     _check_held(found)
     _check_readings(found)
+    _check_rolling(found)
     return found
 
 
@@ -288,6 +289,28 @@ def _check_readings(model: FloatingModel) -> None:
                 where=model.study.source.where(f"sensor.{name}.quantity"),
                 expected="displacement, velocity or acceleration",
                 received=sensor.quantity,
+            )
+
+
+def _check_rolling(model: FloatingModel) -> None:
+    """Nothing turns with a track whose rotation about itself no row of its model tells."""
+    where = model.study.source.where
+    for name, carriage in model.study.carriage.items():
+        turns = any(model.study.value(f"carriage.{name}.{key}") for key in ("inertia", "height"))
+        if turns and not model.bodies[carriage.on].rolls:
+            raise BadInput(
+                "a solid model's rotation about its track is not known: nothing turns with it",
+                where=where(f"carriage.{name}"),
+                expected="no inertia and no height",
+            )
+    for name in model.bodies:
+        on = model.frame(name).on
+        if on != GROUND and not model.bodies[on].rolls:
+            raise BadInput(
+                "a solid model's rotation about its track is not known: nothing hangs on it",
+                where=where(f"frame.{name}.on"),
+                expected="a beam, a frame of beams, or a rigid body",
+                received=on,
             )
 
 
