@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,35 +15,20 @@ from results_schema.variables import Variable, axes, expand
 _TEXT_KINDS = "UTO"
 _COUNT_SHOWN = 3
 LARGEST = 1e150  # of a number: the square of a larger one is none
-_NONE: Mapping[str, str] = MappingProxyType({})
 
 
-def validate(
-    dataset: xr.Dataset,
-    kind: str,
-    sensors: Mapping[str, str],
-    carriages: Sequence[str],
-    envelopes: Mapping[str, str] = _NONE,
-) -> None:
-    """Compare a dataset of a kind ("passage"; a group: "/audit") with what is declared.
+def validate(dataset: xr.Dataset, kind: str, declared: Mapping[str, Variable]) -> None:
+    """Compare a dataset of a kind ("passage"; a group: "/audit") with what is declared, as `expand` has it.
 
-    sensors, envelopes: name -> unit. The grid is the dimensions of `status` (of a group: none). Raises ArchiveError
-    that lists all findings.
+    The grid is the dimensions of `status` (of a group: none). Raises ArchiveError that lists all findings.
     """
-    findings = list(findings_of(dataset, kind, sensors, carriages, envelopes))
+    findings = list(findings_of(dataset, kind, declared))
     if findings:
         raise ArchiveError(f"the results of {kind} are not as declared: " + "; ".join(findings))
 
 
-def findings_of(
-    dataset: xr.Dataset,
-    kind: str,
-    sensors: Mapping[str, str],
-    carriages: Sequence[str],
-    envelopes: Mapping[str, str] = _NONE,
-) -> Iterator[str]:
+def findings_of(dataset: xr.Dataset, kind: str, declared: Mapping[str, Variable]) -> Iterator[str]:
     """Every difference from the declarations as one text."""
-    declared = expand(kind, sensors, carriages, envelopes)
     grid = tuple(map(str, dataset["status"].dims)) if "status" in dataset else ()
     for name, variable in declared.items():
         if variable.required and name not in dataset:
@@ -62,23 +46,17 @@ def findings_of(
         yield from _coordinate_findings(dataset, name)
 
 
-def root_findings(
-    dataset: xr.Dataset,
-    kind: str,
-    sensors: Mapping[str, str],
-    carriages: Sequence[str],
-    envelopes: Mapping[str, str] = _NONE,
-) -> Iterator[str]:
+def root_findings(dataset: xr.Dataset, kind: str, declared: Mapping[str, Variable]) -> Iterator[str]:
     """Every difference of what an archive holds from the declarations, and every number that cannot be."""
     yield from _number_findings(dataset)
-    yield from findings_of(dataset, kind, sensors, carriages, envelopes)
+    yield from findings_of(dataset, kind, declared)
     yield from _index_findings(dataset, "history", int(dataset["status"].size))
 
 
 def group_findings(dataset: xr.Dataset, path: str, size: int) -> Iterator[str]:
     """The same of a group of an archive ("/audit"). size: variants of the study."""
     yield from _number_findings(dataset)
-    yield from findings_of(dataset, path, {}, ())
+    yield from findings_of(dataset, path, expand(path))
     yield from _index_findings(dataset, "sample", size)
 
 

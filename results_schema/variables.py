@@ -39,6 +39,7 @@ _RESERVED_WORDS = """
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
     tolerance_asked worst_result left_out scheme_used
 """
+_NONE: Mapping[str, str] = MappingProxyType({})
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
 
@@ -62,7 +63,10 @@ def axes() -> dict[str, Variable]:
 
 
 def expand(
-    kind: str, sensors: Mapping[str, str], carriages: Sequence[str], envelopes: Mapping[str, str] = MappingProxyType({})
+    kind: str,
+    sensors: Mapping[str, str] = _NONE,
+    carriages: Sequence[str] = (),
+    envelopes: Mapping[str, str] = _NONE,
 ) -> dict[str, Variable]:
     """The declarations of a kind with the names and units of one study filled in.
 

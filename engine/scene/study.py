@@ -28,7 +28,7 @@ from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Status, label
-from results_schema.variables import RESERVED, expand, sensor_unit
+from results_schema.variables import RESERVED, Variable, expand, sensor_unit
 
 SCHEMA_VERSION = 1
 STANDARD_GRAVITY = 9.80665
@@ -188,6 +188,28 @@ class Study(Scene):
             return {path: 1}
         follow = self.train[name].follow(key)
         return {f"carriage.{axle_name(name, axle)}.{own}": factor for axle, own, factor in follow}
+
+    @property
+    def sensor_units(self) -> dict[str, str]:
+        """Name and unit of every sensor."""
+        return {name: sensor_unit(sensor.quantity) for name, sensor in self.sensor.items()}
+
+    @property
+    def envelope_units(self) -> dict[str, str]:
+        """Name and unit of every envelope."""
+        return {name: sensor_unit(envelope.quantity) for name, envelope in self.envelope.items()}
+
+    def results(self, kind: str) -> dict[str, Variable]:
+        """What a kind of study tells of this scene, by name. Raises BadInput where two would have one name."""
+        try:
+            found = expand(kind, self.sensor_units, tuple(self.carriage), self.envelope_units)
+        except BadInput as error:
+            raise error.moved(self._source.where(error.where)) from None
+        for name in self.sweep.axes:
+            if name in found:
+                what = "a result has this name"
+                raise self._source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
+        return found
 
     def with_values(self, values: Mapping[str, Any]) -> Study:
         """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML."""
@@ -369,16 +391,7 @@ def _check_names(study: Study) -> None:
                 raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
             if table not in ("body", "load", "spring") and name in RESERVED:
                 raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
-    sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
-    envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
-    try:
-        results = expand("march", sensors, list(study.carriage), envelopes)
-    except BadInput as error:
-        raise error.moved(study.source.where(error.where)) from None
-    for name in study.sweep.axes:
-        if name in results:
-            what = "a result has this name"
-            raise study.source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
+    study.results("march")
 
 
 def _check_references(study: Study) -> None:

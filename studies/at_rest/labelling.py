@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from engine.model.distinct_models import base_scene
 from results_schema.late import xr
 from results_schema.variable import outputs
-from results_schema.variables import Variable, axes, expand
+from results_schema.variables import axes
 from studies.at_rest.positions import Asked, Positions, positions_of
 from studies.protocol.parts import usual
 from studies.protocol.study import question_of
-from studies.results.results import sensor_units
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -54,7 +53,7 @@ class Gathering:
         self.pieces, self.asked = pieces, question_of(study, kind.settings)
         self.model, self.cases, self.places = base_scene(study), expand(study), positions_of(study, self.asked)
         self.inner = kind.inner(self.model)
-        self.declared = _declared(kind.name, study)
+        self.declared = study.results(kind.name)
 
     def dataset(self) -> xr.Dataset:
         """Everything, labelled."""
@@ -134,8 +133,3 @@ class Gathering:
             part = np.divide(reduced - full, size, out=np.zeros_like(full), where=size > 0.0)
             found[f"{name}_difference"] = self.declared[f"{name}_difference"].holding(part, dims)
         return found
-
-
-def _declared(kind: str, study: Study) -> dict[str, Variable]:
-    """The kind's declarations for the names of a study."""
-    return expand(kind, sensor_units(study), tuple(study.carriage))

@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 from studies.protocol.parts import Piece, Work, usual
 from studies.results.formatting import percent, quantity
-from studies.results.results import sensor_units, spread
+from studies.results.results import spread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -235,10 +235,9 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     from engine.floating.results import results_of
     from engine.scene.sweep import expand
     from results_schema.variables import axes
-    from results_schema.variables import expand as declared_for
 
     cases, model = expand(study), build(study.without_sweep(), 2)
-    declared = declared_for(kind, sensor_units(study), tuple(study.carriage))
+    declared = study.results(kind)
     labels = {"frame": list(model.bodies), "component": COMPONENTS, "quaternion": QUATERNION}
     own = list(parts.values())
     whole = {str(name): np.concatenate([part[name].values for part in own]) for name in own[0].data_vars}

@@ -18,9 +18,9 @@ from results_schema.errors import Interrupted, OutputFailed
 from results_schema.late import xr
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
-from results_schema.variables import declarations, expand
+from results_schema.variables import declarations
 from studies.protocol.stopping import Stop
-from studies.results.results import Results, envelope_units, sensor_units
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.execution import Progress
@@ -185,7 +185,7 @@ class Variants:
 
         study = self.plan.study
         dataset = self.kind.summarise(build(self.plan, found.arrays, found.selected), study)
-        declared = expand(self.kind.name, sensor_units(study), tuple(study.carriage), envelope_units(study))
+        declared = study.results(study.kind)
         # The engine offers static values to every summary; they are results only where the kind says so.
         offered = [name for sensor in study.sensor if (name := f"{sensor}_static") not in declared]
         return dataset.drop_vars(offered, errors="ignore")

@@ -16,9 +16,7 @@ from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.pieces import Pieces, lacks, no_row_of
 from results_schema.validate import validate
-from results_schema.variables import expand
 from studies.protocol.parts import Memory, Variants, Work
-from studies.results.results import envelope_units, sensor_units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,12 +62,14 @@ class Kind:
         """Refuse a scene that does not suit the kind. Raises BadInput; nothing large is computed."""
 
     def check_tables(self, study: Study) -> None:
-        """Refuse a table [question], or options in it, that the kind does not know. Raises BadInput."""
+        """Refuse a table [question], or options in it, that the kind does not know, and names that results of the kind
+        have. Raises BadInput."""
         if self.settings is not None:
             question_of(study, self.settings)
         elif study.question:
             what, received = f"studies of the kind {self.name} have no options", f"the keys {', '.join(study.question)}"
             raise study.source.fault("question", what, expected="no table [question]", received=received)
+        study.results(study.kind)
 
     def parts(self, study: Study) -> Parts:
         """The work. Raises BadInput where it cannot be done."""
@@ -118,8 +118,6 @@ class PiecedKind(Kind, ABC):
             what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
             raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))
         super().check_tables(study)
-        if self.sweeps:
-            _check_names(study)
 
     def parts(self, study: Study) -> Parts:
         from studies.protocol import parts
@@ -159,18 +157,6 @@ def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
         return whole.model_validate(data).question  # type: ignore[attr-defined, no-any-return]
     except ValidationError as error:
         refuse(error, whole, data, study.source)
-
-
-def _check_names(study: Study) -> None:
-    """Refuse names of sensors, carriages and axes that the kind's own results have."""
-    try:
-        declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
-    except BadInput as error:
-        raise error.moved(study.source.where(error.where)) from None
-    for name in study.sweep.axes:
-        if name in declared:
-            what = "a result has this name"
-            raise study.source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
 
 
 KIND_HAS = ("name", "summary", "question", "start")  # those of another package
@@ -255,11 +241,11 @@ def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     Raises ArchiveError where the two differ.
     """
     if "sensor" in dataset.dims:
-        units = ("sensor", list(sensor_units(study).values()), {"long_name": "unit of the sensor"})
+        units = ("sensor", list(study.sensor_units.values()), {"long_name": "unit of the sensor"})
         dataset = dataset.assign_coords(sensor_unit=units)
     missing = {key: value for key, value in study_attributes(study).items() if key not in dataset.attrs}
     dataset = dataset.assign_attrs(missing)
-    validate(dataset, study.kind, sensor_units(study), tuple(study.carriage), envelope_units(study))
+    validate(dataset, study.kind, study.results(study.kind))
     return dataset
 
 

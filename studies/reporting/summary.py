@@ -10,16 +10,14 @@ import numpy as np
 
 from results_schema.late import xr
 from results_schema.status import Status, label
-from results_schema.variables import expand
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.formatting import quantity
-from studies.results.results import Results, sensor_units
+from studies.results.results import Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
 
 if TYPE_CHECKING:
-    from engine.scene.study import Study
     from studies.results.results import Results
     from studies.runs.runner import Outcome
 
@@ -104,7 +102,8 @@ def ranges(study_results: Results) -> Iterator[Range]:
     results = study_results.dataset
     grid = results["status"].dims
     if not is_marched(results):
-        beside = () if is_measured(results) else _beside_the_grid(study_results.study)
+        declared = {} if is_measured(results) else study_results.study.results(study_results.study.kind)
+        beside = {name for name, variable in declared.items() if variable.lead != "grid"}
         for name, array in results.data_vars.items():
             if array.dtype.kind == "f" and name not in beside:
                 yield from _range(study_results, str(name), "", array)
@@ -118,12 +117,6 @@ def ranges(study_results: Results) -> Iterator[Range]:
         elif array.dims == (*grid, "sensor"):
             for place, sensor in enumerate(results["sensor"].values):
                 yield from _range(study_results, str(name), str(sensor), array.isel(sensor=place))
-
-
-def _beside_the_grid(study: Study) -> set[str]:
-    """Results whose dimensions do not begin with the sweep's."""
-    declared = expand(study.kind, sensor_units(study), tuple(study.carriage))
-    return {name for name, variable in declared.items() if variable.lead != "grid"}
 
 
 def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:

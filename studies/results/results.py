@@ -14,7 +14,6 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
-from results_schema.variables import sensor_unit
 from studies.results.formatting import Scale, axis_title, number, quantity, spanned
 
 if TYPE_CHECKING:
@@ -171,7 +170,7 @@ class Results:
     @cached_property
     def sensors(self) -> dict[str, str]:
         """Name and unit of every sensor."""
-        return sensor_units(self.study)
+        return self.study.sensor_units
 
     def noun(self, sensor: str) -> str:
         """What a sensor measures, as a word."""
@@ -209,7 +208,7 @@ class Results:
     @cached_property
     def envelopes(self) -> dict[str, str]:
         """Name and unit of every envelope."""
-        return envelope_units(self.study)
+        return self.study.envelope_units
 
     @cached_property
     def kept(self) -> xr.DataArray:
@@ -348,16 +347,6 @@ def typed_unit(study: Study, axis: str) -> Scale | None:
         return None
     name, size = unit.written(text)
     return Scale(1.0 / size, name)
-
-
-def sensor_units(study: Study) -> dict[str, str]:
-    """Name and unit of every sensor."""
-    return {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
-
-
-def envelope_units(study: Study) -> dict[str, str]:
-    """Name and unit of every envelope."""
-    return {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
 
 
 def statuses(counts: Mapping[Status, int]) -> str:

@@ -17,7 +17,7 @@ from results_schema.variables import declarations
 from studies.findings.numerics_used import is_marched
 from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
-from studies.results.results import Results, envelope_units, sensor_units
+from studies.results.results import Results
 
 MODELS = "/model/"
 SAME = 1e-9  # relative difference of an axis's values from those of the study: other machines round otherwise
@@ -90,8 +90,7 @@ def _findings(archive: Archive, study: Study) -> Iterator[str]:
     yield from _asked_findings(root, study, kind)
     yield from _axis_findings(root, study)
     yield from _label_findings(root, study)
-    names = (sensor_units(study), tuple(study.carriage), envelope_units(study))
-    yield from root_findings(root, study.kind, *names)
+    yield from root_findings(root, study.kind, study.results(study.kind))
     for path, group in archive.groups.items():
         yield from (f"{path}: {text}" for text in group_findings(group, path, int(root["status"].size)))
     yield from _model_findings(root, study, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
@@ -151,6 +150,6 @@ def _asked_findings(root: xr.Dataset, study: Study, kind: Kind) -> Iterator[str]
 
 def _label_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
     """Names of sensors and their units."""
-    for name, wanted in (("sensor", list(study.sensor)), ("sensor_unit", list(sensor_units(study).values()))):
+    for name, wanted in (("sensor", list(study.sensor)), ("sensor_unit", list(study.sensor_units.values()))):
         if name in root.coords and root[name].values.tolist() != wanted:
             yield f"{name}: expected {wanted}, received {root[name].values.tolist()}"

@@ -17,6 +17,7 @@ from results_schema.variables import registered
 from studies.findings import theory
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.protocol import study as running
+from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.results.results import Results
 from tests.engine.build import beam, force, shuttle, study, under
@@ -57,6 +58,11 @@ def test_a_result_that_is_missing_is_noticed() -> None:
         running.compared(dataset.drop_vars("lag"), study)
 
 
+HISTORIES = '[output]\nhistories = "all"\n'
+SWEPT_SPEED = '[sweep]\ntable_speed = { of = "carriage.table.mass", values = [0.1, 0.2] }'
+SPEED_READ = '[sensor.table_speed]\nbody = "bed"\nat = 3.0'
+
+
 @pytest.mark.parametrize(
     ("given", "changes", "extra", "words"),
     [
@@ -69,11 +75,13 @@ def test_a_result_that_is_missing_is_noticed() -> None:
             r"sensor.rate.quantity: .*static response.*velocity",
         ),
         ("trajectory", {}, '[output]\nhistories = "none"', r"output.histories: a trajectory is its histories"),
+        ("trajectory", {}, HISTORIES + SWEPT_SPEED, r"sweep\.table_speed: a result has this name"),
+        ("trajectory", {}, HISTORIES + SPEED_READ, r"table_speed: two results would get this name"),
     ],
 )
 def test_what_does_not_suit_a_kind_is_refused(given: str, changes: dict[str, str], extra: str, words: str) -> None:
     with pytest.raises(BadInput, match=words):
-        studies.run(scenes.study(given, extra=extra).with_values(changes))
+        kind_of(scenes.study(given, extra=extra).with_values(changes))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.store.archive import open_archive
 from results_schema.validate import validate
+from results_schema.variables import expand
 from studies.commands.cli import main
 from studies.protocol.parts import Work
 from studies.reporting.summary import exit_code
@@ -69,7 +70,7 @@ def test_plenty_holds(tmp_path: Path) -> None:
 def test_the_group_is_as_declared_and_the_same_however_it_was_run(tmp_path: Path) -> None:
     first = outcome(crossing(RICH, FINE), tmp_path)
     group = open_archive(first.archive).groups[GROUP]
-    validate(group, GROUP, {}, ())
+    validate(group, GROUP, expand(GROUP))
     assert {"speed", "mass", "sample", "result"} == set(group.coords) and int(group["left_out"]) == 0
     flat = np.ravel_multi_index((np.searchsorted([0.2, 0.5, 0.9], group["speed"]), group["mass"] > 0.2), (3, 2))
     np.testing.assert_array_equal(group["sample"].values, flat)

@@ -13,6 +13,7 @@ from engine.unreduced.comparison import Compared
 from results_schema.errors import BadInput
 from results_schema.store.archive import Archive, open_archive
 from results_schema.validate import validate
+from results_schema.variables import expand
 from studies.protocol.options import RunOptions
 from studies.reporting.report import write_report
 from studies.runs import unreduced
@@ -54,7 +55,7 @@ def test_the_group_is_as_declared(archive: Archive) -> None:
     group = archive.groups[unreduced.GROUP]
     names = [str(name) for name in group["sensor"].values]
     assert names == ["middle", "aboard", "moment", "contact_table_front", "contact_table_rear"]
-    validate(group, unreduced.GROUP, {}, ())
+    validate(group, unreduced.GROUP, expand(unreduced.GROUP))
     assert group["sample"].values.tolist() == [1]
     assert group["degrees_of_freedom"].values.tolist() == [2 * 16 + 15 + 1 + 2]
     assert group["unreduced_steps"].values.tolist() == [19200]

@@ -76,7 +76,7 @@ def groups() -> dict[str, xr.Dataset]:
     audit = xr.Dataset(  # NaN where it is allowed
         {
             name: (variable.dims, _AUDITED[variable.dtype, variable.dims], variable.attributes())
-            for name, variable in expand("/audit", {}, []).items()
+            for name, variable in expand("/audit").items()
         },
         coords={
             "sample": ("sample", np.arange(3), axes()["sample"].attributes()),

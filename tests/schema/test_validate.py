@@ -3,27 +3,28 @@ import pytest
 
 from results_schema.errors import ArchiveError
 from results_schema.validate import findings_of, validate
+from results_schema.variables import expand
 from tests.schema.samples import CARRIAGES, SENSORS, groups, march, with_histories
 
 
 def found(dataset, kind="march"):
-    return "; ".join(findings_of(dataset, kind, SENSORS, CARRIAGES))
+    return "; ".join(findings_of(dataset, kind, expand(kind, SENSORS, CARRIAGES)))
 
 
 @pytest.mark.parametrize("dataset", [march(), march(()), march((3,)), with_histories(march())])
 def test_a_complete_dataset_passes(dataset):
-    validate(dataset, "march", SENSORS, CARRIAGES)
+    validate(dataset, "march", expand("march", SENSORS, CARRIAGES))
 
 
 def test_groups_pass():
-    validate(groups()["/audit"], "/audit", {}, [])
-    validate(groups()["/model/bed"], "/model/bed", {}, [])
+    validate(groups()["/audit"], "/audit", expand("/audit"))
+    validate(groups()["/model/bed"], "/model/bed", expand("/model/bed"))
 
 
 def test_missing_and_unknown_variables_are_named_together():
     dataset = march().rename(midspan_max="midspam_max")
     with pytest.raises(ArchiveError) as caught:
-        validate(dataset, "march", SENSORS, CARRIAGES)
+        validate(dataset, "march", expand("march", SENSORS, CARRIAGES))
     assert "midspan_max: expected in every march" in str(caught.value)
     assert "midspam_max: expected a declared name" in str(caught.value)
 
