@@ -21,13 +21,14 @@ PACKAGES = ("results_schema", "engine", "studies")
 ROOMS = (
     *("results_schema", "results_schema.store"),
     *("engine", "engine.study_file", "engine.kernels", "engine.kernels.stepping", "engine.kernels.floating"),
+    "engine.kernels.robots",
     *("engine.bodies.modal", "engine.bodies.beam", "engine.bodies.rigid", "engine.bodies.frame"),
     *("engine.bodies.reduced", "engine.bodies.files", "engine.bodies.imported", "engine.bodies"),
     *("engine.scene", "engine.model", "engine.observation", "engine.statics", "engine.march", "engine.accuracy"),
-    "engine.floating",
+    *("engine.floating", "engine.robots"),
     *("engine.batch", "engine.methods", "engine.unreduced"),
     *("studies.results", "studies.protocol", "studies.findings", "studies.at_rest", "studies.precision"),
-    "studies.moving",
+    *("studies.moving", "studies.robots"),
     *("studies.maps", "studies.runs", "studies.pictures.common", "studies.pictures", "studies.kinds"),
     *("studies.reporting", "studies.commands", "studies"),
 )

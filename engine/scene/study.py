@@ -18,6 +18,7 @@ from engine.bodies.modal.section_doubts import Doubt
 from engine.scene.carriages import AnyCarriage, Carriage
 from engine.scene.frames import GROUND, Frame
 from engine.scene.loads import Load, Spring
+from engine.scene.robots import Arm, Robot, check_robots
 from engine.scene.sensors import Envelope, Sensor, quantities_of_a_body
 from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
@@ -68,6 +69,8 @@ class Scene(Trains):
     frame: dict[str, Frame] = Field(default_factory=dict)
     load: dict[str, Load] = Field(default_factory=dict)
     spring: dict[str, Spring] = Field(default_factory=dict)
+    arm: dict[str, Arm] = Field(default_factory=dict)
+    robot: dict[str, Robot] = Field(default_factory=dict)
     carriage: dict[str, AnyCarriage] = Field(default_factory=dict)
     sensor: dict[str, Sensor] = Field(default_factory=dict)
     envelope: dict[str, Envelope] = Field(default_factory=dict)
@@ -378,6 +381,8 @@ def _check_names(study: Study) -> None:
         "body": study.body,
         "load": study.load,
         "spring": study.spring,
+        "arm": study.arm,
+        "robot": study.robot,
         "train": study.train,
         "carriage": study.carriage,
         "sensor": study.sensor,
@@ -389,7 +394,7 @@ def _check_names(study: Study) -> None:
             where = study.source.where(f"{table}.{name}")
             if not NAME.fullmatch(name):
                 raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
-            if table not in ("body", "load", "spring") and name in RESERVED:
+            if table not in ("body", "load", "spring", "arm", "robot") and name in RESERVED:
                 raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
     study.results("march")
 
@@ -406,6 +411,8 @@ def _check_references(study: Study) -> None:
         for number, end in enumerate(spring.ends):
             if end.on != GROUND:
                 _must_exist(study, f"spring.{name}.ends.{number}.on", end.on, "body")
+    for key, what, expected in check_robots(study.arm, study.robot, study.body):
+        raise study.source.fault(key, what, expected=expected)
     for name, carriage in study.carriage.items():
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():

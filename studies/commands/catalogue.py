@@ -102,7 +102,7 @@ def start_text(kind: str) -> str:
     known, shared = starts(), EVERY_STUDY.read_text(encoding="utf-8")
     if kind in known:
         own = known[kind].read_text(encoding="utf-8")
-        return own if "[frame." in own else own + shared
+        return own if any(f"[{table}." in own for table in ("frame", "robot")) else own + shared
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:

@@ -44,9 +44,9 @@ class Kind:
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
     settings: the class of its table [question], None where it has none. sweeps: whether it takes a [sweep], whose grid
     is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
-    failure of the run. moves_frames: whether frames of bodies may move, and carriages slide by themselves. drawn_by:
-    the module whose `pictures` makes its figures of the results. start: a study file to start from, of a kind of
-    another package.
+    failure of the run. moves_frames: whether frames of bodies may move, and carriages slide by themselves.
+    moves_robots: whether robots move. drawn_by: the module whose `pictures` makes its figures of the results. start: a
+    study file to start from, of a kind of another package.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Kind:
     sweeps = True
     drawn_by = ""
     moves_frames = False
+    moves_robots = False
     start: str
 
     def check(self, study: Study) -> None:
@@ -218,6 +219,9 @@ def kind_of(study: Study) -> Kind:
     kind = kind_named(study.kind, study.source.where("kind"))
     if not kind.moves_frames:
         check_stands(study)
+    if study.robot and not kind.moves_robots:
+        what = f"no robots move in studies of the kind {study.kind}"
+        raise study.source.fault("robot", what, expected='kind = "portal"')
     kind.check_tables(study)
     kind.check(study)
     return kind

@@ -311,7 +311,12 @@ class Results:
 
     def traced(self) -> list[Index]:
         """The variants whose values and histories are kept, in the order of their flat numbers."""
-        traces = (*self.sensors, *(f"{name}_position" for name in self.study.carriage), "end_place")
+        traces = (
+            *self.sensors,
+            *(f"{name}_position" for name in self.study.carriage),
+            "end_place",
+            "tool_centre_point_error",
+        )
         names = [name for name in traces if name in self.dataset]
         if not names:
             return []
@@ -326,10 +331,10 @@ class Results:
         over = str(stored.dims[-1])
         elapsed = self.dataset.coords.get("elapsed")
         along = np.asarray(self.dataset[over].values, dtype=np.float64)
-        times = None if elapsed is None else np.asarray(self._row(elapsed, index))
-        return Trace(over, along, np.asarray(self._row(stored, index)), times)
+        times = None if elapsed is None else np.asarray(self.row(elapsed, index))
+        return Trace(over, along, np.asarray(self.row(stored, index)), times)
 
-    def _row(self, stored: xr.DataArray, index: Index) -> Array:
+    def row(self, stored: xr.DataArray, index: Index) -> Array:
         """One variant's row of an array over histories, or over the sweep, or over neither."""
         if "history" in stored.dims:
             flat = int(np.ravel_multi_index(index, self.shape)) if self.dims else 0

@@ -59,7 +59,7 @@ def test_every_key_of_every_built_in_study(how: How) -> None:
     tried = distinct(*TEXTS.values(), *more, scenes.text_of("passage", extra=EXTRA))
     assert len(tried) > 800
     for mutation in accepted(how, tried, read):
-        of_frame = mutation.path[0] == "frame"  # all of whose keys have a default
+        of_frame = mutation.path[0] in ("frame", "arm")  # where these keys have a default
         needed = ("kind", "length", "on", "start", "end", "of", "centre")
         assert how != "drop" or of_frame or mutation.path[-1] not in needed
 

@@ -1,0 +1,135 @@
+"""What travels into the kernels of robots on rails: few float64 tables, as every one makes kernels longer to compile.
+
+Axes are those of the ground, z up. R robots of up to J joints, that along the rail first; B bodies; N coordinates: the
+modes of all bodies, then the joints that have a stiffness, as what they are away from their plan. Motions and wrenches
+of six: translation and rotation, force and moment.
+"""
+
+from typing import NamedTuple
+
+from engine.kernels.layout import FloatArray, IntArray
+
+# columns of System.counts: joints, moves, and whether drives are told the forces of the whole plan
+JOINTS, MOVES_TOLD, WHOLE = range(3)
+# columns of System.chain: whether a joint slides; its axis, place and turn in the axes of the link before; the link
+SLIDES, JOINT_AXIS, JOINT_PLACE, JOINT_TURN, MASS, CENTRE, INERTIA, LINK = 0, 1, 4, 7, 16, 17, 20, 23
+# columns of System.robots: the tool centre point on the last link, and the base point at place 0
+TOOL, BASE = 0, 3
+# columns of System.tracks
+FIRST, MODES, ELEMENTS = range(3)
+# columns of System.moves
+START, JERK, RAMP, UP, STEADY, MOVE = 0, 1, 2, 3, 4, 5
+
+# columns of Work.links, by joint: link in space; joint as it is and as planned (value, rate, acceleration); what its
+# drive is told, and exerts; its plan when the matrix was made
+PLACE, TURN, AXIS, FORCE, MOMENT, ACTUAL, PLANNED, TOLD, DRIVE, SINCE, COLUMNS = (
+    0,
+    3,
+    12,
+    15,
+    18,
+    21,
+    24,
+    27,
+    28,
+    29,
+    30,
+)
+VALUE, RATE, PUSH = range(3)
+# columns of Work.robots: tool centre points, motion of the base per unit rate of joint 0, wrench on it, payload
+PLANNED_TOOL, ACTUAL_TOOL, AHEAD, WRENCH, PAYLOAD, ROBOT = 0, 3, 6, 12, 18, 19
+# columns of Work.doing
+BEGUN, PHASE = range(2)
+# columns of Work.grips, by rail: wrench on the robot, motion that the modes miss, loads on the ends of an element, the
+# motion by those of the ends (6, 12), the place, the element
+GRIP, MISSING, LOADS, BY_ENDS, AT, ELEMENT, GRIPPED = 0, 6, 12, 24, 96, 97, 98
+# rows of Work.six: sums of `section`, what becomes of them at the base, and the inertia of a solid (10 in two rows)
+SUMS, MOVED, SOLID, SIXES = 0, 6, 12, 14
+# rows of Work.vectors
+CHANGE, MOMENTUM, VECTORS = 0, 1, 2
+
+# what a robot does at a time: moves, holds, works
+MOVES, HOLDS, WORKS = range(3)
+
+
+class System(NamedTuple):
+    """A whole scene.
+
+    counts (R, 3), chain (R, J, LINK), robots (R, 6): columns above; link 0 is the carriage;  gravity: m/s2, down;
+    coordinate (R, J): of joints, -1 for those that follow their plan;  springs (N, 2): stiffness and damping of all
+    coordinates, of modes omega^2 and 2 zeta omega.
+    body (R, 2): that a robot stands on, -1 for none;  share (R, 2, 7, 6): motion of the base by that of the track's
+    axis, and in the first of row 6 its place on that track less that of the robot;  tracks (B, 3): columns above;
+    ends (B, E + 1): ends of a track's elements, m;  shapes (B, E, 4, 6, n): motion of the axis per mode, cubics in the
+    distance from an end, constant first;  missed (B, 6 (E + 1), 6 (E + 1)): motions of the ends per unit load on them
+    that the modes miss.
+    moves (R, M, MOVE): columns above;  stays (R, M + 1, J + 2): joints before and after moves, the payload from the
+    beginning of a move on, and s up to which a robot works after it.
+    """
+
+    counts: IntArray
+    chain: FloatArray
+    robots: FloatArray
+    gravity: float
+    coordinate: IntArray
+    springs: FloatArray
+    body: IntArray
+    share: FloatArray
+    tracks: IntArray
+    ends: FloatArray
+    shapes: FloatArray
+    missed: FloatArray
+    moves: FloatArray
+    stays: FloatArray
+
+
+class Work(NamedTuple):
+    """What an evaluation leaves behind: links (R, J, COLUMNS), robots (R, ROBOT), doing (R, 2), grips (R, 2, GRIPPED),
+    six (SIXES, 6), vectors (VECTORS, N): columns above;  rows (R, 2, 6, n): motion of rails under robots per mode. Of
+    the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs (R, 2, 6, n): motion of bases per mode;
+    elastic (N, N); inertia (6 + J, 6 + J) of a robot."""
+
+    links: FloatArray
+    robots: FloatArray
+    doing: IntArray
+    grips: FloatArray
+    six: FloatArray
+    vectors: FloatArray
+    rows: FloatArray
+    lower: FloatArray
+    pairs: FloatArray
+    elastic: FloatArray
+    inertia: FloatArray
+
+
+class Stretch(NamedTuple):
+    """Times between events: start (P), step (P): s;  steps (P): how many;  every: steps between observed stations."""
+
+    start: FloatArray
+    step: FloatArray
+    steps: IntArray
+    every: int
+
+
+class Pace(NamedTuple):
+    """A step (s), and what a change of the acceleration at its end is there to rate and place (Newmark)."""
+
+    step: float
+    of_rate: float
+    of_place: float
+
+
+class Record(NamedTuple):
+    """What is observed: coordinates (S, N, 4): y, y', y'' and the time;  robots (S, R, OBSERVED) and grips
+    (S, R, 2, OF_GRIP): columns below;  drive (S, R, J): what drives exert."""
+
+    coordinates: FloatArray
+    robots: FloatArray
+    drive: FloatArray
+    grips: FloatArray
+
+
+# columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point, what
+# the robot does; of Record.grips: of that wrench what each rail carries about its axis, and m by which the rail is down
+SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, SEEN_PHASE, OBSERVED = 0, 3, 6, 12, 13
+SUNK, OF_GRIP = 6, 7

@@ -1,0 +1,290 @@
+"""The march of robots on rails: Newmark's scheme with every step solved by Newton's method, whose matrix is kept while
+it serves; events fall on step boundaries."""
+
+import numpy as np
+
+from engine.kernels.floating.vectors import add, cross, shared_vector, times
+from engine.kernels.jit import called, kernel
+from engine.kernels.layout import NOT_CONVERGED, SOUND
+from engine.kernels.robots.dynamics import evaluate, plan_at, prepare, room, solve
+from engine.kernels.robots.layout import (
+    ACTUAL,
+    ACTUAL_TOOL,
+    AT,
+    BEGUN,
+    CHANGE,
+    DRIVE,
+    FIRST,
+    GRIP,
+    JOINTS,
+    MISSING,
+    MODES,
+    MOMENTUM,
+    MOVED,
+    PAYLOAD,
+    PHASE,
+    PLACE,
+    PLANNED,
+    PLANNED_TOOL,
+    PUSH,
+    RATE,
+    SEEN_ACTUAL,
+    SEEN_PHASE,
+    SEEN_PLANNED,
+    SEEN_WRENCH,
+    SINCE,
+    SUNK,
+    VALUE,
+    WRENCH,
+    Pace,
+)
+from engine.kernels.robots.timing import number_of
+from engine.kernels.robots.tracks import give
+
+CLOSE = 1e-10  # of the elastic energy: what a correction may still do
+MOST_CORRECTIONS, MOST_SETTLING, STARTING = 12, 200, 3
+REUSED = 3  # corrections of a step after which its matrix is made anew
+FAR = 0.1  # m or rad that a joint has gone since then
+
+
+@kernel
+def march(system, stretches, newmark, record):
+    """From equilibrium at the first time through all stretches, observing into ``record``; a code of `layout`."""
+    work, N = room(system), system.springs.shape[0]
+    state, left = np.zeros((N, 3)), np.zeros(N)
+    load_at(system, stretches.start[0], work)
+    plan_at(system, stretches.start[0], work)
+    code, station = np.int64(settle(system, state, work, left)), np.int64(0)
+    energy = elastic_energy(system, state)
+    for p in range(stretches.start.shape[0]):
+        start, h = stretches.start[p], stretches.step[p]
+        pace = Pace(h, newmark.gamma * h, newmark.beta * h * h)
+        if p > 0:
+            strike(system, start, state, work, left)
+        begin(system, start, state, work, left)
+        for n in range(stretches.steps[p] + 1):
+            if n > 0:
+                energy, close = step(system, start + n * h, pace, state, work, left, energy)
+                if not close:
+                    code = np.int64(NOT_CONVERGED)
+                if not np.isfinite(energy):
+                    return np.int64(NOT_CONVERGED)
+            if n % stretches.every == 0:
+                observe(system, start + n * h, state, work, left, record, station)
+                station += 1
+    return code
+
+
+@kernel
+def rest(system, stretches, record):
+    """Where everything would rest with joints held where they are told to be, at the stations of `march`; a code."""
+    work, N = room(system), system.springs.shape[0]
+    state, left = np.zeros((N, 3)), np.zeros(N)
+    code, station = np.int64(SOUND), np.int64(0)
+    for p in range(stretches.start.shape[0]):
+        start, h = stretches.start[p], stretches.step[p]
+        load_at(system, start, work)
+        for n in range(0, stretches.steps[p] + 1, stretches.every):
+            plan_at(system, start + n * h, work)
+            hold(work)
+            code = max(code, np.int64(settle(system, state, work, left)))
+            observe(system, start + n * h, state, work, left, record, station)
+            station += 1
+    return code
+
+
+@called
+def hold(work):
+    """Joints stand still where they are told to be."""
+    for r in range(work.links.shape[0]):
+        for j in range(work.links.shape[1]):
+            work.links[r, j, PLANNED + RATE], work.links[r, j, PLANNED + PUSH] = 0.0, 0.0
+
+
+@called
+def elastic_energy(system, state):
+    """1/2 sum k y^2."""
+    found = 0.0
+    for k in range(state.shape[0]):
+        found += 0.5 * system.springs[k, 0] * state[k, 0] ** 2
+    return found
+
+
+@called
+def payload_of(system, r, begun):
+    """kg that robot r carries once so many of its moves have begun."""
+    return system.stays[r, begun, system.coordinate.shape[1]]
+
+
+@called
+def load_at(system, t, work):
+    """The moves that have begun at a time, and what is carried then."""
+    for r in range(work.robots.shape[0]):
+        work.doing[r, BEGUN] = number_of(system, r, t)
+        work.robots[r, PAYLOAD] = payload_of(system, r, work.doing[r, BEGUN])
+        work.doing[r, PHASE] = -1
+
+
+@called
+def settle(system, state, work, left):
+    """Static equilibrium of what is planned, which stands still."""
+    for _ in range(MOST_SETTLING):
+        evaluate(system, state, work, left)
+        change, largest = 0.0, 0.0
+        for k in range(state.shape[0]):
+            by = left[k] / system.springs[k, 0]
+            state[k, 0] -= by
+            change = max(change, by**2 * system.springs[k, 0])
+            largest = max(largest, state[k, 0] ** 2 * system.springs[k, 0])
+        if change <= CLOSE**2 * largest:
+            return SOUND
+    return NOT_CONVERGED
+
+
+@called
+def strike(system, t, state, work, left):
+    """Velocities where payloads change: what is picked up is at rest until then, what is put down takes its momentum
+    along."""
+    plan_at(system, t, work)
+    for k in range(left.shape[0]):
+        work.vectors[MOMENTUM, k] = 0.0
+    add_momenta(system, 1.0, state, work, left)
+    for r in range(work.robots.shape[0]):
+        payload = payload_of(system, r, number_of(system, r, t))
+        if payload < work.robots[r, PAYLOAD]:
+            add_momenta(system, -1.0, state, work, left)
+            work.robots[r, PAYLOAD] = payload
+            add_momenta(system, 1.0, state, work, left)
+        work.robots[r, PAYLOAD] = payload
+    evaluate(system, state, work, left)
+    prepare(system, 0.0, 0.0, work)
+    solve(system, work, work.vectors[MOMENTUM])
+    for k in range(left.shape[0]):
+        state[k, 1] = work.vectors[MOMENTUM, k]
+
+
+@called
+def add_momenta(system, sign, state, work, left):
+    """work.momentum += sign M y', as the difference of what is left of two accelerations."""
+    for there in (0.0, 1.0):
+        for k in range(left.shape[0]):
+            state[k, 2] += there * state[k, 1]
+        evaluate(system, state, work, left)
+        for k in range(left.shape[0]):
+            work.vectors[MOMENTUM, k] += sign * (2.0 * there - 1.0) * left[k]
+    for k in range(left.shape[0]):
+        state[k, 2] -= state[k, 1]
+
+
+@called
+def begin(system, t, state, work, left):
+    """The moves that begin at a time, and accelerations for their loads."""
+    load_at(system, t, work)
+    plan_at(system, t, work)
+    evaluate(system, state, work, left)
+    prepare(system, 0.0, 0.0, work)
+    for _ in range(STARTING):
+        evaluate(system, state, work, left)
+        solve(system, work, left)
+        for k in range(left.shape[0]):
+            state[k, 2] -= left[k]
+    for r in range(work.links.shape[0]):
+        work.links[r, 0, SINCE] = np.inf  # that matrix is none of a step's
+
+
+@called
+def step(system, t, pace, state, work, left, energy):
+    """One step to a time: the largest elastic energy so far, and whether Newton's method came close enough."""
+    plan_at(system, t, work)
+    fresh, h = stays(work), pace.step
+    for k in range(state.shape[0]):
+        state[k, 0] += h * state[k, 1] + 0.5 * h * h * state[k, 2]
+        state[k, 1] += h * state[k, 2]
+    for corrected in range(MOST_CORRECTIONS + 1):
+        evaluate(system, state, work, left)
+        if not fresh or corrected == REUSED:
+            prepare(system, pace.of_rate, pace.of_place, work)
+            fresh = True
+            for r in range(work.links.shape[0]):
+                for j in range(work.links.shape[1]):
+                    work.links[r, j, SINCE] = work.links[r, j, PLANNED + VALUE]
+        done = correct(system, state, pace, work, left)
+        energy = max(energy, elastic_energy(system, state))
+        if done <= CLOSE * energy:
+            return energy, True
+        if not np.isfinite(done):
+            return done, False
+    return energy, False
+
+
+@called
+def stays(work):
+    """Whether no joint has gone far since the matrix was made."""
+    for r in range(work.links.shape[0]):
+        for j in range(work.links.shape[1]):
+            if abs(work.links[r, j, PLANNED + VALUE] - work.links[r, j, SINCE]) > FAR:
+                return False
+    return True
+
+
+@called
+def correct(system, state, pace, work, left):
+    """One correction by what is left; the work that it does."""
+    for k in range(state.shape[0]):
+        work.vectors[CHANGE, k] = left[k]
+    solve(system, work, work.vectors[CHANGE])
+    done = 0.0
+    for k in range(state.shape[0]):
+        done += abs(work.vectors[CHANGE, k] * left[k])
+        state[k, 2] -= work.vectors[CHANGE, k]
+        state[k, 1] -= pace.of_rate * work.vectors[CHANGE, k]
+        state[k, 0] -= pace.of_place * work.vectors[CHANGE, k]
+    return done * pace.of_place
+
+
+@called
+def observe(system, t, state, work, left, record, station):
+    """A station of the record."""
+    evaluate(system, state, work, left)
+    for r in range(work.robots.shape[0]):
+        for g in range(2):
+            work.grips[r, g, AT] = work.links[r, 0, ACTUAL + VALUE] + system.share[r, g, 6, 0]
+    if system.missed.shape[1] > 0:
+        give(system, work.grips)
+    for k in range(state.shape[0]):
+        record.coordinates[station, k, 3] = t
+        for order in range(3):
+            record.coordinates[station, k, order] = state[k, order]
+    for r in range(work.robots.shape[0]):
+        seen, robot = record.robots[station, r], work.robots[r]
+        seen[SEEN_PHASE] = work.doing[r, PHASE]
+        for j in range(system.counts[r, JOINTS]):
+            record.drive[station, r, j] = work.links[r, j, DRIVE]
+        missing, turn = sink(system, r, state, work, record.grips[station, r])
+        lever = add(shared_vector(work.robots, r, ACTUAL_TOOL), times(-1.0, shared_vector(work.links[r], 0, PLACE)))
+        beyond = add(missing, cross(turn, lever))
+        for k in range(3):
+            seen[SEEN_PLANNED + k] = robot[PLANNED_TOOL + k]
+            seen[SEEN_ACTUAL + k] = robot[ACTUAL_TOOL + k] + beyond[k]
+        for k in range(work.six.shape[1]):
+            seen[SEEN_WRENCH + k] = robot[WRENCH + k]
+
+
+@called
+def sink(system, r, state, work, seen):
+    """What rails do under robot r, into seen (2, OF_GRIP); motion and rotation of its base that their modes miss."""
+    base = work.six[MOVED]
+    for o in range(work.six.shape[1]):
+        base[o] = 0.0
+    for g in range(2):
+        body, grip = system.body[r, g], work.grips[r, g]
+        if body >= 0:
+            sunk = grip[MISSING + 2]
+            for k in range(system.tracks[body, MODES]):
+                sunk += work.rows[r, g, 2, k] * state[system.tracks[body, FIRST] + k, 0]
+            seen[g, SUNK] = -sunk
+            for o in range(work.six.shape[1]):
+                seen[g, o] = grip[GRIP + o]
+                for i in range(work.six.shape[1]):
+                    base[o] += system.share[r, g, o, i] * grip[MISSING + i]
+    return (base[0], base[1], base[2]), (base[3], base[4], base[5])

@@ -1,0 +1,55 @@
+"""One march of robots on rails, and what is observed of it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.kernels.layout import SOUND, Newmark
+from engine.kernels.robots.layout import OBSERVED, OF_GRIP, START, WHOLE, Record, Stretch
+from engine.kernels.robots.march import march as march_kernel
+from engine.kernels.robots.march import rest as rest_kernel
+from results_schema.status import Status
+
+if TYPE_CHECKING:
+    from engine.robots.model import RobotModel
+
+
+def stretches(model: RobotModel, duration: float, step: float, every: int) -> Stretch:
+    """The time (s) cut at the beginnings of moves, into steps no longer than ``step`` (s) of which ``every`` th is
+    observed; the same events and stations whatever ``every`` is where step/every stays."""
+    starts = model.system.moves[:, :, START]
+    events = np.unique(np.concatenate([[0.0], starts[starts < duration]]))
+    lengths = np.diff([*events, duration])
+    steps = np.maximum(1, np.ceil(lengths / (step * every) - 1e-9)).astype(np.int64) * every
+    return Stretch(events, lengths / steps, steps, every)
+
+
+def march(model: RobotModel, times: Stretch, scheme: Newmark) -> tuple[Record, Status]:
+    """What robots and rails do over all stretches of time."""
+    record = _empty(model, times)
+    return record, _status(march_kernel(model.system, times, scheme, record))
+
+
+def rest(model: RobotModel, times: Stretch) -> tuple[Record, Status]:
+    """Where robots and rails would rest at the same stations, with joints held where they are told to be then."""
+    record, counts = _empty(model, times), model.system.counts.copy()
+    counts[:, WHOLE] = 0
+    return record, _status(rest_kernel(model.system._replace(counts=counts), times, record))
+
+
+def _empty(model: RobotModel, times: Stretch) -> Record:
+    S = int(np.sum(1 + times.steps // times.every))
+    (R, J), N = model.system.coordinate.shape, len(model.system.springs)
+    return Record(
+        np.full((S, N, 4), math.nan),
+        np.full((S, R, OBSERVED), math.nan),
+        np.zeros((S, R, J)),
+        np.zeros((S, R, 2, OF_GRIP)),
+    )
+
+
+def _status(code: int) -> Status:
+    return Status.OK if code == SOUND else Status.NOT_CONVERGED

@@ -1,0 +1,189 @@
+"""Robots on rails: arms of rigid links with their drives, and what each robot is told to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field, Strict, model_validator
+
+from engine.study_file.spec import Noun, Spec
+from engine.study_file.units import Dimensionless, Inertia, Length, Mass, Time, fault
+
+MOST_LINKS, MOST_RAILS, MOST_MOVES = 7, 2, 64
+
+Vector = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False)]
+Place = Annotated[tuple[Length, Length, Length], Strict(False)]
+_Principal = Annotated[Inertia, Field(ge=0)]
+Principal = Annotated[tuple[_Principal, _Principal, _Principal], Strict(False)]
+Values = Annotated[tuple[Dimensionless, ...], Strict(False)]
+
+
+class Drive(Spec):
+    """What moves a joint: m or rad. speed, acceleration, jerk: its limits (m/s or rad/s, and so on). stiffness, damping
+    (N/m or N m/rad, ...): of the joint with its controller, PD towards the plan; without a stiffness it follows its
+    plan whatever force that takes."""
+
+    speed: Dimensionless = Field(gt=0)
+    acceleration: Dimensionless = Field(gt=0)
+    jerk: Dimensionless = Field(gt=0)
+    stiffness: Dimensionless | None = Field(default=None, gt=0)
+    damping: Dimensionless = Field(default=0.0, ge=0)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it has no coordinate of its own."""
+        return self.stiffness is None
+
+    @model_validator(mode="after")
+    def _spring_with_damper(self) -> Drive:
+        if self.is_rigid and self.damping > 0.0:
+            raise fault("a joint that follows its plan rigidly has no damper", expected="a stiffness beside it")
+        return self
+
+
+class Solid(Spec):
+    """mass (kg), centre (m, in its axes) and principal inertia (kg m2, about that centre along its axes)."""
+
+    mass: Mass = Field(default=0.0, ge=0)
+    centre: Place = (0.0, 0.0, 0.0)
+    inertia: Principal = (0.0, 0.0, 0.0)
+
+
+class Link(Solid, Drive):
+    """A rigid link and the joint that moves it.
+
+    kind: of the joint, which turns about or slides along axis. place: m, of the joint in the axes of the link before.
+    turned: rotation vector (rad) of the link's axes before the joint moves.
+    """
+
+    kind: Literal["revolute", "prismatic"]
+    axis: Vector
+    place: Place = (0.0, 0.0, 0.0)
+    turned: Vector = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _has_axis(self) -> Link:
+        if not any(self.axis):
+            raise fault("an axis needs a direction", expected="three numbers, not all zero, such as [0, 0, 1]")
+        return self
+
+
+class Arm(Solid):
+    """A sort of robot: the carriage on the rails (mass, centre, inertia, from its base point) with its drive along
+    them, the links on it, and the tool centre point (m, in the axes of the last link)."""
+
+    mass: Mass = Field(gt=0)
+    rail: Drive
+    links: Annotated[tuple[Link, ...], Strict(False), Field(min_length=1, max_length=MOST_LINKS)]
+    tool: Place = (0.0, 0.0, 0.0)
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """Of all joints, that along the rails first."""
+        return (self.rail, *self.links)
+
+
+class Move(Spec):
+    """A move of all joints together, at rest at both ends: straight in the joints' values, as fast as the slowest of
+    them may go, jerk-limited.
+
+    to: values, the place along the rail (m) first. after: s, it sets off no earlier. hold: s that the robot stays
+    there; process: whether it works then. payload: kg at the tool from the beginning of the move on, as before if not
+    given: picked up at rest, or put down.
+    """
+
+    to: Values
+    after: Time = Field(default=0.0, ge=0)
+    hold: Time = Field(default=0.0, ge=0)
+    process: bool = False
+    payload: Mass | None = Field(default=None, ge=0)
+
+
+class Robot(Spec):
+    """A robot on one or two parallel rails, which are tracks of frames along x.
+
+    arm: its sort. rails: names of bodies. offset: m, of its base point from the axis of the first rail's track, or from
+    the middle between two. start: values of its joints at time 0, the place along the first rail first. delay: s by
+    which all its moves set off later. payload: kg at time 0. speed_scale, acceleration_scale, payload_scale: factors
+    of all limits of speed, of acceleration and jerk, and of all payloads. feedforward: what the drives are told beside
+    the plan: the forces of the whole plan on a rigid base, or those of gravity alone.
+    """
+
+    arm: Annotated[str, Noun("the name of a table [arm.NAME]")]
+    rails: Annotated[tuple[str, ...], Strict(False), Field(min_length=1, max_length=MOST_RAILS)]
+    offset: Place = (0.0, 0.0, 0.0)
+    start: Values
+    moves: Annotated[tuple[Move, ...], Strict(False), Field(max_length=MOST_MOVES)] = ()
+    delay: Time = Field(default=0.0, ge=0)
+    payload: Mass = Field(default=0.0, ge=0)
+    speed_scale: Dimensionless = Field(default=1.0, gt=0)
+    acceleration_scale: Dimensionless = Field(default=1.0, gt=0)
+    payload_scale: Dimensionless = Field(default=1.0, ge=0)
+    feedforward: Literal["plan", "gravity"] = "plan"
+
+    @model_validator(mode="after")
+    def _distinct_rails(self) -> Robot:
+        if len(set(self.rails)) < len(self.rails):
+            raise fault("a robot stands on two different rails", expected="names of two bodies, or one name")
+        return self
+
+
+class Profile(NamedTuple):
+    """A move of unit length: jerk (1/s3) and the times (s) of one jerk, of speeding up, and at full speed."""
+
+    jerk: float
+    jerk_time: float
+    up_time: float
+    steady_time: float
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return 2.0 * self.up_time + self.steady_time
+
+
+def profile(distance: float, speed: float, acceleration: float, jerk: float) -> Profile:
+    """Jerk-limited from rest to rest over a distance > 0, scaled to unit length.
+
+    With T_j = a/j, T_a = T_j + v/a, where v j < a^2 T_j = sqrt(v/j), T_a = 2 T_j, and T_v = D/v - T_a; where that is
+    negative the speed is never reached: T_a = T_j/2 + sqrt(T_j^2/4 + D/a) with T_j = a/j if that is 2 T_j at least,
+    else T_j = (D/(2 j))^(1/3), T_a = 2 T_j.
+
+    >>> profile(1.0, 10.0, 100.0, 2.0).duration  # 4 (D/(2 j))^(1/3)
+    2.5198420997897464
+    """
+    if speed * jerk >= acceleration**2:
+        ramp = acceleration / jerk
+        up = ramp + speed / acceleration
+    else:
+        ramp = math.sqrt(speed / jerk)
+        up = 2.0 * ramp
+    steady = distance / speed - up
+    if steady < 0.0:
+        steady, ramp = 0.0, acceleration / jerk
+        up = 0.5 * ramp + math.sqrt(0.25 * ramp**2 + distance / acceleration)
+        if up < 2.0 * ramp:
+            ramp = (distance / (2.0 * jerk)) ** (1.0 / 3.0)
+            up = 2.0 * ramp
+    return Profile(jerk=jerk / distance, jerk_time=ramp, up_time=up, steady_time=steady)
+
+
+def check_robots(
+    arms: Mapping[str, Arm], robots: Mapping[str, Robot], bodies: Collection[str]
+) -> Iterator[tuple[str, str, str]]:
+    """What does not fit together: dotted key, what is wrong, what is expected."""
+    for name, robot in robots.items():
+        here = f"robot.{name}"
+        if robot.arm not in arms:
+            yield f"{here}.arm", "no such arm", f"one of {', '.join(arms)}" if arms else "a table [arm.NAME]"
+            continue
+        for number, rail in enumerate(robot.rails):
+            if rail not in bodies:
+                yield f"{here}.rails.{number}", "no such body", f"one of {', '.join(bodies)}"
+        wanted = len(arms[robot.arm].drives)
+        given = {"start": robot.start} | {f"moves.{number}.to": move.to for number, move in enumerate(robot.moves)}
+        for key, values in given.items():
+            if len(values) != wanted:
+                yield f"{here}.{key}", "one value for each joint, the place along the rail first", f"{wanted} numbers"

@@ -1,0 +1,116 @@
+"""What studies of robots on rails answer, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from results_schema.arrays import Array, Counts, Mask
+from studies.results.findings_common import in_words, told_statuses
+from studies.results.formatting import quantity
+from studies.results.results import extreme
+
+if TYPE_CHECKING:
+    from studies.results.results import Results
+
+MOST_NAMED = 4
+
+
+def answer(results: Results) -> list[str]:
+    """The front, errors, deflections, what causes errors, statuses."""
+    return [
+        *_front(results),
+        *_errors(results),
+        *_deflections(results),
+        *_causes(results),
+        *told_statuses(results),
+    ]
+
+
+def accuracy(results: Results) -> tuple[str, Array]:
+    """What counts as accuracy, in words, and its values (m) over the grid: what any tool is off from where it would
+    rest while it works, as what it is off at rest can be taught; in moves, where no robot works."""
+    works = bool(np.isfinite(results.dataset["beyond_rest_working"]).any())
+    doing, words = ("working", "at work") if works else ("moving", "in moves")
+    return words, np.asarray(results.dataset[f"beyond_rest_{doing}"].max("robot").values)
+
+
+def front(cycle: Array, error: Array) -> Mask:
+    """Which points no other one beats in both, or in one and equals in the other (Pareto)."""
+    known = np.isfinite(cycle) & np.isfinite(error)
+    better = (cycle[None] <= cycle[:, None]) & (error[None] <= error[:, None])
+    strictly = better & ((cycle[None] < cycle[:, None]) | (error[None] < error[:, None]))
+    return known & ~(strictly & known[None]).any(axis=1)
+
+
+def of_front(results: Results) -> Counts:
+    """Flat numbers of the variants on the front, fastest first, each point once."""
+    cycle, error = results.dataset["cycle_time"].values.reshape(-1), accuracy(results)[1].reshape(-1)
+    chosen = np.flatnonzero(front(cycle, error))
+    chosen = chosen[np.lexsort((error[chosen], cycle[chosen]))]
+    points = np.round(np.stack([cycle[chosen], error[chosen]], axis=1), 12)
+    return np.asarray(chosen[np.sort(np.unique(points, axis=0, return_index=True)[1])], dtype=np.int64)
+
+
+def _errors(results: Results) -> Iterator[str]:
+    for name in results.study.robot:
+        part = results.dataset.sel(robot=name)
+        index = extreme(part["error_moving"])
+        if index is None:
+            continue
+        said = f"The tool of {name} is off by up to {quantity(float(part['error_moving'].values[index]), 'm')} in moves"
+        work = extreme(part["error_working"])
+        if work is not None:
+            said += f" and {quantity(float(part['error_working'].values[work]), 'm')} at work"
+        dynamic = float(np.nanmax(part["beyond_rest_moving"].values))
+        yield f"{said}{in_words(results, index)}; from where it would rest by up to {quantity(dynamic, 'm')} in moves."
+
+
+def _causes(results: Results) -> Iterator[str]:
+    """What moves where the error is longest, and what is left of it when one robot stands still."""
+    from engine.robots.converge import FIRST_MODES, with_open_modes
+    from engine.robots.model import build
+    from engine.robots.results import moving_at
+
+    dataset = results.dataset
+    if results.size == 1:
+        model = build(with_open_modes(results.study.without_sweep(), FIRST_MODES))
+        for name in results.study.robot:
+            time = float(dataset["error_largest_time"].sel(robot=name))
+            if np.isfinite(time):
+                moving = " and ".join(moving_at(model, time)) or "nothing"
+                yield f"The error of {name} is longest at {quantity(time, 's')}, in which moves: {moving}."
+    if "error_without" in dataset:
+        for still in results.study.robot:
+            left = dataset["error_without"].sel(still=still)
+            others = [name for name in results.study.robot if name != still]
+            told = ", ".join(f"{name} {quantity(float(left.sel(robot=name)), 'm')}" for name in others)
+            yield f"While {still} stands still, the largest errors of the others are: {told}."
+
+
+def _deflections(results: Results) -> Iterator[str]:
+    for name in results.dataset["rail"].values[:MOST_NAMED]:
+        values = results.dataset["deflection_largest"].sel(rail=name)
+        index = extreme(values)
+        if index is not None:
+            yield f"{name} goes down by up to {quantity(float(values.values[index]), 'm')}{in_words(results, index)}."
+
+
+def _front(results: Results) -> Iterator[str]:
+    """The points of cycle time and accuracy that nothing beats."""
+    if results.size == 1:
+        return
+    words, error = accuracy(results)
+    chosen, cycle = of_front(results), results.dataset["cycle_time"].values.reshape(-1)
+    if not chosen.size:
+        return
+    named = chosen[np.unique(np.linspace(0, chosen.size - 1, min(MOST_NAMED, chosen.size)).round().astype(int))]
+    told = []
+    for number in named:
+        index = tuple(int(i) for i in np.unravel_index(number, results.shape))
+        off = quantity(float(error.reshape(-1)[number]), "m")
+        told.append(f"{quantity(float(cycle[number]), 's', 4)} for {off} ({results.at(index)})")
+    best = f"{chosen.size} of {results.size} variants are best"
+    yield f"Of cycle time against what tools are off from rest {words}, {best}: {'; '.join(told)}."

@@ -1,0 +1,21 @@
+"""What is asked of robots on rails: the table [question]."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from engine.study_file.spec import Spec
+from engine.study_file.units import Time
+
+
+class Question(Spec):
+    """duration: s, of the march; until all robots have done what they are told, and some time after, if not given.
+    zero: what errors count from: "start", what they are at time 0, or "unloaded" rails. one_at_a_time: how large errors
+    are while each robot in turn stands still, of the scene without sweep."""
+
+    duration: Time | None = Field(default=None, gt=0)
+    after: Time = Field(default=1.0, ge=0)
+    zero: Literal["start", "unloaded"] = "start"
+    one_at_a_time: bool = False

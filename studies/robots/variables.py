@@ -1,0 +1,50 @@
+"""What studies of robots on rails report, declared once."""
+
+from __future__ import annotations
+
+from results_schema.variable import outputs
+
+RESULTS = outputs("""
+    estimated_error | result | | optional nan float32 | estimated error of every result
+        largest at any time, over the largest length of a robot's error or the largest deflection of a rail; of steps,
+        and of modes where their number is open
+    steps_used | | | int32 | number of steps used
+        over the whole time
+    cycle_time | | s | | time at which all robots have done what they are told
+    * | | | nan |
+    error_moving | robot | m | | largest length of the error of the tool centre point while any of its joints moves
+        NaN where none does
+    error_working | robot | m | | largest length of the error of the tool centre point while the robot works
+        NaN where it never does
+    error_holding | robot | m | | largest length of the error of the tool centre point while it stands without work
+        NaN where it never does
+    beyond_rest_moving | robot | m | | largest length of what a tool is off from rest while any of its joints moves
+        from where it would rest if all joints were held where they are told to be then; NaN where none moves
+    beyond_rest_working | robot | m | | largest length of what a tool is off from rest while the robot works
+        likewise; NaN where it never does
+    beyond_rest_holding | robot | m | | largest length of what a tool is off from rest while it stands without work
+        likewise; NaN where it never does
+    * | | | |
+    error_largest | robot component | m | | largest component of the error of the tool centre point
+        actual less planned
+    error_largest_time | robot | s | | time of the longest error of the tool centre point
+    error_at_start | robot component | m | | error of the tool centre point at time 0, on unloaded rails
+        from which errors count, unless the question says otherwise
+    deflection_largest | rail | m | | largest deflection of a rail under a robot, down > 0
+    rail_force_largest | robot | N | | largest vertical force of a robot on one of its rails
+    * | | | optional history |
+    tool_centre_point | station robot component | m | | planned place of the tool centre point
+    tool_centre_point_error | station robot component | m | | error of the tool centre point: actual less planned
+    rail_deflection | station rail rail_end | m | gaps | deflection of a rail by its modes, down > 0
+        NaN beyond the places that a rail has
+    * | | | optional alone nan |
+    error_without | still robot | m | | largest length of the error of a tool while one robot stands still
+        where it starts; of the scene without sweep
+    rail_place | rail rail_end | m | | place along a rail
+    * | | | |
+    robot | | | axis str | robot
+    still | | | axis str | robot that stands still
+    rail | | | axis str | body that robots ride
+    rail_end | | | axis | number of the place along a rail
+    component | | | axis str | component of the vector
+""")

@@ -1,0 +1,161 @@
+"""Studies of robots on rails: from the study file to the dataset and its sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import studies
+from engine.robots.converge import converge
+from engine.scene.study import Study
+from engine.scene.sweep import expand
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from studies.pictures.portal import pictures
+from studies.protocol.study import kind_of
+from studies.results.results import Results
+from studies.robots.findings import front, of_front
+from tests.robots.scenes import GANTRY, errors, marched, rail, scene
+
+SWEPT = {
+    "acceleration": {"of": ["robot.portal.acceleration_scale"], "values": [0.5, 1.0, 3.0]},
+    "payload": {"of": ["robot.portal.payload_scale"], "values": [0.0, 2.0]},
+}
+
+
+def swept(**more: Any) -> Study:
+    return scene(solver={"tolerance": 1e-2}, sweep=SWEPT, question={"after": 0.5, "one_at_a_time": True}, **more)
+
+
+@pytest.fixture(scope="module")
+def found() -> Any:
+    return studies.run(swept(), threads=2)
+
+
+def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
+    study = swept()
+    cases = expand(study)
+    assert found["error_moving"].dims == ("acceleration", "payload", "robot")
+    assert (found["status"] == Status.OK).all() and (found["error_estimate"] <= 1e-2).all()
+    alone = converge(cases.study_of(study, 4), None, 0.5, "start")
+    for name in ("cycle_time", "error_moving", "error_largest", "beyond_rest_working", "deflection_largest"):
+        np.testing.assert_array_equal(found[name].values[2, 0], alone.outcome.numbers[name])
+    assert (found["cycle_time"].diff("acceleration") < 0.0).all()
+
+
+def test_estimated_errors_are_no_smaller_than_true_ones(found: Any) -> None:
+    """Against a march with eight times the steps and more than three times the modes of the rails."""
+    study = swept()
+    cases = expand(study)
+    for variant in (1, 4):
+        own = cases.study_of(study, variant)
+        mine = converge(own, None, 0.5, "start")
+        every = mine.outcome
+        many = own.with_values({f"body.{name}.modes": 20 for name in own.body})
+        steps = mine.steps / (every.times[-1])
+        _, record = marched(many, 1.0 / steps / 8.0, float(every.times[-1]), every=32)
+        fine = errors(record) - errors(record)[0]
+        times = record.coordinates[:, 0, 3]
+        for r in range(2):
+            close = np.stack([np.interp(every.times, times, fine[:, r, c]) for c in range(3)], axis=1)
+            own_off = np.linalg.norm(close - every.error[:, r], axis=1).max() / np.linalg.norm(fine[:, r], axis=1).max()
+            assert own_off < 2e-2
+
+
+def test_a_robot_that_stands_still_leaves_the_others_alone(found: Any) -> None:
+    still = found["error_without"]
+    assert still.sel(still="portal", robot="portal") < 0.2 * still.sel(still="hanging", robot="portal")
+    assert still.sel(still="hanging", robot="portal") > 0.0
+
+
+def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
+    results = Results.of(found)
+    answer = " ".join(kind_of(results.study).findings(results))
+    best = of_front(results)
+    assert f"{best.size} of 6 variants are best" in answer
+    assert "While portal stands still" in answer and "left goes down by" in answer
+    figures = pictures(results)
+    assert [figure.name for figure in figures] == ["front", "over-time", "rails"]
+
+
+def test_the_front_is_what_no_point_beats() -> None:
+    random = np.random.default_rng(2)
+    points = random.integers(0, 12, (200, 2)).astype(float)
+    points[3] = np.nan
+    chosen = front(points[:, 0], points[:, 1])
+    for number, (x, y) in enumerate(points):
+        beaten = any((a <= x and b < y) or (a < x and b <= y) for a, b in points)
+        assert chosen[number] == (not beaten and number != 3)
+
+
+def test_errors_count_from_the_start_or_from_unloaded_rails() -> None:
+    study = scene(solver={"steps": 200})
+    start, unloaded = (converge(study, 1.0, 0.0, zero).outcome for zero in ("start", "unloaded"))
+    np.testing.assert_allclose(unloaded.error - unloaded.error[0], start.error, atol=1e-15)
+    np.testing.assert_allclose(unloaded.error[0], start.numbers["error_at_start"], atol=1e-15)
+    assert np.abs(unloaded.error[0]).max() > 1e-4
+
+
+def test_open_modes_grow_until_nothing_changes() -> None:
+    study = scene({"modes": "auto"}, solver={"tolerance": 2e-2})
+    found = converge(study, 1.0, 0.0, "start")
+    assert found.status == Status.OK and found.model.modes > 12
+
+
+def _rail(**more: Any) -> Callable[[], Study]:
+    return lambda: scene(body={"left": rail(-3.0) | more, "right": rail(3.0)})
+
+
+ELSEWHERE = {"node": {"west": [0, -3, 5], "east": [0, 9, 5]}}
+BEAM = {
+    "kind": "beam",
+    "length": 12.0,
+    "area": 1.0,
+    "second_moment": 1.0,
+    "youngs_modulus": 1.0,
+    "density": 1.0,
+    "supports": "pinned-pinned",
+}
+
+
+def _robot(**more: Any) -> Callable[[], Study]:
+    robot = {"arm": "gantry", "rails": ["left", "right"], "start": [3.0, 0, 0, 0, 0]}
+    return lambda: scene(robot={"portal": robot | more})
+
+
+@pytest.mark.parametrize(
+    ("make", "where"),
+    [
+        (_rail(**ELSEWHERE), "body.left.track"),
+        (_rail(own_weight=True), "body.left.own_weight"),
+        (_rail(gravity_direction=[0, 1, -1]), "body.left.gravity_direction"),
+        (_rail(spring={}), "body.left.supports"),
+        (lambda: scene(body={"left": BEAM, "right": rail(3.0)}), "body.left.kind"),
+        (_robot(arm="nobody"), "robot.portal.arm"),
+        (_robot(rails=["left", "nowhere"]), "robot.portal.rails.1"),
+        (_robot(rails=["left", "left"]), "robot.portal"),
+        (_robot(start=[3.0, 0]), "robot.portal.start"),
+        (_robot(start=[13.0, 0, 0, 0, 0]), "robot.portal.start"),
+        (_robot(moves=[{"to": [-1.0, 0, 0, 0, 0]}]), "robot.portal.moves.0.to"),
+        (lambda: scene(robot={}), "robot"),
+        (lambda: scene(kind="passage"), "robot"),
+        (lambda: scene(solver={"scheme": "fox-goodwin"}), "solver.scheme"),
+        (lambda: scene(solver={"fidelity": "static"}), "solver.fidelity"),
+        (lambda: scene(output={"histories": {"every": 3}}), "output.histories"),
+        (lambda: scene(sensor={"tip": {"body": "left", "at": 1.0}}), "sensor"),
+        (
+            lambda: scene(
+                arm={"gantry": GANTRY | {"rail": {"speed": 1, "acceleration": 1, "jerk": 1, "damping": 3.0}}}
+            ),
+            "",
+        ),
+    ],
+)
+def test_what_cannot_be_marched_is_refused(make: Callable[[], Study], where: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        study = make()
+        kind_of(study).parts(study)
+    assert caught.value.where.endswith(where)
