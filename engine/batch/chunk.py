@@ -13,7 +13,6 @@ from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import Flat, histories
-from engine.march.tables import SceneTables
 from engine.observation.histories import counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
@@ -65,14 +64,11 @@ def _status(plan: Plan, group: Group, found: Found) -> NDArray[np.int8]:
     held = found.held
     missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
     known = worst_held(found.error, results_of(plan.asked))
-    unknown = np.isnan(held) | (np.isnan(known) & ~_all_is_fixed(group))
+    # Where the study leaves nothing open, no error of its variants is the program's.
+    fixed = group.grid.fixed and not group.grid.chooses
+    unknown = np.isnan(held) | (np.isnan(known) & (not fixed))
     missed = np.where(unknown, np.int8(Status.UNRESOLVED), missed)
     return gravest(found.outcome.status, missed)
-
-
-def _all_is_fixed(group: Group) -> bool:
-    """Whether the study leaves nothing open, so that no error of its variants is the program's."""
-    return group.grid.fixed and not group.grid.chooses
 
 
 @one_thread()
@@ -103,9 +99,5 @@ def _marched_again(
         return
     values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
-        yield Rows(variants[own], histories(tables, values.part(own), _counts(plan, tables), halted))
-
-
-def _counts(plan: Plan, tables: SceneTables) -> Counts:
-    """Stations of the kept histories of a march, by their count."""
-    return counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)
+        counts = counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)
+        yield Rows(variants[own], histories(tables, values.part(own), counts, halted))

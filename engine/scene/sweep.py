@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine.scene.axes import Values, check_distinct, check_targets, listed, ranged, sampled, sobol_points
-from engine.scene.settings import SweepAxis
 from engine.scene.study import Study, checks
 from engine.study_file.checks import Check
 from results_schema.errors import BadInput
@@ -117,7 +116,8 @@ def expand(study: Study) -> Cases:
     found = []
     for name, axis in axes.items():
         dim = VARIANT if study.sweep.zip or axis.sobol is not None else name
-        values = sampled_values[name] if name in sampled_values else _listed_or_ranged(study, name, axis)
+        own = listed if axis.values is not None else ranged
+        values = sampled_values[name] if name in sampled_values else own(study, name, axis)
         unit = study.unit(axis.of[0])
         targets = {target: factor for path in axis.of for target, factor in study.targets(path).items()}
         symbol, noun = (unit.symbol, unit.noun) if unit else ("", "")
@@ -126,12 +126,9 @@ def expand(study: Study) -> Cases:
     cases = Cases(tuple(dims), tuple(dims.values()), tuple(found))
     _check_repeats(study, cases)
     for check in checks(study):
-        _verify(study, cases, check)
+        if unmet := broken(study, cases, check):
+            _refuse(study, check, *unmet)
     return cases
-
-
-def _listed_or_ranged(study: Study, name: str, axis: SweepAxis) -> Values:
-    return listed(study, name, axis) if axis.values is not None else ranged(study, name, axis)
 
 
 def _sampled(study: Study) -> Iterator[tuple[str, Values]]:
@@ -190,12 +187,6 @@ def _check_repeats(study: Study, cases: Cases) -> None:
     if (counts > 1).any():
         what = "zipped axes repeat a variant"
         raise study.source.fault("sweep", what, received=f"{int((counts > 1).sum())} repeated")
-
-
-def _verify(study: Study, cases: Cases, check: Check) -> None:
-    """A check on the axes that it depends on; the study itself was checked."""
-    if unmet := broken(study, cases, check):
-        _refuse(study, check, *unmet)
 
 
 def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any], Mapping[str, int]] | None:

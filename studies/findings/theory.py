@@ -151,10 +151,10 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     """1 + (2.5 + 8.1 mu)(Omega/omega_1)^2 for every variant; None unless a mass swings about the middle of a pinned
     beam from one end to the other and the sensor is at midspan."""
     body, motion = results.study.body[results.carriage.on], results.carriage.motion
-    mass = _coordinate(results, "mass_ratio")
+    ratio = results.dataset.coords.get("mass_ratio")
     swept = {path for axis in results.axes for path in axis.paths}
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
-    if mass is None or swept & fixed or not motion.is_harmonic:
+    if ratio is None or swept & fixed or not motion.is_harmonic:
         return None
     if results.carriage.masses != ("mass",):  # a spring keeps part of the mass from following
         return None
@@ -165,6 +165,7 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
         return None
     if max(abs(place / body.length - 0.5) for place in (at, 0.5 * (low + high))) > NEARLY:
         return None
+    mass = results.everywhere(ratio)
     return np.asarray(1.0 + (2.5 + 8.1 * mass) * results.everywhere(frequency_ratio(results)) ** 2)
 
 
@@ -185,11 +186,6 @@ def end_spring_difference(results: Results, sensor: str) -> Array | None:
     first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
     bending: Any = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
     return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
-
-
-def _coordinate(results: Results, name: str) -> Array | None:
-    found = results.dataset.coords.get(name)
-    return None if found is None else results.everywhere(found)
 
 
 def _support_damping(results: Results) -> Array:

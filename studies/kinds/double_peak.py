@@ -21,7 +21,7 @@ from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import MINUS, counted, listed, number, percent
-from studies.results.results import PACES, Axis, Index, Results, chosen, extreme
+from studies.results.results import PACES, Index, Results, chosen, extreme
 
 MOST_SENSORS = 3
 STATIONS = 8192  # of a cycle: all steps of nearly every march, so that whatever rings in it is seen as it was marched
@@ -227,14 +227,9 @@ def _breaks(results: Results, sensor: str) -> list[str]:
     along = results.everywhere(results.dataset[group.name])
     said = []
     for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
-        label = _group_label(results, group, value)
+        label = group.at(group.values.tolist().index(value))
         said.append(f"{label}: {_break(results, ratio, counts, known & (along == value))}")
     return [f"{sensor}: " + "; ".join(said) + "."]
-
-
-def _group_label(results: Results, group: Axis, value: float) -> str:
-    place = int(np.flatnonzero(group.values == value)[0])
-    return group.at(place)
 
 
 def _break(results: Results, ratio: Array, counts: Array, among: Mask) -> str:

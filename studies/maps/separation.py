@@ -14,7 +14,7 @@ from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
 from studies.maps.mapping import Asked, Map, dataset_of
 from studies.protocol.parts import Work
-from studies.results.formatting import counted, listed, number, percent
+from studies.results.formatting import counted, listed, number, percent, spanned
 
 MODES, STEPS = 20, 6000
 SLOWEST, FASTEST = 0.05, 1.5  # speed ratios
@@ -100,16 +100,12 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     faster = dataset["separation_speed_ratio"] > dataset["separation_onset"]
     again = int((faster & (dataset["smallest_contact_force"] >= 0.0)).sum())
     holds = f" At {again} of {counted(int(faster.sum()), 'faster passage')} it holds." if again else ""
+    places = dataset["separation_place"].values
+    where = spanned(places[np.isfinite(places)], percent)
     return [
-        f"Separation: the contact opens first at speed ratio {told}, {_range(dataset['separation_place'].values)} of "
-        f"the way; from there on the equations say no more of the passage.{holds}{kept}"
+        f"Separation: the contact opens first at speed ratio {told}, at {where} of the way; from there on the "
+        f"equations say no more of the passage.{holds}{kept}"
     ]
-
-
-def _range(place: Array) -> str:
-    """The first and last place, or the only one."""
-    ends = dict.fromkeys(percent(float(end)) for end in (np.nanmin(place), np.nanmax(place)))
-    return f"at {' to '.join(ends)}"
 
 
 MAP = Map("separation", "where a crossing mass would lift off", 2.0, OUTPUTS, compute, sentences)

@@ -69,7 +69,9 @@ def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:
 
 
 def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr.Dataset:
-    names, derived = _names(plan), derived_from(plan.study)
+    from engine.accuracy.results import results_of
+
+    names, derived = [result.name for result in results_of(plan.asked)], derived_from(plan.study)
     whole = [str(name) for name in dataset["result"].values]
     rows = [[names.index(own) for own in ([name] if name in names else derived[name])] for name in whole]
     observed = np.where(np.isfinite(found.observed), found.observed, np.nan)
@@ -94,13 +96,6 @@ def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr
         {name: declared[name].holding(array) for name, array in arrays.items()},
         coords=coordinates | own,
     )
-
-
-def _names(plan: Plan) -> list[str]:
-    """The results of a plan's march."""
-    from engine.accuracy.results import results_of
-
-    return [result.name for result in results_of(plan.asked)]
 
 
 def relative_errors(group: xr.Dataset, name: str = "observed_error") -> Array:

@@ -30,21 +30,16 @@ def unreduced_group(plan: Plan, dataset: xr.Dataset, check: Callable[[], None] =
 
     dataset: the study's own. check: called now and then, to stop by what it raises.
     """
+    from engine.accuracy.groups import USED
     from engine.unreduced.comparison import compare_variant
 
     variants = _chosen(plan, dataset)
     found = []
     for variant in variants:
         check()
-        found.append(compare_variant(plan, variant, _used(dataset, variant), check))
+        used = {name: dataset[name].values.reshape(-1)[[variant]] for name in USED}
+        found.append(compare_variant(plan, variant, used, check))
     return {GROUP: _dataset(variants, found)} if found else {}
-
-
-def _used(dataset: xr.Dataset, variant: int) -> dict[str, NDArray[Any]]:
-    """What a variant was computed with, by the names of the archive."""
-    from engine.accuracy.groups import USED
-
-    return {name: dataset[name].values.reshape(-1)[[variant]] for name in USED}
 
 
 def _chosen(plan: Plan, dataset: xr.Dataset) -> list[int]:

@@ -34,15 +34,12 @@ def main() -> int:
         model = READERS[request["kind"]](request["files"], request["options"])
         save_model(Path(request["answer"]), model)
     except (BadInput, MemoryError) as error:
-        fault = error if isinstance(error, BadInput) else _too_large(request["memory"])
+        too_large = BadInput("the files need too much memory", expected=f"at most {request['memory'] / 2**30:.3g} GiB")
+        fault = error if isinstance(error, BadInput) else too_large
         words = {key: str(getattr(fault, key)) for key in FAULT_KEYS}
         Path(request["refusal"]).write_text(json.dumps(words), encoding="utf-8")
         return BadInput.exit_code
     return 0
-
-
-def _too_large(memory: int) -> BadInput:
-    return BadInput("the files need too much memory", expected=f"at most {memory / 2**30:.3g} GiB")
 
 
 def _limit(memory: int, seconds: int) -> None:

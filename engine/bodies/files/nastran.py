@@ -32,7 +32,8 @@ def read_nastran(files: Mapping[str, str], options: Mapping[str, Any]) -> FileMo
     if suffix in (".op4", ".op2"):
         both = suffix == ".op4" and Path(files["nodes"]).suffix.lower() == ".op2"
         found = _of_superelement(files, superelement) if both else _binary(path, suffix)
-        rows, read, (stiffness, mass) = table.rows, [path], _pair(found, options, path)
+        rows, read = table.rows, [path]
+        stiffness, mass = (sparse.csc_array(found[name]) for name in _names(found, options, path))
         recovery = _recovery(found, options, path)
     else:
         rows, read, (stiffness, mass) = _punched(path, options)
@@ -160,11 +161,6 @@ def _recovery(found: dict[str, Any], options: Mapping[str, Any], path: str) -> A
         known = ", ".join(sorted(found)[:30]) or "no other matrix"
         raise BadInput("no such recovery matrix", where=path, expected=f"recovery = one of {known}", received=name)
     return sparse.csc_array(found[name])
-
-
-def _pair(found: dict[str, Any], options: Mapping[str, Any], path: str) -> tuple[Any, Any]:
-    stiffness, mass = (sparse.csc_array(found[name]) for name in _names(found, options, path))
-    return stiffness, mass
 
 
 def _punched(path: str, options: Mapping[str, Any]) -> tuple[list[Row], list[str], tuple[Any, Any]]:
