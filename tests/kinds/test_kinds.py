@@ -26,7 +26,9 @@ from tests.studies import scenes
 KINDS = tuple(scenes.MOTIONS)
 
 
-MEASURING = ("eigenfrequencies", "influence", "stability", "work-precision", "moving-frames", "sliding-mass")
+MEASURING = (
+    *("eigenfrequencies", "influence", "stability", "work-precision", "moving-frames", "sliding-mass", "portal"),
+)
 
 
 def test_all_kinds_are_found_by_their_files() -> None:
