@@ -296,7 +296,8 @@ def _check_rolling(model: FloatingModel) -> None:
     """Nothing turns with a track whose rotation about itself no row of its model tells."""
     where = model.study.source.where
     for name, carriage in model.study.carriage.items():
-        turns = any(model.study.value(f"carriage.{name}.{key}") for key in ("inertia", "height"))
+        is_mass = carriage.suspension is None  # what is sprung has neither key
+        turns = is_mass and any(model.study.value(f"carriage.{name}.{key}") for key in ("inertia", "height"))
         if turns and not model.bodies[carriage.on].rolls:
             raise BadInput(
                 "a solid model's rotation about its track is not known: nothing turns with it",
