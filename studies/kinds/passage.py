@@ -10,28 +10,43 @@ from pydantic import Field
 
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from engine.study_file.units import Dimensionless
-from results_schema.arrays import Mask
+from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
+from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.protocol.study import Kind, question_of
-from studies.results.findings_common import check_sensors, exceeds, first_carriage, in_words, told_statuses, uncertainty
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5
 MOST_PARTS = 3  # of a sweep that are told one by one
+MOST_TOLD = 3  # values of another swept number that are told one by one
+GAP = 3.0  # times the usual distance of two values of a sweep
 BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
 
+LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
+
+
 class Asked(Spec):
-    """The table [question]. amplification: dynamic over static, of which is told from which speed on it is exceeded."""
+    """The table [question]. amplification: dynamic over static, of which is told at which speeds it is exceeded; the
+    others: absolute values, of which the same is told for every sensor of that quantity."""
 
     amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
+    displacement: Annotated[Length, Field(gt=0)] | None = None
+    velocity: Annotated[Speed, Field(gt=0)] | None = None
+    acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
+    bending_moment: Annotated[Torque, Field(gt=0)] | None = None
+    stress: Annotated[Pressure, Field(gt=0)] | None = None
+
+    def limit(self, name: str) -> float | None:
+        """What is named for a quantity."""
+        return getattr(self, name) if name in LIMITED else None
 
 
 class Passage(Kind):
@@ -52,7 +67,8 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        said = [f"{_largest(results, sensor)}{_amplified(results, sensor)}" for sensor in _told(results)]
+        told = (_largest, _amplified, _limited)
+        said = ["".join(tell(results, sensor) for tell in told) for sensor in _told(results)]
         said += [text for carriage in results.study.carriage for text in _contact(results, carriage)]
         return [*said, *told_statuses(results)]
 
@@ -99,31 +115,60 @@ def _largest(results: Results, sensor: str) -> str:
 
 def _amplified(results: Results, sensor: str) -> str:
     """Where statics are exceeded by as much as the question names; "" without anything to compare."""
-    gain = np.where(results.with_values, results.numbers("dynamic_amplification", sensor), np.nan)
-    if results.size < 2 or not np.isfinite(gain).any():
+    gain = results.numbers("dynamic_amplification", sensor)
+    if results.size < 2 or not np.isfinite(np.where(results.with_values, gain, np.nan)).any():
         return ""
-    threshold, axis = question_of(results.study, Asked).amplification, results.axis(*PACES)
+    threshold = question_of(results.study, Asked).amplification
+    return f" The dynamic amplification exceeds {number(threshold)} {_where(results, gain, threshold)}."
+
+
+def _limited(results: Results, sensor: str) -> str:
+    """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
+    limit = question_of(results.study, Asked).limit(results.study.sensor[sensor].quantity)
+    if limit is None:
+        return ""
+    said = quantity(limit, results.sensors[sensor])
+    return f" Its absolute value exceeds {said} {_where(results, sizes(results, sensor), limit)}."
+
+
+def _where(results: Results, values: Array, threshold: float) -> str:
+    """In which part of the sweep values exceed a threshold: of a swept pace, for each value of another number where
+    these are few."""
+    beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    axis = results.axis(*PACES)
     if axis is None or axis.dim == VARIANT:
-        return f" The dynamic amplification {exceeds(results, gain, threshold, number)}."
-    beyond = np.nan_to_num(gain) > threshold
-    return f" The dynamic amplification exceeds {number(threshold)} {_paces(results, axis, beyond)}."
+        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+    others = [other for other in results.axes if other.name != axis.name]
+    if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
+        return _paces(results, axis, beyond)
+    own = results.everywhere(results.dataset[others[0].name])
+    told = {float(value): _paces(results, axis, beyond, own == value) for value in np.unique(own)}
+    if len(set(told.values())) == 1:
+        return next(iter(told.values()))
+    return "; ".join(f"{text} ({others[0].noun} {others[0].in_words(value)})" for value, text in told.items())
 
 
-def _paces(results: Results, axis: Axis, beyond: Mask) -> str:
-    """The parts of a swept pace in which any variant is beyond a threshold, and which variants these are."""
+def _paces(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None) -> str:
+    """The parts of a swept pace in which any variant (among some) is beyond a threshold, and which variants these are.
+    A part ends where the pace leaves out more than `GAP` times its usual distance: nothing was computed there."""
+    beyond = beyond if among is None else beyond & among
     along = results.everywhere(results.dataset[axis.name])
     paces = np.unique(along)
     over = np.isin(paces, along[beyond])
     if not over.any():
         return f"nowhere from {axis.span}"
-    if over.all():
-        return f"everywhere from {axis.span}{_common(results, axis, beyond)}"
+    steps = np.diff(paces)
+    apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
+    if over.all() and not apart.size:
+        return f"everywhere from {axis.span}{_common(results, axis, beyond) if among is None else ''}"
     turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
-    parts = [paces[first:end] for first, end in zip(turns[::2], turns[1::2], strict=True)]
+    bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
+    parts = [paces[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
     told = [f"at {replace(axis, values=part).span}" for part in parts]
-    if over[-1]:
-        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} on"
-    told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
+    if over[-1] and parts[-1].size > 1:
+        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(paces[-1])}"
+    if among is None:
+        told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
     return listed(told) if len(told) <= MOST_PARTS else f"first {told[0]}, last {told[-1]}"
 
 

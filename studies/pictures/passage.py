@@ -257,12 +257,22 @@ def _draw_response(results: Results, sensors: list[str], shown: list[Index], dra
 
 
 def _shade_left(axes: Any, results: Results, index: Index, end: float) -> None:
-    """Grey where the first carriage has left its body; at most twice the way on it, for the slow are soon still."""
-    position = results.trace(f"{results.carriage_name}_position", index).values
-    on = position[np.isfinite(position)]
-    if not on.size or on[-1] <= on[0]:
+    """Grey where the first carriage has left its body; at most its way on it beyond where the last one has left too,
+    for the slow are soon still."""
+    first = results.trace(f"{results.carriage_name}_position", index)
+    on = np.flatnonzero(np.isfinite(first.values))
+    if on.size < 2 or first.values[on[-1]] <= first.values[on[0]]:
         return
-    end = min(end, 2.0 * on[-1] - on[0])
-    if end > on[-1] + LEFT * (on[-1] - on[0]):
-        axes.axvspan(on[-1], end, color=look.HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
-        axes.set_xlim(on[0], end)
+    start, left = first.values[on[0]], first.values[on[-1]]
+    speed = (left - first.values[on[-2]]) / (first.times[on[-1]] - first.times[on[-2]])
+    last = max(_last_time(results, carriage, index) for carriage in results.study.carriage)
+    end = min(end, left + speed * (last - first.times[on[-1]]) + left - start)
+    if end > left + LEFT * (left - start):
+        axes.axvspan(left, end, color=look.HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
+        axes.set_xlim(start, end)
+
+
+def _last_time(results: Results, carriage: str, index: Index) -> float:
+    """When a carriage was last on its body."""
+    trace = results.trace(f"{carriage}_position", index)
+    return float(trace.times[np.isfinite(trace.values)].max(initial=-np.inf))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from engine.scene.carriages import Carriage
@@ -61,20 +59,19 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     return f" (estimated to within {percent(error)}{remedy})"
 
 
-def exceeds(results: Results, values: Array, threshold: float, told: Callable[[float], str] = percent) -> str:
-    """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept. told: how the
-    threshold is written."""
+def exceeds(results: Results, values: Array, threshold: float) -> str:
+    """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept."""
     beyond = np.isfinite(values) & (values > threshold)
     if not beyond.any():
-        return f"stays below {told(threshold)}"
+        return f"stays below {percent(threshold)}"
     axis = results.axis(".motion.speed", ".motion.frequency")
     if axis is None:
-        return f"exceeds {told(threshold)} in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+        return f"exceeds {percent(threshold)} in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
     along = results.everywhere(results.dataset[axis.name])
     lowest = float(along[beyond].min())
     if lowest == axis.values.min():
-        return f"exceeds {told(threshold)} already at {axis.in_words(lowest)}"
-    return f"first exceeds {told(threshold)} at {axis.in_words(lowest)}"
+        return f"exceeds {percent(threshold)} already at {axis.in_words(lowest)}"
+    return f"first exceeds {percent(threshold)} at {axis.in_words(lowest)}"
 
 
 def told_envelopes(results: Results) -> list[str]:

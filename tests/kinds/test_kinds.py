@@ -216,10 +216,18 @@ def test_findings_of_a_passage_tell_where_the_contact_opens() -> None:
     [
         ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere from 1 m/s to 6 m/s."),
         ([1.2] * 6, [1.3] * 6, "everywhere from 1 m/s to 6 m/s."),
-        ([1.2] * 6, [1.0] * 6, "everywhere from 1 m/s to 6 m/s (zeta 0.01)."),
-        ([1.0, 1.0, 1.0, 1.2, 1.0, 1.2], [1.0, 1.0, 1.0, 1.2, 1.2, 1.2], "from 4 m/s on."),
-        ([1.0, 1.2, 1.2, 1.0, 1.0, 1.2], [1.0] * 5 + [1.2], "at 2 m/s to 3 m/s (zeta 0.01) and from 6 m/s on."),
-        ([np.nan, 1.2, 1.0, 1.0, 1.0, np.nan], [1.0] * 6, "at 2 m/s (zeta 0.01)."),
+        ([1.2] * 6, [1.0] * 6, "everywhere from 1 m/s to 6 m/s (zeta 0.01); nowhere from 1 m/s to 6 m/s (zeta 0.05)."),
+        (
+            [1.0, 1.2, 1.2, 1.0, 1.0, 1.2],
+            [1.0] * 5 + [1.2],
+            "at 2 m/s to 3 m/s and at 6 m/s (zeta 0.01); at 6 m/s (zeta 0.05).",
+        ),
+        (
+            [np.nan, 1.2, 1.0, 1.2, 1.2, 1.2],
+            [1.0] * 6,
+            "at 2 m/s and from 4 m/s to the end of the sweep, 6 m/s (zeta 0.01); nowhere from 1 m/s to 6 m/s "
+            "(zeta 0.05).",
+        ),
     ],
 )
 def test_a_passage_tells_at_which_speeds_statics_are_exceeded(
@@ -230,6 +238,23 @@ def test_a_passage_tells_at_which_speeds_statics_are_exceeded(
     dataset = scenes.run("passage", f"{pace}\n{zeta}", extra="[question]\namplification = 1.15").copy(deep=True)
     dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = np.transpose([first, second])
     assert f"The dynamic amplification exceeds 1.15 {words}" in answers.answer(dataset)[0]
+
+
+def test_between_speeds_that_lie_far_apart_nothing_is_said() -> None:
+    pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 20, 21] }'
+    dataset = scenes.run("passage", pace).copy(deep=True)
+    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = 1.3
+    wanted = "exceeds 1.1 at 1 m/s to 3 m/s and from 20 m/s to the end of the sweep, 21 m/s."
+    assert wanted in answers.answer(dataset)[0]
+
+
+def test_a_passage_tells_where_a_limit_of_the_question_is_exceeded() -> None:
+    pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 4] }'
+    dataset = scenes.run("passage", pace, extra='[question]\ndisplacement = "5 mm"').copy(deep=True)
+    dataset["midspan_max"].values[:] = [1e-3, 2e-3, 6e-3, 4e-3]
+    dataset["midspan_min"].values[:] = [0.0, 0.0, 0.0, -7e-3]
+    wanted = "Its absolute value exceeds 5 mm from 3 m/s to the end of the sweep, 4 m/s."
+    assert wanted in answers.answer(dataset)[0]
 
 
 def test_without_swept_speeds_variants_that_exceed_statics_are_counted() -> None:
