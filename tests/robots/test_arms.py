@@ -44,7 +44,11 @@ def test_gravity_load_of_the_puma_is_that_of_its_publication() -> None:
     np.testing.assert_allclose(found, [0, 31.63988, 6.035138, 0, 0.0282528, 0], atol=5e-6)
 
 
-@pytest.mark.parametrize("table", [GANTRY, ARM], ids=["gantry", "arm"])
+SLIDE = {"kind": "prismatic", "axis": [1, 0, 1], "place": [0.2, 0, 0], "mass": 20, "inertia": [1, 1, 1], **LIMITS}
+TELESCOPE = ARM | {"links": [*ARM["links"], SLIDE]}  # slides on what turns
+
+
+@pytest.mark.parametrize("table", [GANTRY, ARM, TELESCOPE], ids=["gantry", "arm", "telescope"])
 def test_inverse_dynamics_of_random_states_is_that_of_particles(table: dict[str, object]) -> None:
     arm, random = Arm(**table), np.random.default_rng(17)
     joints = random.uniform(-1.5, 1.5, (20, len(arm.drives), 3))
