@@ -27,6 +27,7 @@ from tests.bodies import models
 from tests.bodies.frames import straight
 from tests.engine import gantries
 from tests.engine.build import Table, beam, cruise, mass, study
+from tests.floating.scenes import ARM
 from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
 
 STUDIES = {f"built-in {name}": path for name, path in catalogue.built_in().items()}
@@ -39,6 +40,13 @@ CAR = mass(0.1, cruise(0.0, 1.0, 1.0))
 def laid_out(scene: Study) -> Layout:
     model = base_scene(scene)
     return layout(model, starts(model))
+
+
+def test_a_body_on_which_nothing_rides_moves_with_its_frame(tmp_path: Path) -> None:
+    arm = ARM | {"own_weight": True}
+    frame = {"joints": [{"kind": "revolute", "axis": [0, 1, 0]}]}
+    scene = Study(kind="moving-frames", gravity=9.81, body={"arm": arm}, frame={"arm": frame}, question={"duration": 1})
+    assert "Mode shapes of arm" in write_drawing(scene, tmp_path / "drawing").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", [*STUDIES, *STARTS])
