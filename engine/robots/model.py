@@ -134,7 +134,7 @@ def _chain(arm: Arm, most: int) -> Array:
         found[j, CENTRE : CENTRE + 3], found[j, INERTIA : INERTIA + 3] = solid.centre, solid.inertia
     for j, link in enumerate(arm.links, start=1):
         axis = np.array(link.axis)
-        found[j, SLIDES] = link.kind == "prismatic"
+        found[j, SLIDES] = link.slides
         found[j, JOINT_AXIS : JOINT_AXIS + 3] = axis / np.linalg.norm(axis)
         found[j, JOINT_PLACE : JOINT_PLACE + 3] = link.place
         found[j, JOINT_TURN : JOINT_TURN + 9] = Rotation.from_rotvec(link.turned).as_matrix().reshape(9)

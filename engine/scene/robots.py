@@ -63,6 +63,11 @@ class Link(Solid, Drive):
     place: Place = (0.0, 0.0, 0.0)
     turned: Vector = (0.0, 0.0, 0.0)
 
+    @property
+    def slides(self) -> bool:
+        """Whether its joint slides, in place of turning."""
+        return self.kind == "prismatic"
+
     @model_validator(mode="after")
     def _has_axis(self) -> Link:
         if not any(self.axis):
