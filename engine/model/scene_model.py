@@ -266,10 +266,9 @@ def check_moves(study: Study) -> None:
 
 
 def _in_use(study: Study, body: str) -> bool:
-    """Whether a body carries a carriage, a robot, a sensor or an envelope, or moves with a frame, or carries one."""
+    """Whether a body carries a carriage, a robot, a sensor or an envelope."""
     moving = [name for carriage in study.carriage.values() for name in carriage.bodies]
     moving += [name for robot in study.robot.values() for name in robot.rails]
-    moving += [name for own, frame in study.frame.items() for name in (own, frame.on)]
     read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
     return body in (*moving, *read)
 

@@ -71,6 +71,12 @@ def write_drawing(study: Study, folder: Path) -> Path:
 def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
     """Everything that the template shows of a study, plain text but for drawings; remarks: what is worth knowing."""
     model = base_scene(study)
+    if not model.bodies:
+        raise BadInput(
+            "nothing rides on a body and nothing reads one: there is nothing to draw",
+            where=study.source.where("sensor"),
+            expected="a carriage or a sensor",
+        )
     scene = layout(model, in_a_row(model))
     variants = expand(study).size
     drawn = [
