@@ -117,6 +117,16 @@ def refuse_beam_words(frame: Frame, where: str) -> None:
             )
 
 
+def refuse_unheld(loose: int, frame: Frame, where: str) -> None:
+    """Raise BadInput for a body with so many motions without strain that no free joint gives its frame."""
+    if loose and not any(joint.freedoms == AXES for joint in frame.joints):
+        raise BadInput(
+            "nothing holds this body in the frame that moves",
+            where=f"{where}.supports",
+            expected="supports that hold it, or a joint of the kind free",
+        )
+
+
 def hermite(values: Array, width: float) -> Array:
     """(cells, 6, ...): polynomials of degree 5 in the part of a cell gone, constant first, through values and first two
     derivatives (3, cells + 1, ...) at the ends of cells of a width."""

@@ -13,7 +13,7 @@ from engine.bodies.frame.body import motion_of_points
 from engine.bodies.frame.frame import Frame as FrameBody
 from engine.bodies.frame.frame import PointMass
 from engine.bodies.frame.track import TrackBeams, TrackPoints, line_of
-from engine.floating.elastic import AXES, ElasticBody, Z, floating_axes, refuse_beam_words
+from engine.floating.elastic import AXES, ElasticBody, Z, floating_axes, refuse_beam_words, refuse_unheld
 from engine.scene.frames import Frame
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
@@ -81,12 +81,7 @@ def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str) 
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)
     own = asked.model_copy(update={"rigid_body_modes": "drop"})
     assembly, motion = motion_of_points(own)
-    if assembly.rigid.shape[1] and not any(joint.freedoms == AXES for joint in frame.joints):
-        raise BadInput(
-            "nothing holds this frame in the frame that moves",
-            where=f"{where}.supports",
-            expected="supports that hold it, or a joint of the kind free",
-        )
+    refuse_unheld(assembly.rigid.shape[1], frame, where)
     line = own.line
     axes = floating_axes(line.tangent, line.direction)
     track, points = line_of(own, assembly.mesh, line.members, line.direction, np.array(own.track.offset))

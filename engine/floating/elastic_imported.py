@@ -13,7 +13,17 @@ from engine.bodies.imported.imported import Imported
 from engine.bodies.imported.line import LineShapes
 from engine.bodies.imported.model import HeldModel
 from engine.bodies.imported.rows import spline_slopes
-from engine.floating.elastic import ABOUT_Y, ABOUT_Z, AXES, ElasticBody, Y, Z, floating_axes, refuse_beam_words
+from engine.floating.elastic import (
+    ABOUT_Y,
+    ABOUT_Z,
+    AXES,
+    ElasticBody,
+    Y,
+    Z,
+    floating_axes,
+    refuse_beam_words,
+    refuse_unheld,
+)
 from engine.scene.frames import Frame
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -47,12 +57,7 @@ def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)
     own = asked.model_copy(update={"rigid_body_modes": "drop"})
     held, motion = motion_of_nodes(own)
-    if held.flexibility.rigid.shape[1] and not any(joint.freedoms == AXES for joint in frame.joints):
-        raise BadInput(
-            "nothing holds this body in the frame that moves",
-            where=f"{where}.supports",
-            expected="supports that hold it, or a joint of the kind free",
-        )
+    refuse_unheld(held.flexibility.rigid.shape[1], frame, where)
     mass = nodal_mass(held, where)
     line = own.line
     axes = floating_axes(np.asarray(line.tangent), np.asarray(own.direction))

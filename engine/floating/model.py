@@ -281,11 +281,11 @@ def _check_held(model: FloatingModel) -> None:
 
 
 def _check_readings(model: FloatingModel) -> None:
-    """Forces and stresses are read of beams, not of frames of them."""
+    """Forces and stresses are read of single beams alone."""
     for name, sensor in model.study.sensor.items():
         if sensor.under is None and not model.bodies[str(sensor.body)].slender and sensor.reads.derivative:
             raise BadInput(
-                "this quantity of a frame of beams in a frame that moves is not built yet",
+                "this quantity is read of single beams alone in frames that move",
                 where=model.study.source.where(f"sensor.{name}.quantity"),
                 expected="displacement, velocity or acceleration",
                 received=sensor.quantity,

@@ -19,6 +19,7 @@ from engine.robots.results import beyond_rest, differences, outcome
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from results_schema.statuses import gravest
 
 if TYPE_CHECKING:
     from engine.robots.model import RobotModel
@@ -108,9 +109,10 @@ def converge(
         known = bool(np.isfinite(error).all())
         held = known and bool(error.max() <= tolerance)
         judged = Status.OK if held else Status.TOLERANCE_MISSED if known else Status.UNRESOLVED
-        found = Converged(model, now, error, steps, max(judged, now.status))
+        found = Converged(model, now, error, steps, Status(int(gravest(judged, now.status))))
         if known and error.max() <= ENOUGH * tolerance:
             break
     assert found is not None
     resting, status = rest(model, times)
-    return replace(found, outcome=beyond_rest(found.outcome, record, resting), status=max(found.status, status))
+    whole = Status(int(gravest(found.status, status)))
+    return replace(found, outcome=beyond_rest(found.outcome, record, resting), status=whole)

@@ -38,11 +38,6 @@ class Rail:
     moved: Array
     missed: Array
 
-    @property
-    def length(self) -> float:
-        """m."""
-        return float(self.ends[-1])
-
 
 @dataclass(frozen=True, eq=False)
 class _Whole:

@@ -16,7 +16,10 @@ from engine.kernels.robots.layout import (
     SEEN_ACTUAL,
     SEEN_PHASE,
     SEEN_PLANNED,
+    START,
+    STEADY,
     SUNK,
+    UP,
     WORKS,
 )
 from results_schema.arrays import Array, Counts
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     from engine.kernels.robots.layout import Record
     from engine.robots.model import RobotModel
 
-UP = 2  # of a wrench: its part along z
+VERTICAL = 2  # of a wrench and of a motion: its part along z
 DOING = {"moving": MOVES, "working": WORKS, "holding": HOLDS}
 KEPT = 800  # stations of a history
 
@@ -61,10 +64,10 @@ def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Out
         "error_largest": np.abs(error).max(axis=0),
         "error_largest_time": times[np.argmax(size, axis=0)],
         "deflection_largest": np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))]),
-        "rail_force_largest": record.grips[:, :, :, UP].max(axis=(0, 2)),
+        "rail_force_largest": record.grips[:, :, :, VERTICAL].max(axis=(0, 2)),
     }
     numbers |= {f"error_{name}": largest(np.where(phase == doing, size, np.nan)) for name, doing in DOING.items()}
-    if status >= Status.NOT_CONVERGED:
+    if not status.values_kept:
         numbers = {name: np.full_like(array, np.nan) for name, array in numbers.items()}
     return Outcome(numbers, times, planned, error, sunk, record.coordinates[:, : model.modes, 0], status)
 
@@ -73,7 +76,7 @@ def beyond_rest(found: Outcome, record: Record, resting: Record) -> Outcome:
     """The same with the largest lengths of what tools are off from where they would rest."""
     own, other = (one.robots[:, :, SEEN_ACTUAL : SEEN_ACTUAL + 3] for one in (record, resting))
     size, phase = np.linalg.norm(own - other, axis=2), record.robots[:, :, SEEN_PHASE]
-    lost = np.nan if found.status >= Status.NOT_CONVERGED else 1.0
+    lost = 1.0 if found.status.values_kept else np.nan
     more = {f"beyond_rest_{name}": lost * largest(np.where(phase == k, size, np.nan)) for name, k in DOING.items()}
     return replace(found, numbers=found.numbers | more)
 
@@ -93,8 +96,8 @@ def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     """(results,) how far two marches are apart at any station, over the largest length of each robot's error or the
     largest deflection; NaN where ``other`` has none, infinite where ``one`` has none."""
     count = len(results_of(model))
-    if other.status >= Status.NOT_CONVERGED or one.status >= Status.NOT_CONVERGED:
-        return np.full(count, np.nan if other.status >= Status.NOT_CONVERGED else np.inf)
+    if not (one.status.values_kept and other.status.values_kept):
+        return np.full(count, np.inf if other.status.values_kept else np.nan)
     apart = np.linalg.norm(one.error - other.error, axis=2).max(axis=0)
     size = np.linalg.norm(other.error, axis=2).max(axis=0)
     sunk, bodies = np.abs(one.sunk - other.sunk), model.system.body
@@ -115,19 +118,16 @@ def deflections(model: RobotModel, found: Outcome, kept: Counts) -> Array:
     down = np.full(shape, np.nan)
     for b, rail in enumerate(model.rails.values()):
         first, count = model.system.tracks[b, FIRST], model.system.tracks[b, MODES]
-        down[:, b, : rail.ends.size] = -found.coordinates[kept, first : first + count] @ rail.moved[:, UP].T
+        down[:, b, : rail.ends.size] = -found.coordinates[kept, first : first + count] @ rail.moved[:, VERTICAL].T
     return down
 
 
 def moving_at(model: RobotModel, time: float) -> list[str]:
     """Robots and the numbers of their moves (from 1) that are under way at a time (s)."""
-    from engine.kernels.robots.layout import START, STEADY
-    from engine.kernels.robots.layout import UP as UP_TIME
-
     found = []
     for r, name in enumerate(model.robots):
         moves = model.system.moves[r]
-        ends = moves[:, START] + 2.0 * moves[:, UP_TIME] + moves[:, STEADY]
+        ends = moves[:, START] + 2.0 * moves[:, UP] + moves[:, STEADY]
         for m in np.flatnonzero((moves[:, START] <= time) & (time <= ends)):
             found.append(f"move {m + 1} of {name}")
     return found

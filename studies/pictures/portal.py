@@ -118,7 +118,7 @@ def _shapes(results: Results, index: Index) -> Figure:
     words = quantity(float(np.nanmax(np.abs(down))), "m")
     title = f"The rails bend by up to {words} where errors are longest"
     caption = (
-        f"The {len(rails)} rails from above each other, bent down, at the times of the longest errors; the largest "
+        f"The {len(rails)} rails one above another, as they bend at the times of the longest errors; the largest "
         f"deflection of the run is drawn as a quarter of the distance between two."
     )
     return draw("rails", title, caption, 1.0 + 1.5 * marked.size, partial(_draw_shapes, results, index, marked, factor))

@@ -8,7 +8,6 @@ there; a spring has an energy. Then each term is switched off in turn.
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -17,6 +16,7 @@ from engine.floating.model import build
 from engine.kernels.floating import equations, loads
 from engine.scene.study import Study
 from tests.floating import residual_twin as twin
+from tests.floating.scenes import mutated
 
 AGREE, DIFFER = 1e-11, 1e-7  # of the largest force
 COURSE, FREE_LENGTH = 0.7, 0.4
@@ -150,13 +150,10 @@ TERMS = {
 }
 
 
-def mutated(old: str, new: str) -> ModuleType:
+def equations_with(old: str, new: str) -> ModuleType:
     """The equations with the loads' kernels of another text."""
-    source = Path(loads.__file__).read_text(encoding="utf-8")
-    assert old in source, old
-    own, whole = ModuleType("mutated"), ModuleType("whole")
-    exec(compile(source.replace(old, new), "mutated", "exec"), own.__dict__)
-    exec(compile(Path(equations.__file__).read_text(encoding="utf-8"), "whole", "exec"), whole.__dict__)
+    own = mutated(loads, old, new)
+    whole = mutated(equations, "", "")  # a copy, as others use the module itself
     whole.load_forces, whole.link_forces = own.load_forces, own.link_forces  # type: ignore[attr-defined]
     return whole
 
@@ -172,7 +169,7 @@ def main() -> None:
         print(f"state {seed}: {gap:.1e}")
         assert gap < AGREE, (found, wanted)
     for name, (old, new) in TERMS.items():
-        found = twin.left_of(mutated(old, new), with_loads, y, u, a) - bare
+        found = twin.left_of(equations_with(old, new), with_loads, y, u, a) - bare
         gap = np.abs(found - wanted).max() / np.abs(wanted).max()
         print(f"without {name}: {gap:.1e}")
         assert gap > DIFFER, name

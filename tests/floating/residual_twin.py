@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -26,6 +25,7 @@ from engine.kernels.floating.work import room
 from engine.kernels.layout import LANES
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
+from tests.floating.scenes import mutated
 
 STEP, APART = 1e-30, 1e-2
 AGREE, DIFFER = 1e-10, 1e-8  # of the largest inertia force
@@ -247,15 +247,6 @@ TERMS = {
 }
 
 
-def mutated(old: str, new: str) -> ModuleType:
-    """The kernels' module with another text."""
-    source = Path(equations.__file__).read_text(encoding="utf-8")
-    assert old in source, old
-    module = ModuleType("mutated")
-    exec(compile(source.replace(old, new), "mutated", "exec"), module.__dict__)
-    return module
-
-
 def state(model: FloatingModel, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Random coordinates, velocities and accelerations; the spherical joint stands where its step begins."""
     draw: Callable[..., np.ndarray] = np.random.default_rng(seed).normal
@@ -279,7 +270,7 @@ def main() -> None:
         print(f"state {seed}: {gap:.1e}")
         assert gap < AGREE, (found, wanted)
     for name, (old, new) in TERMS.items():
-        gap = np.abs(left_of(mutated(old, new), model, y, u, a) - wanted).max() / largest
+        gap = np.abs(left_of(mutated(equations, old, new), model, y, u, a) - wanted).max() / largest
         print(f"without {name}: {gap:.1e}")
         assert gap > DIFFER, name
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import ModuleType
+
 import numpy as np
 
 from engine.floating.march import Marched, march
@@ -61,3 +64,12 @@ def history(model: FloatingModel, marched: Marched, group: str, first: int = 0, 
     """(stations, count) signals of a group."""
     start = model.signal_of(group) + first
     return marched.history[0, :, start : start + count]
+
+
+def mutated(module: ModuleType, old: str, new: str) -> ModuleType:
+    """A module of kernels that are not compiled, with another text."""
+    source = Path(str(module.__file__)).read_text(encoding="utf-8")
+    assert old in source, old
+    found = ModuleType("mutated")
+    exec(compile(source.replace(old, new), "mutated", "exec"), found.__dict__)
+    return found

@@ -7,7 +7,6 @@ it in a step. Then each way is switched off in turn.
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -21,6 +20,7 @@ from engine.kernels.floating.motions import motions_at
 from engine.kernels.layout import LANES
 from engine.scene.variants import VariantValues
 from tests.floating import loads_twin, residual_twin
+from tests.floating.scenes import mutated
 
 STEP, BETA, GAMMA = 0.02, 0.25, 0.5
 AGREE, DIFFER = 1e-4, 1e-3  # of the largest entry of each column
@@ -31,15 +31,6 @@ TERMS = {
     "what follows in velocities": ("put_lanes(x.u, (k,), u + of_u * by)", "pass"),
     "accelerations": ("put_lanes(x.a, (k,), a + by)", "pass"),
 }
-
-
-def mutated(old: str, new: str) -> ModuleType:
-    """The march's module with another text."""
-    source = Path(march.__file__).read_text(encoding="utf-8")
-    assert old in source, old
-    module = ModuleType("mutated")
-    exec(compile(source.replace(old, new), "mutated", "exec"), module.__dict__)
-    return module
 
 
 def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +58,7 @@ def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarr
 
 def main() -> None:
     model = build(loads_twin.study())
-    for name, module in (("tangent", march), *((name, mutated(*term)) for name, term in TERMS.items())):
+    for name, module in (("tangent", march), *((name, mutated(march, *term)) for name, term in TERMS.items())):
         found, wanted = both(module, model)
         gap = (np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max()
         print(f"{'' if module is march else 'without '}{name}: {gap:.1e}")

@@ -10,8 +10,9 @@ import pytest
 from engine.floating.march import Marched, march
 from engine.floating.model import build
 from engine.floating.results import differences, outcome, results_of
+from engine.scene.study import Study
 from engine.scene.variants import VariantValues
-from tests.floating.scenes import AVERAGE_ACCELERATION, FOX_GOODWIN, history, sliding_mass, steps
+from tests.floating.scenes import ARM, AVERAGE_ACCELERATION, FOX_GOODWIN, history, sliding_mass, steps
 
 PERIOD = 2.0 * np.pi / 6.5480886  # of the beam, s
 CROSSINGS = (4.2128, 13.5532, 23.0755, 32.6171, 42.1598, 51.7024)  # s, from an ODE solver of other equations
@@ -109,20 +110,37 @@ def test_a_missing_part_of_a_history_is_a_difference() -> None:
     assert differences(model, holed, whole)[named.index("load_position_max"), 0] == np.inf
 
 
-def test_lanes_do_not_hang_on_their_neighbours() -> None:
-    """Variants that lift off, slide over an end, or stay, side by side and each for itself: the same bits."""
-    study = sliding_mass()
-    masses, starts = np.linspace(20.0, 400.0, 21), np.linspace(0.01, 7.0, 21)
-    columns = {"carriage.load.mass": masses, "carriage.load.motion.start": starts}
+def same_alone(study: Study, columns: dict[str, np.ndarray], duration: float) -> None:
+    """The march of variants side by side, and of each for itself: the same bits."""
     model, stations = build(study), np.arange(0, 2001, 50)
+    count = len(next(iter(columns.values())))
 
     def own(part: slice) -> Marched:
-        values = VariantValues(study, {key: column[part] for key, column in columns.items()}, masses[part].size)
-        return march(model, values, np.full(values.size, 20.0), 2000, stations, AVERAGE_ACCELERATION)
+        values = VariantValues(study, {key: column[part] for key, column in columns.items()}, len(range(count)[part]))
+        return march(model, values, np.full(values.size, duration), 2000, stations, AVERAGE_ACCELERATION)
 
     together = own(slice(None))
-    for k in range(21):
+    for k in range(count):
         alone = own(slice(k, k + 1))
         assert alone.history.tobytes() == together.history[k : k + 1].tobytes()
         assert alone.statistics.tobytes() == together.statistics[k : k + 1].tobytes()
         assert (alone.status, alone.last) == (together.status[k], together.last[k])
+
+
+def test_lanes_do_not_depend_on_their_neighbours() -> None:
+    """Variants that lift off, slide over an end, or stay."""
+    masses, starts = np.linspace(20.0, 400.0, 21), np.linspace(0.01, 7.0, 21)
+    same_alone(sliding_mass(), {"carriage.load.mass": masses, "carriage.load.motion.start": starts}, 20.0)
+
+
+def test_events_of_lanes_do_not_depend_on_their_neighbours() -> None:
+    """Arms whose given motion goes on as another piece at times of their own, while accelerations grow from nothing."""
+    motion = {"kind": "spin-up", "rate": 1.0, "time": 2.0}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": ARM | {"modes": 3}},
+        frame={"arm": {"joints": [{"kind": "revolute", "axis": [0, 1, 0], "motion": motion}]}},
+        question={"duration": 5.0},
+    )
+    same_alone(study, {"frame.arm.joints.0.motion.time": np.linspace(0.1, 4.9, 18)}, 5.0)

@@ -3,7 +3,7 @@ rotation group Bruels and Cardona 2010), Newton's method in each step.
 
 The tangent is made of differences of the residual, and kept for as many steps as the iteration converges fast. Lanes
 go side by side, and each decides for itself: a lane that is done, or has failed, stays where it is while others go on,
-so that its numbers do not hang on its neighbours.
+so that its numbers do not depend on its neighbours.
 """
 
 from typing import NamedTuple
@@ -356,10 +356,11 @@ def judge(change, memory):
 
 
 @called
-def step(system, lane, scheme, h, state, solver):
-    """Newton's method for one step of the lanes that are not done, from accelerations that go on as they did. Each
-    ends with one correction more, which is not judged: what is observed is of before it."""
+def step(system, lane, scheme, who, h, state, solver):
+    """Newton's method for one step of some lanes, from accelerations that go on as they did. Each ends with one
+    correction more, which is not judged: what is observed is of before it."""
     memory = solver.memory
+    put_lanes(memory, (DONE,), choose(who, all_lanes(0.0), 1.0))
     for k in range(state.before.shape[0]):
         now, before, earlier = lanes_at(state.now.a, (k,)), lanes_at(state.before, (k,)), lanes_at(state.earlier, (k,))
         put_lanes(state.tried.a, (k,), 3.0 * (now - before) + earlier)
@@ -374,7 +375,7 @@ def step(system, lane, scheme, h, state, solver):
     put_where(of(memory, DONE) < 0.5, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
     advance(state, scheme, h)
     residual(system, lane, state.tried, solver.work, state.residual)
-    correct(sound(memory), state, solver)
+    correct(who & sound(memory), state, solver)
     advance(state, scheme, h)
 
 
@@ -389,11 +390,10 @@ def go_on(system, lane, scheme, who, end, state, solver):
     """Some lanes, those that are sound, go to another time (s) without an event between."""
     memory = solver.memory
     goes, start = who & sound(memory), of(memory, TIME)
-    put_lanes(memory, (DONE,), choose(goes, all_lanes(0.0), 1.0))
     end = choose(goes, end, start)
     middle = choose(goes, 0.5 * (start + end), start - 2.0 * near_of(lane))
     motions_at(lane.motions, end, middle, solver.work.piece, solver.work.motions)
-    step(system, lane, scheme, end - start, state, solver)
+    step(system, lane, scheme, goes, end - start, state, solver)
     arrived = goes & sound(memory)
     take(arrived, state, scheme)
     put_where(arrived, memory, (TIME,), end)
