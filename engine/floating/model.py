@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.floating.bodies import elastic_body
-from engine.floating.elastic import ABOUT_X, CELLS, ElasticBody, Y, Z
+from engine.floating.elastic import CELLS, ElasticBody, Y, Z
 from engine.floating.grips import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
+from engine.floating.refusals import refuse_model, refuse_scene
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
@@ -20,13 +21,9 @@ from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
-    from engine.scene.carriages import Carriage
-    from engine.scene.sensors import Sensor
     from engine.scene.study import Study
 
 OF_DEPTH = 4  # signals of a body
-MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all its pieces
-HELD = 1e-9  # of the largest: a shape below is zero
 
 
 @dataclass(frozen=True)
@@ -115,7 +112,7 @@ class FloatingModel:
 
 def build(study: Study, modes: int | None = None) -> FloatingModel:
     """The model of a study without its sweep. Raises BadInput for what is not built or cannot be."""
-    _check(study)
+    refuse_scene(study)
     names = list(_in_order(study))
     bodies = {
         name: elastic_body(study.body[name], study.frame.get(name) or Frame(), modes, f"body.{name}") for name in names
@@ -143,71 +140,8 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
     loads, links = tuple(loads_of(study, bodies)), tuple(springs_of(study, bodies))
     motions += dict.fromkeys(load.course for load in loads if load.course)
     found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)
-    _check_held(found)
-    _check_readings(found)
-    _check_rolling(found)
+    refuse_model(found)
     return found
-
-
-def _check(study: Study) -> None:
-    """Refuse what frames that move do not know."""
-    where = study.source.where
-    if study.initial == "equilibrium":
-        raise BadInput("bodies in frames that move start undeformed", where=where("initial"), expected='"rest"')
-    for name, body in study.body.items():
-        if not body.own_weight and study.gravity > 0.0:
-            raise BadInput(
-                "bodies in frames that move carry their own weight",
-                where=where(f"body.{name}.own_weight"),
-                expected="own_weight = true",
-            )
-    for name, carriage in study.carriage.items():
-        _check_carriage(study, name, carriage)
-    for name, sensor in study.sensor.items():
-        _check_sensor(study, name, sensor)
-
-
-def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
-    """Refuse a carriage of another kind, with another motion, or that starts later."""
-    where = study.source.where
-    if carriage.kind not in ("mass", "oscillator"):
-        raise BadInput(
-            "carriages of this kind on bodies in frames that move are not built yet",
-            where=where(f"carriage.{name}.kind"),
-            expected="mass or oscillator",
-            received=carriage.kind,
-        )
-    if not carriage.motion.slides and not carriage.motion.in_pieces:
-        raise BadInput(
-            "this motion on bodies in frames that move is not built yet",
-            where=where(f"carriage.{name}.motion.kind"),
-            expected="free, cruise, out-and-back, sinusoidal or waypoints",
-            received=carriage.motion.kind,
-        )
-    if carriage.motion.legs is not None and carriage.motion.duration > MOST_CYCLES:
-        raise BadInput(
-            "too many cycles on a body in a frame that moves",
-            where=where(f"carriage.{name}.motion.cycles"),
-            expected=f"at most {MOST_CYCLES}",
-            received=f"{carriage.motion.duration:.0f}",
-        )
-    if carriage.start_time > 0.0:
-        raise BadInput("carriages here set off at time 0", where=where(f"carriage.{name}.delay"), expected="0")
-
-
-def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
-    """Refuse a sensor of another place or quantity."""
-    where, where_quantity = study.source.where(f"sensor.{name}"), study.source.where(f"sensor.{name}.quantity")
-    if sensor.spot is not None or sensor.carriage is not None:
-        raise BadInput("this place is not read in frames that move", where=where, expected="at, or under")
-    if sensor.under is not None and sensor.quantity != "displacement":
-        raise BadInput(
-            "under a carriage only the displacement is read here", where=where_quantity, expected="displacement"
-        )
-    if sensor.quantity == "axial_force":
-        raise BadInput(
-            "axial_force is not available here", where=where_quantity, expected="displacement, bending_moment, …"
-        )
 
 
 def _in_order(study: Study) -> Iterator[str]:
@@ -251,68 +185,6 @@ def _joints(study: Study, name: str, size: int, motions: list[str]) -> Iterator[
             kind = columns.PRISMATIC if isinstance(joint, Prismatic) else columns.REVOLUTE
             yield OneJoint(name, number, joint, kind, tuple(axis), -1 if joint.is_driven else size, motion)
             size += 0 if joint.is_driven else 1
-
-
-def _check_held(model: FloatingModel) -> None:
-    """A frame sits where the shapes of its body vanish, unless that moves freely or has supports elsewhere, and a joint
-    that is driven or controlled about an axis holds the track's direction."""
-    for name, body in model.bodies.items():
-        joints = model.frame(name).joints
-        if not body.omega.size or not body.slender or any(isinstance(joint, Free) for joint in joints):
-            continue
-        at = body.fields(np.zeros(1), (0,))[0, 0]
-        far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0, :, : Z + 1]).max()
-        where = model.study.source.where(f"body.{name}.supports")
-        if np.abs(at[: Z + 1]).max() > HELD * far:
-            raise BadInput(
-                "the track begins where its joint holds it: its shapes must vanish there",
-                where=where,
-                expected="pinned or clamped at its beginning",
-            )
-        innermost = next((joint for joint in reversed(joints) if joint.turns), None)
-        axis = None if innermost is None else innermost.turned_about
-        if axis is not None and np.abs(axis @ at[ABOUT_X:]).max() > HELD * far * np.linalg.norm(axis) / body.length:
-            raise BadInput(
-                "a joint that is driven or controlled holds the track's direction: shapes must not turn there",
-                where=where,
-                expected="clamped at its beginning",
-                remedy="a rigid body on the joint that carries this one, for a beam in a cradle",
-            )
-
-
-def _check_readings(model: FloatingModel) -> None:
-    """Forces and stresses are read of single beams alone."""
-    for name, sensor in model.study.sensor.items():
-        if sensor.under is None and not model.bodies[str(sensor.body)].slender and sensor.reads.derivative:
-            raise BadInput(
-                "this quantity is read of single beams alone in frames that move",
-                where=model.study.source.where(f"sensor.{name}.quantity"),
-                expected="displacement, velocity or acceleration",
-                received=sensor.quantity,
-            )
-
-
-def _check_rolling(model: FloatingModel) -> None:
-    """Nothing turns with a track whose rotation about itself no row of its model tells."""
-    where = model.study.source.where
-    for name, carriage in model.study.carriage.items():
-        is_mass = carriage.suspension is None  # what is sprung has neither key
-        turns = is_mass and any(model.study.value(f"carriage.{name}.{key}") for key in ("inertia", "height"))
-        if turns and not model.bodies[carriage.on].rolls:
-            raise BadInput(
-                "a solid model's rotation about its track is not known: nothing turns with it",
-                where=where(f"carriage.{name}"),
-                expected="no inertia and no height",
-            )
-    for name in model.bodies:
-        on = model.frame(name).on
-        if on != GROUND and not model.bodies[on].rolls:
-            raise BadInput(
-                "a solid model's rotation about its track is not known: nothing hangs on it",
-                where=where(f"frame.{name}.on"),
-                expected="a beam, a frame of beams, or a rigid body",
-                received=on,
-            )
 
 
 def _system(model: FloatingModel) -> System:
