@@ -1,9 +1,10 @@
-"""Conditions between several numbers of a study, written once for one value and for whole columns of a sweep."""
+"""Conditions on numbers of a study: of any by itself, and between several, for one value and for columns of a sweep."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,21 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from engine.study_file.document import Source
+
+# Sizes, beside 0, of what studies are made of in SI units: from the inertia of molecules to what stands for infinite.
+# Whatever is taken to the fourth power on the way to a deflection stays within the range of floating-point numbers.
+SMALLEST, LARGEST = 1e-50, 1e30
+NOT_MEANT = "no usable number"
+SIZES = f"0 or of a size from {SMALLEST:g} to {LARGEST:g}"
+
+
+def is_meant(value: float | Fraction) -> bool:
+    """Whether a number has a size that a study may mean (no NaN does).
+
+    >>> [is_meant(value) for value in (0, -2.5, 1e300, 5e-324, float("nan"))]
+    [True, True, False, False, False]
+    """
+    return value == 0 or SMALLEST <= value <= LARGEST or -LARGEST <= value <= -SMALLEST
 
 
 @dataclass(frozen=True)

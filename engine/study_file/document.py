@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import hashlib
 import json
-import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +15,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from engine.study_file.checks import NOT_MEANT, SIZES, is_meant
 from results_schema.errors import BadInput, printable, shortened
 
 _NUMBER = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
@@ -119,15 +119,16 @@ class Beside:
     """What the program itself knows of a table, beside what a user wrote; no text gives one, and none is written."""
 
 
-class _Overflow(str):
-    """The text of a float that is not finite; kept as text until the key is known."""
+class _Unusable(str):
+    """The text of a float that no study can mean; kept as text until the key is known."""
 
 
 def read_document(path_or_text: str | Path) -> Document:
     """Read a TOML file, or TOML text if the argument is a string with a line break.
 
     Raises BadInput (faults 1, 4, 5) for a file that cannot be read, is larger than 1 MB or is not UTF-8, for TOML
-    errors with their line, and for numbers that are not finite or beyond 64 bits with their key.
+    errors with their line, and with their key for numbers that are not finite, beyond 64 bits or of no size that a
+    study may mean.
     """
     if isinstance(path_or_text, str) and "\n" in path_or_text:
         name, raw = "", path_or_text.encode("utf-8", "surrogatepass")
@@ -193,7 +194,7 @@ def _text(name: str, raw: bytes) -> str:
 
 
 def _parsed(source: Source) -> dict[str, Any]:
-    """The file's tables; numbers that are not finite as `_Overflow`."""
+    """The file's tables; numbers that no study can mean as `_Unusable`."""
     if not source.text.strip():
         remedy = "begin with a commented one: wanderlast init passage FILE.toml"
         raise BadInput("the file is empty", where=source.where(), expected="a study (TOML)", remedy=remedy)
@@ -225,9 +226,9 @@ def _tables_of(text: str) -> dict[str, Any]:
         return tomllib.loads(shorter, parse_float=_float_or_text)
 
 
-def _float_or_text(text: str) -> float | _Overflow:
+def _float_or_text(text: str) -> float | _Unusable:
     value = float(text)
-    return value if math.isfinite(value) and len(text) <= FLOAT_DIGITS else _Overflow(text)
+    return value if is_meant(value) and len(text) <= FLOAT_DIGITS else _Unusable(text)
 
 
 def _plain_table(data: Mapping[str, Any], source: Source) -> dict[str, Any]:
@@ -247,8 +248,8 @@ def _plain(value: Any, keys: tuple[str, ...], source: Source) -> Any:
         return {key: _plain(item, (*keys, str(key)), source) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):
         return [_plain(item, (*keys, str(index)), source) for index, item in enumerate(value)]
-    if isinstance(value, _Overflow) or (isinstance(value, float) and not math.isfinite(value)):
-        _refuse_number(value, "a finite number", keys, source)
+    if isinstance(value, _Unusable) or (isinstance(value, float) and not is_meant(value)):
+        _refuse_number(value, f"a finite number, {SIZES}", keys, source)
     if isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
         _refuse_number(value, "an integer within 64 bits", keys, source)
     return value
@@ -260,7 +261,7 @@ def _refuse_number(value: str | float, expected: str, keys: Sequence[str], sourc
     line = source.text.count("\n", 0, found[0]) + 1 if len(found) == 1 else None
     huge = isinstance(value, int) and value.bit_length() > 128
     received = printable(value, 60) if isinstance(value, str) else "more than 128 bits" if huge else str(value)
-    raise BadInput("no usable number", where=source.where(".".join(keys), line), expected=expected, received=received)
+    raise BadInput(NOT_MEANT, where=source.where(".".join(keys), line), expected=expected, received=received)
 
 
 def _tables(header: str, table: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:

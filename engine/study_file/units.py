@@ -16,6 +16,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from engine.study_file.checks import NOT_MEANT, SIZES, is_meant
 from results_schema.errors import shortened
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
@@ -85,10 +86,10 @@ class Unit:
             raise fault(f"{found} where {self.article} is wanted", expected=self.article, received=shortened(text))
         if self.per_turn and angle == 1:
             factor /= 2 * _PI
-        try:
-            return float(Fraction(number) * factor)
-        except OverflowError:
-            raise fault("beyond the range of numbers", expected=self.article, received=shortened(text)) from None
+        value = Fraction(number) * factor
+        if not is_meant(value):
+            raise fault(NOT_MEANT, expected=f"{self.article}, {SIZES}", received=shortened(text))
+        return float(value)
 
     def written(self, text: str) -> tuple[str, float]:
         """The unit of a number with a unit as it was written, and one of it in SI.

@@ -20,8 +20,8 @@ from results_schema.errors import BadInput, OutputFailed
 # The netCDF and HDF5 libraries are not safe under threads: every call into them holds this lock.
 NETCDF_LOCK = threading.RLock()
 
-_TEMPORARY = ".wanderlast-tmp"
-_SIDECAR = ".sha256"
+TEMPORARY = ".wanderlast-tmp"
+SIDECAR = ".sha256"
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -42,7 +42,7 @@ def write_whole(path: Path | str, write: Callable[[Path], object], look: Callabl
     system or the netCDF library cannot write; the old file stays.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{_TEMPORARY}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
     try:
         FAULTS.before("open", temporary)
         temporary.touch()
@@ -63,7 +63,8 @@ def write_whole(path: Path | str, write: Callable[[Path], object], look: Callabl
 def output_failed(path: Path, error: BaseException) -> OutputFailed:
     """The error for a failed operation on `path`, with the bytes that are free there."""
     reason = getattr(error, "strerror", None) or str(error)
-    remedy = "free some space or choose another place, then run again: finished work is kept"
+    is_full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    remedy = f"{'free some space or ' if is_full else ''}choose another place, then run again: finished work is kept"
     return OutputFailed(f"cannot write ({reason})", path=path, free_bytes=_free_bytes(path.parent), remedy=remedy)
 
 
@@ -95,7 +96,7 @@ def clean_leftovers(path: Path | str) -> None:
     """Remove temporary files that a killed run left beside `path`; call it while holding the lock of `path`."""
     path = Path(path)
     for entry in path.parent.iterdir():
-        if entry.name.startswith(f".{path.name}.") and entry.name.endswith(_TEMPORARY):
+        if entry.name.startswith(f".{path.name}.") and entry.name.endswith(TEMPORARY):
             _discard(entry)
 
 
@@ -141,7 +142,7 @@ def sha256_of(path: Path) -> str:
 
 def sidecar(path: Path) -> Path:
     """The file beside `path` that holds its SHA-256, in the form that `sha256sum --check` reads."""
-    return path.with_name(path.name + _SIDECAR)
+    return path.with_name(path.name + SIDECAR)
 
 
 def write_sidecar(path: Path) -> None:

@@ -87,7 +87,8 @@ class PartStore:
     key: what the results depend on. study: its name, kept beside them. look: called under the lock, before anything is
     touched; it may refuse what lies at the archive's place. discard: parts with another key are removed instead of
     refused (`--overwrite`).
-    Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key.
+    Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key, or
+    files that are none of ours lie among them.
     """
 
     def __init__(
@@ -121,6 +122,9 @@ class PartStore:
         files.clean_leftovers(self._archive)
         if self._folder.exists() and not self._folder.is_dir():
             raise BadInput("a file is in the way of the parts", where=str(self._folder), remedy="move it away")
+        if others := _not_ours(self._folder):
+            what, remedy = "files that no run has put there are among the parts", "move them away"
+            raise BadInput(what, where=str(self._folder), received=", ".join(others), remedy=remedy)
         found = _stored_key(self._folder)
         if found and found != self.key and not self._discard:
             raise BadInput(
@@ -176,6 +180,17 @@ class PartStore:
         files.remove_folder(self._folder)
 
 
+def _not_ours(folder: Path) -> list[str]:
+    """Some names in a folder that no run gives: any but its key, parts, their checksums and leftovers of a power cut;
+    without a key, which comes first, any but leftovers."""
+    if not folder.is_dir():
+        return []
+    keyed = (folder / _KEY_FILE).is_file()
+    endings = (files.TEMPORARY, *((_SUFFIX, f"{_SUFFIX}{files.SIDECAR}") if keyed else ()))
+    names = sorted(entry.name for entry in folder.iterdir() if entry.is_dir() or not entry.name.endswith(endings))
+    return [name for name in names if name != _KEY_FILE][:3]
+
+
 def finished_so_far(archive: Path | str) -> list[np.ndarray] | None:
     """The variants of every valid part beside an archive, None where there are no parts.
 
@@ -183,6 +198,14 @@ def finished_so_far(archive: Path | str) -> list[np.ndarray] | None:
     """
     folder = _folder_of(archive)
     return list(_valid(folder, _stored_key(folder)).values()) if folder.is_dir() else None
+
+
+def bytes_so_far(archive: Path | str) -> int:
+    """What the parts beside an archive take of the disk."""
+    folder = _folder_of(archive)
+    with suppress(OSError):  # none, or a run that is at work there has just replaced one
+        return sum(path.stat().st_size for path in folder.iterdir())
+    return 0
 
 
 def unfinished_study(archive: Path | str) -> str:

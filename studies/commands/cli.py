@@ -15,6 +15,7 @@ import click
 
 from results_schema.errors import ArchiveError, BadInput
 from studies.commands import error_exit as trouble
+from studies.commands import process
 from studies.protocol import stopping
 from studies.results.formatting import counted
 
@@ -287,20 +288,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = list(sys.argv[1:] if arguments is None else arguments)
 
     def invoke() -> int:
+        if arguments is None:
+            process.set_up()
         code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
         return code if isinstance(code, int) else 0
 
-    if arguments is None:
-        stopping.own_process()
-        _keep_linear_algebra_to_one_thread()
     code = trouble.exit_code_of(invoke)
     if arguments is None:
         stopping.end_undisturbed()
         gc.freeze()  # looking through what is left would take a third of a second
     return code
-
-
-def _keep_linear_algebra_to_one_thread() -> None:
-    """Tell OpenBLAS so before numpy loads it. The threads are the march's own; those of OpenBLAS wait for each other
-    longer than a product of small matrices takes."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

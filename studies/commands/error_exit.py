@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 
-from results_schema.errors import BadInput, Interrupted, OutputFailed, WanderlastError
+from results_schema.errors import BadInput, Interrupted, OutputFailed, WanderlastError, WorkersGaveUp
 
 _OUTPUT_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG}
 
@@ -54,13 +54,20 @@ def drop_stdout() -> None:
 
 
 def _code_of_unforeseen(error: Exception) -> int:
+    if isinstance(error, MemoryError):
+        remedy = "remedy: fewer --threads, fewer variants, or more memory; finished work is kept"
+        _complain(f"not enough memory ({_words(error) or 'none is left'}); {remedy}")
+        return WorkersGaveUp.exit_code
     if isinstance(error, OSError) and error.errno in _OUTPUT_ERRORS:
         drop_stdout()
         _complain(f"output failed: {error}")
         return OutputFailed.exit_code
-    said = " ".join(str(error).split())[:200]
-    _complain(f"a bug of our own ({type(error).__name__}: {said}); details in {_log(error)}")
+    _complain(f"a bug of our own ({type(error).__name__}: {_words(error)}); details in {_log(error)}")
     return WanderlastError.exit_code
+
+
+def _words(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
 
 
 def _complain_about_usage(error: click.UsageError) -> None:

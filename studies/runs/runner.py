@@ -5,6 +5,7 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import files
 from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
-from results_schema.store.parts import PartStore
+from results_schema.store.parts import PartStore, bytes_so_far
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop
@@ -71,12 +72,13 @@ def run_to_archive(
     """
     started, stop = time.perf_counter(), stop or Stop()
     kind = kind_of(study)
-    files.check_output_place(archive)
     run = _Run(study, archive, options, stop, started)
-    if _look(run) == "same study, finished":
+    if os.path.isfile(archive) and _look(run) == "same study, finished":  # which takes no place to write
         return _found_finished(run)
+    files.check_output_place(archive)
+    _look(run)
     parts = kind.parts(study)
-    files.check_free(archive.parent, parts.disk_bytes, parts.words)
+    files.check_free(archive.parent, parts.disk_bytes - bytes_so_far(archive), parts.words)
     key, name = run_key(study, parts.names), study.source.name
     with PartStore(archive, key, partial(_look, run), study=name, discard=options.overwrite) as store:
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began

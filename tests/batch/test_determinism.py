@@ -73,11 +73,13 @@ def digest(plan: Plan, chunk: int | None, threads: int) -> str:
     return found.hexdigest()
 
 
+@pytest.mark.fault(20)
 def test_same_bits_for_any_chunks_and_threads() -> None:
     plan, given = make_plan(mixed()), ((7, 2), (64, 1), (64, 2), (None, 1), (None, 2))
     assert len({digest(plan, chunk, threads) for chunk, threads in given}) == 1
 
 
+@pytest.mark.fault(20)
 def test_same_bits_one_by_one() -> None:
     plan, whole = of_mixed()
     picked = np.arange(0, 150, 13)
@@ -87,6 +89,7 @@ def test_same_bits_one_by_one() -> None:
         assert found.arrays[name][picked].tobytes() == array[picked].tobytes(), name
 
 
+@pytest.mark.fault(20)
 def test_same_bits_for_any_order_and_company() -> None:
     """A variant alone, and the sweep in another order."""
     whole = dataset_of_mixed()
@@ -120,6 +123,7 @@ def test_a_sensor_has_the_same_bits_in_any_company(riding: dict[str, Any]) -> No
 POISON = {"mass": math.nan, "weight": math.inf, "rates": -200.0}  # what a lane has in place of a sound number
 
 
+@pytest.mark.fault(19)
 @pytest.mark.parametrize("name", POISON)
 @pytest.mark.parametrize("carriages", ["one", "two"])
 def test_one_bad_lane_leaves_its_neighbours_alone(name: str, carriages: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,6 +156,7 @@ def test_one_bad_lane_leaves_its_neighbours_alone(name: str, carriages: str, mon
     assert np.all(np.delete(found.diverged_step.values, 20) == -1)
 
 
+@pytest.mark.fault(17)
 def test_a_diverging_variant_among_others() -> None:
     """Parametric resonance without damping grows until nothing is left; light carriages beside it do not."""
     way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
@@ -164,6 +169,7 @@ def test_a_diverging_variant_among_others() -> None:
     assert np.isfinite(ds.midspan_max.values[[0, 2]]).all()
 
 
+@pytest.mark.fault(16)
 def test_resonance_without_damping_is_no_alarm() -> None:
     """A force at alpha = 1, whose every mode but the first is quiet, and 20 forces in step with mode 1."""
     model = closed_forms.PinnedBeam(5)
@@ -285,6 +291,7 @@ def test_a_stop_is_heard_between_chunks() -> None:
     assert 50 <= len(sink.variants) <= 200
 
 
+@pytest.mark.fault(25)
 def test_a_stop_is_heard_within_a_variant() -> None:
     """Which alone would take minutes."""
     plan = make_plan(study(beam(modes=10), mass(0.5, cruise(0.0, 1.0, 1.0)), solver={"steps": 20_000_000}))

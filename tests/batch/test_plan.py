@@ -49,6 +49,7 @@ def test_auto_steps_stay_inside_the_stability_limit(scheme: str, limit: float) -
     assert np.isfinite(ds.midspan_max.values).all()
 
 
+@pytest.mark.fault(12)
 def test_a_step_beyond_the_limit_is_refused() -> None:
     """Fault 12: limit, what was found, and a suggestion that is then accepted."""
 
@@ -69,6 +70,7 @@ def test_a_step_beyond_the_limit_is_refused() -> None:
     make_plan(given(enough))
 
 
+@pytest.mark.fault(12)
 def test_the_worst_variant_decides_whether_a_fixed_step_is_refused() -> None:
     given = swept(
         "carriage.car.motion.speed",
@@ -80,6 +82,7 @@ def test_the_worst_variant_decides_whether_a_fixed_step_is_refused() -> None:
         make_plan(given)
 
 
+@pytest.mark.fault(10, 13)
 def test_too_many_steps_are_refused() -> None:
     """Fault 13: asked for, or needed by a carriage that hardly moves."""
     with pytest.raises(BadInput) as caught:

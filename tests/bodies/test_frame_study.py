@@ -105,6 +105,7 @@ def test_the_frame_is_valid() -> None:
     assert len(MUTATIONS) > 350
 
 
+@pytest.mark.fault(2, 3, 4)
 @pytest.mark.parametrize("how", HOW)
 def test_every_key(how: How) -> None:
     chosen = [mutation for mutation in MUTATIONS if mutation.how == how]
@@ -158,6 +159,7 @@ REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
 }
 
 
+@pytest.mark.fault(7)
 @pytest.mark.parametrize("name", REFUSED)
 def test_refusals_name_the_place(name: str) -> None:
     changes, words = REFUSED[name]
@@ -244,6 +246,7 @@ def test_a_mass_weighs_by_its_share_of_gravity() -> None:
     assert 0.75 < float(found["oblique"].trolley_contact_force_max) / weight < 0.85
 
 
+@pytest.mark.fault(45)
 @pytest.mark.parametrize("value", [1e-300, 1e-30, 1e30, 1e300])
 def test_numbers_of_absurd_size_never_crash(value: float) -> None:
     """Each number of the frame in turn: the frame is refused, or all that a march asks of it is finite."""

@@ -77,6 +77,7 @@ def test_run_prints_one_json_object(here: Path, capsys: Captured) -> None:
     assert float(root.midspan_max.sel(largest["at"])) == largest["value"]
 
 
+@pytest.mark.fault(28)
 def test_a_finished_study_is_left_alone_and_its_code_stays(here: Path, capsys: Captured) -> None:
     write(here, SEPARATED)
     code, first = run_json(capsys, "small.toml")
@@ -89,6 +90,7 @@ def test_a_finished_study_is_left_alone_and_its_code_stays(here: Path, capsys: C
     assert code == 3 and not third["was_finished"] and third["resumed"] == 0
 
 
+@pytest.mark.fault(28)
 def test_another_study_is_overwritten_only_if_asked(here: Path, capsys: Captured) -> None:
     write(here)
     write(here, SEPARATED, "heavy.toml")
@@ -107,6 +109,7 @@ def test_draw_writes_one_page_beside_the_study(here: Path, capsys: Captured) -> 
     assert {path.name for path in here.iterdir()} == {"small.toml", "small-drawing"}
 
 
+@pytest.mark.fault(27, 28)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -214,6 +217,7 @@ def test_info_tells_what_is_inside(here: Path, capsys: Captured) -> None:
         assert words in output
 
 
+@pytest.mark.fault(37)
 def test_a_damaged_archive_is_code_4(here: Path, capsys: Captured) -> None:
     write(here)
     assert main(["run", "small.toml"]) == 0
@@ -225,6 +229,7 @@ def test_a_damaged_archive_is_code_4(here: Path, capsys: Captured) -> None:
         assert name in refused(capsys, "report", name, code=4)
 
 
+@pytest.mark.fault(37)
 def test_a_damaged_archive_of_the_same_study_needs_overwrite(here: Path, capsys: Captured) -> None:
     write(here)
     assert main(["run", "small.toml"]) == 0
@@ -237,6 +242,7 @@ def test_a_damaged_archive_of_the_same_study_needs_overwrite(here: Path, capsys:
     np.testing.assert_array_equal(open_archive("small.nc").root.midspan_max, values)
 
 
+@pytest.mark.fault(30)
 def test_a_held_archive_is_code_75(here: Path, capsys: Captured) -> None:
     write(here)
     lock = Lock(here / "small.nc.lock")
@@ -256,6 +262,7 @@ def test_workers_that_give_up_are_code_70(here: Path, capsys: Captured, monkeypa
     assert "no worker is left" in refused(capsys, "run", "small.toml", code=70)
 
 
+@pytest.mark.fault(26)
 def test_a_full_disk_is_code_74_and_the_next_start_finishes(
     here: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -325,6 +332,7 @@ def test_the_first_study_that_people_run_ends_well(here: Path) -> None:
     assert main(["run", "passage.toml"]) == 0
 
 
+@pytest.mark.fault(39)
 def test_titles_cannot_speak_to_the_terminal(here: Path, capsys: Captured) -> None:
     write(here, SMALL.replace('title = "small"', 'title = "[red]a[/red] \\u001b[31m {{7*7}} <script>"'))
     for arguments in (["check", "small.toml"], ["run", "small.toml"], ["info", "small.nc"]):

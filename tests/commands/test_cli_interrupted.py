@@ -69,6 +69,7 @@ def assert_same_results(first: xr.Dataset, second: xr.Dataset) -> None:
         assert first[name].values.tobytes() == second[name].values.tobytes()
 
 
+@pytest.mark.fault(21, 25)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_and_the_next_start_goes_on(
     number: signal.Signals, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -114,6 +115,7 @@ def test_parts_of_another_study_need_overwrite(
     assert outcome.resumed == 0
 
 
+@pytest.mark.fault(29)
 def test_a_part_that_was_damaged_meanwhile_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     interrupted(monkeypatch, 3)
     part = sorted(Path("small.nc.parts").glob("*.nc"))[0]
@@ -123,6 +125,7 @@ def test_a_part_that_was_damaged_meanwhile_is_computed_again(monkeypatch: pytest
     assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
 
 
+@pytest.mark.fault(25, 48)
 @pytest.mark.parametrize(("signals", "code"), [([signal.SIGTERM], 143), ([signal.SIGINT] * 2, 130)], ids=str)
 def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code: int) -> None:
     write(here, LONG, "long.toml")

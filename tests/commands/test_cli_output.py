@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import subprocess
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def test_a_run_keeps_its_code_when_its_reader_leaves(tmp_path: Path) -> None:
     assert (tmp_path / "small.nc").exists()
 
 
+@pytest.mark.fault(26)
 @pytest.mark.parametrize("arguments", [["--help"], ["list"]], ids=str)
 def test_full_output_is_code_74(tmp_path: Path, arguments: list[str]) -> None:
     done = shell(tmp_path, '"$@" > /dev/full', *arguments)
@@ -48,6 +50,32 @@ def test_closed_output_is_no_error(tmp_path: Path) -> None:
     done = shell(tmp_path, '"$@" >&-', "list")
     assert (done.returncode, done.stderr) == (0, "")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.fault(50)
+def test_ascii_screens_show_plain_letters(tmp_path: Path) -> None:
+    write(tmp_path)
+    line = 'export PYTHONIOENCODING=ascii LC_ALL=C; "$@" run small.toml -v && "$@" info small.nc'
+    done = shell(tmp_path, line)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.isascii() and re.search(r"\d um\b", done.stdout) and "?" not in done.stdout
+
+
+@pytest.mark.fault(50)
+def test_too_little_memory_is_code_70(tmp_path: Path) -> None:
+    write(tmp_path)
+    done = shell(tmp_path, 'ulimit -v 500000; "$@"', "run", "small.toml")
+    assert done.returncode == 70 and "limit of memory" in done.stderr and "received 512000000 bytes" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.fault(45)
+def test_warnings_of_libraries_stay_away_from_the_screen(tmp_path: Path) -> None:
+    """One is made on purpose: which of ours may make one is not known."""
+    warned = "import warnings, studies.commands.cli as c; s = c.process.set_up"
+    warned += "; c.process.set_up = lambda: (s(), warnings.warn('overflow', RuntimeWarning)); c.main()"
+    done = shell(tmp_path, f'PYTHONWARNINGS= "$1" -c "{warned}" list')
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:

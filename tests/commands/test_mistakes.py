@@ -77,6 +77,7 @@ def told(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> str:
     return output.out + output.err
 
 
+@pytest.mark.fault(1, 2, 3)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_in_a_study_file(mistake: str, capsys: pytest.CaptureFixture[str]) -> None:
     text, code, words = MISTAKES[mistake]

@@ -32,6 +32,7 @@ def test_spin_up_of_kane_ryan_and_banerjee() -> None:
     assert (np.hypot(end[:, 0], end[:, 2]) - 10.0).mean() == pytest.approx(5.143e-4, rel=2e-3)
 
 
+@pytest.mark.fault(17)
 def test_spin_up_without_stiffening_diverges() -> None:
     """Above its first frequency, 3.8 rad/s, a spinning arm without stiffening has none left."""
     _, marched = steps(arm({"joints": [SPIN_UP]}), 20.0, 4000)

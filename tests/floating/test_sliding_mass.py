@@ -127,12 +127,14 @@ def same_alone(study: Study, columns: dict[str, np.ndarray], duration: float) ->
         assert (alone.status, alone.last) == (together.status[k], together.last[k])
 
 
+@pytest.mark.fault(19)
 def test_lanes_do_not_depend_on_their_neighbours() -> None:
     """Variants that lift off, slide over an end, or stay."""
     masses, starts = np.linspace(20.0, 400.0, 21), np.linspace(0.01, 7.0, 21)
     same_alone(sliding_mass(), {"carriage.load.mass": masses, "carriage.load.motion.start": starts}, 20.0)
 
 
+@pytest.mark.fault(19)
 def test_events_of_lanes_do_not_depend_on_their_neighbours() -> None:
     """Arms whose given motion goes on as another piece at times of their own, while accelerations grow from nothing."""
     motion = {"kind": "spin-up", "rate": 1.0, "time": 2.0}

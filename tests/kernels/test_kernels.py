@@ -122,6 +122,7 @@ def assert_same(found: dict[str, dict[str, list[float]]], tolerance: float) -> N
     assert compared > 3000
 
 
+@pytest.mark.fault(23)
 @pytest.mark.slow
 def test_no_index_out_of_range(tmp_path: Path) -> None:
     """Fault 23: compiled with checks of every index, which do find one that is out of range."""
@@ -129,6 +130,7 @@ def test_no_index_out_of_range(tmp_path: Path) -> None:
     assert_same(in_a_process("break", NAMES, **checked), 1e-11)
 
 
+@pytest.mark.fault(23)
 def test_the_same_without_the_compiler(tmp_path: Path) -> None:
     plain = {"NUMBA_DISABLE_JIT": "1", "WANDERLAST_CACHE": str(tmp_path)}
     assert_same(in_a_process("break", NAMES, **plain), 1e-11)
@@ -144,6 +146,7 @@ def copied_cache(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.fault(36)
 @pytest.mark.slow
 def test_a_damaged_cache_is_rebuilt(copied_cache: Path) -> None:
     """Fault 36: every compiled kernel and one index replaced by garbage; the next process finds a whole cache."""
@@ -163,6 +166,7 @@ def save_all(folder: Path, name: str) -> None:
         index.save((name, number), f"{name} {number}")
 
 
+@pytest.mark.fault(36)
 def test_two_processes_compile_into_one_cache(tmp_path: Path) -> None:
     fork = multiprocessing.get_context("fork")
     writers = [fork.Process(target=save_all, args=(tmp_path, name)) for name in ("one", "two")]
@@ -185,6 +189,7 @@ print(a_kernel.twice(3.0), jit._FOLDER, sep="\\n")
 """
 
 
+@pytest.mark.fault(36)
 @pytest.mark.parametrize("place", ["/dev/null/kernels", "a file", "a link"])
 def test_an_unwritable_cache_folder(tmp_path: Path, place: str) -> None:
     """Another private folder takes its place, and kernels compile."""
@@ -252,6 +257,7 @@ def test_policy() -> None:
     assert isinstance(march_many._cache._cache_file, jit.Index)  # type: ignore[attr-defined]
 
 
+@pytest.mark.fault(36)
 def test_kernel_hash_is_of_the_sources(monkeypatch: pytest.MonkeyPatch) -> None:
     before = jit.kernel_hash()
     assert before == jit.kernel_hash()

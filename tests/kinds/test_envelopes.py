@@ -85,6 +85,7 @@ def test_the_figure_draws_the_envelope_over_all_variants() -> None:
     assert envelopes.pictures(Results.of(scenes.run("passage", MASSES))) == []
 
 
+@pytest.mark.fault(18)
 def test_failed_variants_are_left_out() -> None:
     dataset = scenes.with_failures(scenes.run("passage", scenes.pace("passage"), extra=EXTRA), 2)
     (figure,) = envelopes.pictures(Results.of(dataset))

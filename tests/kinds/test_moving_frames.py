@@ -30,6 +30,7 @@ def paper(duration: float = 6.0, **more: object) -> Study:
     return Study(**{key: value for key, value in (data | more).items() if key != "schema_version"})
 
 
+@pytest.mark.fault(20)
 def test_a_sweep_is_the_same_whatever_shares_it_out() -> None:
     one, two = (studies.run(paper(), threads=threads) for threads in (1, 2))
     for name, variable in one.variables.items():

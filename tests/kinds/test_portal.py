@@ -35,6 +35,7 @@ def found() -> Any:
     return studies.run(swept(), threads=2)
 
 
+@pytest.mark.fault(20)
 def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
     study = swept()
     cases = expand(study)

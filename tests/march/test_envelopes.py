@@ -177,6 +177,7 @@ def mixed() -> Study:
     return Study(**(data | {"sweep": sweep, "envelope": envelopes, "output": {"histories": "none"}}))
 
 
+@pytest.mark.fault(20)
 def test_same_bits_for_any_chunks_and_threads() -> None:
     given = mixed()
     whole = digest(make_plan(given), None, 2)

@@ -53,6 +53,7 @@ def crossing() -> Study:
     return study(beam(), mass(0.1, cruise(0.0, 1.0, 1.0)), sensor={"mid": fixed(0.5)}, solver=solver)
 
 
+@pytest.mark.fault(17)
 def test_a_lane_that_diverges_says_so_and_its_neighbours_do_not() -> None:
     """Central differences leave omega h = 2 behind where a variant is slow; the others share its block."""
     given = crossing()

@@ -177,6 +177,7 @@ def test_picard_is_the_implicit_march_where_it_converges() -> None:
             assert found.status[0] == Status.OK
 
 
+@pytest.mark.fault(22)
 def test_picard_contracts_where_r_is_below_one() -> None:
     """r = m sum phi^2/(1 + 2 zeta omega gamma h + beta h^2 omega^2) of the worst place; relaxed it always does."""
     tables = tables_of(crossing(), 300)

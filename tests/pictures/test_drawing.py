@@ -70,6 +70,7 @@ def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
     assert text.count("<animate ") >= min(2, modes)
 
 
+@pytest.mark.fault(39)
 def test_a_hostile_title_stays_text(tmp_path: Path) -> None:
     hostile = engine.load(catalogue.find_study("asymmetry")).with_values({"title": HOSTILE})
     page = write_drawing(hostile, tmp_path).read_text(encoding="utf-8")

@@ -57,6 +57,7 @@ def test_any_sweep_can_be_drawn(kind: str, shape: str) -> None:
     assert found and len({figure.name for figure in found}) == len(found)
 
 
+@pytest.mark.fault(18)
 @pytest.mark.parametrize("every", [1, 2])
 @pytest.mark.parametrize("kind", KINDS)
 def test_failed_variants_are_left_out_and_counted(kind: str, every: int) -> None:
@@ -163,6 +164,7 @@ def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
         assert "<script" not in text and "<!--" not in text and "DOCTYPE" not in text
 
 
+@pytest.mark.fault(39)
 def test_no_text_is_mathematics() -> None:
     """A label such as $\\frac{1}{0$ would raise, and $x$ would lose its dollars."""
 

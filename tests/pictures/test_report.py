@@ -112,6 +112,7 @@ def test_the_page_opens_with_six_figures_at_most_and_folds_methods(tmp_path: Pat
         assert table.count("<tr>") <= 10
 
 
+@pytest.mark.fault(39)
 @pytest.mark.parametrize("kind", ["passage", "double-peak"])
 def test_hostile_titles_are_text(kind: str, tmp_path: Path) -> None:
     page = write_report(archive(tmp_path, scenes.run(kind, title=HOSTILE)), tmp_path / "out")
@@ -123,6 +124,7 @@ def test_hostile_titles_are_text(kind: str, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "study.nc"]
 
 
+@pytest.mark.fault(18)
 def test_failed_variants_are_counted_with_their_message(tmp_path: Path) -> None:
     dataset = scenes.with_failures(scenes.run("passage", scenes.pace("passage")), 2)
     page = write_report(archive(tmp_path, dataset), tmp_path / "out")
@@ -158,6 +160,7 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.fault(26)
 def test_a_full_disk_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = archive(tmp_path, scenes.run("passage", scenes.pace("passage")))
 

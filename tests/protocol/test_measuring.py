@@ -196,6 +196,7 @@ def test_check_lists_the_pieces_and_writes_nothing(here: Path, capsys: Captured)
     assert [path.name for path in here.iterdir()] == ["small.toml"]
 
 
+@pytest.mark.fault(21)
 def test_a_stopped_run_goes_on_from_its_pieces(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     with monkeypatch.context() as patch:
         after_pieces(patch, 2)

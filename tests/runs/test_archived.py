@@ -84,9 +84,10 @@ def with_text(old: str, new: str) -> Change:
 ALL_OTHERS = ("asymmetry", "double-peak", "eigenfrequencies", "stability")
 
 
+@pytest.mark.fault(47)
 @pytest.mark.parametrize("kinds", [("passage", "influence"), pytest.param(ALL_OTHERS, marks=pytest.mark.slow)])
-def test_fault_47_a_report_opens_nothing_but_the_archive(kinds: tuple[str, ...], here: Path) -> None:
-    """Fault 47: info and report of every sort of study with the model's files gone, seen by an audit hook."""
+def test_a_report_opens_nothing_but_the_archive(kinds: tuple[str, ...], here: Path) -> None:
+    """Info and report of every sort of study with the model's files gone, seen by an audit hook."""
     bed, archives = imported.matrices(here), []
     for kind in kinds:
         car = {"on": "bed", "kind": "mass", "mass": 50.0, "motion": ON_THE_MOVE.get(kind, ON_THE_MOVE["passage"])}
@@ -100,8 +101,9 @@ def test_fault_47_a_report_opens_nothing_but_the_archive(kinds: tuple[str, ...],
     assert all((here / f"{name}-page" / "report.html").stat().st_size > 10_000 for name in archives)
 
 
-def test_fault_47_a_hostile_archive_makes_nothing_be_read(here: Path) -> None:
-    """Fault 47: paths in the study of an archive are words, and what it does not hold is not looked for."""
+@pytest.mark.fault(47)
+def test_a_hostile_archive_makes_nothing_be_read(here: Path) -> None:
+    """Paths in the study of an archive are words, and what it does not hold is not looked for."""
     imported.write(here, imported.matrices(here))
     assert main(["run", "bed.toml", "-o", "path.nc"]) in (0, 3)
     (here / "secret").mkdir()
@@ -123,10 +125,11 @@ def test_fault_47_a_hostile_archive_makes_nothing_be_read(here: Path) -> None:
     assert codes == [0, 0, 0, 4, 4, 4] and complaints.count("what this archive says of its study") == 3
 
 
+@pytest.mark.fault(47)
 @pytest.mark.parametrize("kind", ON_THE_MOVE)
 @pytest.mark.parametrize("sweep", ["speed", "unit"])
-def test_fault_47_what_is_recorded_tells_what_the_files_tell(kind: str, sweep: str, here: Path) -> None:
-    """Fault 47: sentences and closed forms from the archive alone, and with the model's files read again."""
+def test_what_is_recorded_tells_what_the_files_tell(kind: str, sweep: str, here: Path) -> None:
+    """Sentences and closed forms from the archive alone, and with the model's files read again."""
     key = "frequency" if kind == "double-peak" else "speed"
     axes = {
         "speed": {"pace": {"of": f"carriage.car.motion.{key}", "values": [0.3, 0.5]}},
@@ -231,9 +234,10 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "small.nc"
 
 
+@pytest.mark.fault(47)
 @pytest.mark.parametrize("name", FORGED)
-def test_fault_47_what_an_archive_says_is_what_it_holds(name: str, small: Path, here: Path, capsys: Captured) -> None:
-    """Fault 47: changed labels, another axis, status 99, values 1.7e308 and indices out of range end with 4."""
+def test_what_an_archive_says_is_what_it_holds(name: str, small: Path, here: Path, capsys: Captured) -> None:
+    """Changed labels, another axis, status 99, values 1.7e308 and indices out of range end with 4."""
     (here / "small.nc").write_bytes(small.read_bytes())
     change, words = FORGED[name]
     changed("small.nc", change)
@@ -244,8 +248,9 @@ def test_fault_47_what_an_archive_says_is_what_it_holds(name: str, small: Path, 
     assert sorted(path.name for path in here.iterdir()) == ["small.nc"]
 
 
-def test_fault_47_histories_out_of_range(here: Path) -> None:
-    """Fault 47: flat numbers of variants that the study does not have."""
+@pytest.mark.fault(47)
+def test_histories_out_of_range(here: Path) -> None:
+    """Flat numbers of variants that the study does not have."""
     write(here, SMALL.replace("count = 8", "count = 70"))
     assert main(["run", "small.toml"]) == 0
 
@@ -258,9 +263,10 @@ def test_fault_47_histories_out_of_range(here: Path) -> None:
         results_of(open_archive("small.nc"))
 
 
+@pytest.mark.fault(47)
 @pytest.mark.parametrize("name", ["correction", "mode_count", "position", "checked_position", "on_body"])
-def test_fault_47_coordinates_of_a_study_at_rest(name: str, here: Path) -> None:
-    """Fault 47: another coordinate than the study asks for."""
+def test_coordinates_of_a_study_at_rest(name: str, here: Path) -> None:
+    """Another coordinate than the study asks for."""
     write(here, at_rest.text_of("eigenfrequencies", "positions = 3\nmode_counts = [4, 8]"))
     assert main(["run", "small.toml"]) == 0
     changed("small.nc", put(name, (0,), "x" if name == "on_body" else 3))
@@ -290,10 +296,11 @@ def numbers(archive: Archive) -> list[tuple[str, str, Any]]:
     return [found[place] for place in picked.tolist()]
 
 
+@pytest.mark.fault(47)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", texts())
-def test_fault_47_any_other_number_is_refused_or_told(kind: str, here: Path) -> None:
-    """Fault 47: strange numbers anywhere in an archive are no bug of ours: 4, or a report of them."""
+def test_any_other_number_is_refused_or_told(kind: str, here: Path) -> None:
+    """Strange numbers anywhere in an archive are no bug of ours: 4, or a report of them."""
     write(here, texts()[kind])
     assert main(["run", "small.toml"]) in (0, 3)
     whole, codes = Path("small.nc").read_bytes(), []

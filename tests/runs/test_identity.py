@@ -69,6 +69,7 @@ def reduced(folder: Path) -> dict[str, object]:
     return {"kind": "reduced", "file": "bed.nc"}
 
 
+@pytest.mark.fault(41)
 @pytest.mark.parametrize(
     ("table", "name", "change", "kind"),
     [
@@ -81,7 +82,7 @@ def reduced(folder: Path) -> dict[str, object]:
         (reduced, "bed.nc", soften, "passage"),
     ],
 )
-def test_fault_41_a_changed_file_of_the_model_is_another_study(
+def test_a_changed_file_of_the_model_is_another_study(
     table: Callable[[Path], dict[str, object]],
     name: str,
     change: Callable[[Path], None],
@@ -89,7 +90,7 @@ def test_fault_41_a_changed_file_of_the_model_is_another_study(
     here: Path,
     capsys: Captured,
 ) -> None:
-    """Fault 41: the finished archive belongs to the files as they were."""
+    """The finished archive belongs to the files as they were."""
     imported.write(here, table(here), kind)
     assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
     assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
@@ -105,9 +106,10 @@ def test_fault_41_a_changed_file_of_the_model_is_another_study(
     assert main(["run", "bed.toml", "-o", "out.nc"]) in (0, 3)
 
 
+@pytest.mark.fault(41)
 @pytest.mark.extras
-def test_fault_41_a_study_that_measures_names_its_files(here: Path) -> None:
-    """Fault 41: the key of a study in pieces, and what its archive says, hold the files too."""
+def test_a_study_that_measures_names_its_files(here: Path) -> None:
+    """The key of a study in pieces, and what its archive says, hold the files too."""
     path = imported.write(here, imported.nastran(here), "work-precision")
     before = engine.load(path)
     remark(here / "grids.bdf")
@@ -116,8 +118,9 @@ def test_fault_41_a_study_that_measures_names_its_files(here: Path) -> None:
     assert before.source.sha256 == after.source.sha256 and run_key(before) != run_key(after)
 
 
-def test_fault_41_an_included_file_is_read_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 41: a model is remembered while all its files stay as they are, not only those that the study names."""
+@pytest.mark.fault(41)
+def test_an_included_file_is_read_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model is remembered while all its files stay as they are, not only those that the study names."""
     files_of_bed = Files(here, straight(PINNED, elements=4))
     bed = Matrices.model_validate(files_of_bed.table())
     included = here / "included.txt"
@@ -137,8 +140,9 @@ def test_fault_41_an_included_file_is_read_again(here: Path, monkeypatch: pytest
     assert dict(found[2].hashes)[str(included)] == hashes_of(str(included))[0][1]
 
 
-def test_fault_41_files_that_change_while_the_study_runs(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 41: nothing is written of a model that was exchanged half-way, and no part is kept."""
+@pytest.mark.fault(41)
+def test_files_that_change_while_the_study_runs(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is written of a model that was exchanged half-way, and no part is kept."""
     study = engine.load(imported.write(here, imported.matrices(here)))
     write_part = PartStore.write
 
@@ -175,12 +179,13 @@ def a_text() -> None:
     Path("small.nc").write_text("my notes", encoding="utf-8")
 
 
+@pytest.mark.fault(42)
 @pytest.mark.parametrize("kind", ["marched", "at rest"])
 @pytest.mark.parametrize(
     ("act", "option", "code"),
     [(another_archive, [], 2), (a_text, [], 2), (a_text, ["--overwrite"], 2), (another_archive, ["--overwrite"], 0)],
 )
-def test_fault_42_what_comes_there_before_the_replace_stays(
+def test_what_comes_there_before_the_replace_stays(
     kind: str,
     act: Callable[[], None],
     option: list[str],
@@ -189,7 +194,7 @@ def test_fault_42_what_comes_there_before_the_replace_stays(
     monkeypatch: pytest.MonkeyPatch,
     capsys: Captured,
 ) -> None:
-    """Fault 42: the target is looked at once more just before the archive takes its place; finished work is kept."""
+    """The target is looked at once more just before the archive takes its place; finished work is kept."""
     write(here, SMALL if kind == "marched" else at_rest.text_of("influence", "positions = 3"))
     write(here, at_rest.text_of("influence", "positions = 5"), "other.toml")
     assert main(["run", "other.toml"]) == 0
@@ -206,11 +211,12 @@ def test_fault_42_what_comes_there_before_the_replace_stays(
         assert open_archive("small.nc").root.attrs["study"] == Path("small.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.fault(42)
 @pytest.mark.parametrize("kind", ["marched", "at rest"])
-def test_fault_42_the_target_is_looked_at_again_under_the_lock(
+def test_the_target_is_looked_at_again_under_the_lock(
     kind: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
-    """Fault 42: another study has finished there between the first look and the lock; no folder of parts is made."""
+    """Another study has finished there between the first look and the lock; no folder of parts is made."""
     write(here, SMALL if kind == "marched" else at_rest.text_of("influence", "positions = 3"))
     write(here, at_rest.text_of("influence", "positions = 5"), "other.toml")
     assert main(["run", "other.toml"]) == 0
@@ -223,8 +229,9 @@ def test_fault_42_the_target_is_looked_at_again_under_the_lock(
     assert not Path("small.nc.parts").exists() and not Path("small.nc.lock").exists()
 
 
-def test_fault_42_the_same_study_finished_meanwhile_is_left_alone(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 42: whoever comes second finds the archive and computes nothing."""
+@pytest.mark.fault(42)
+def test_the_same_study_finished_meanwhile_is_left_alone(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever comes second finds the archive and computes nothing."""
     study = engine.load(write(here))
     first = run_to_archive(study, Path("whole.nc"), RunOptions())
     enter = PartStore.__enter__
@@ -243,10 +250,11 @@ def copied(source: str, target: str) -> int:
     return len(found)
 
 
-def test_fault_43_parts_of_another_study_are_computed_again(
+@pytest.mark.fault(43)
+def test_parts_of_another_study_are_computed_again(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
-    """Fault 43: same variants, other damping; every part carries the key of its run."""
+    """Same variants, other damping; every part carries the key of its run."""
     write(here, SCENES)
     write(here, SCENES.replace("damping_ratio = 0.02", "damping_ratio = 0.3"), "damped.toml")
     for name, number in (("damped", 3), ("small", 1)):
@@ -260,8 +268,9 @@ def test_fault_43_parts_of_another_study_are_computed_again(
     assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
 
 
-def test_fault_43_pieces_of_another_study_are_computed_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 43: the pieces of a bed with another stiffness have the same names."""
+@pytest.mark.fault(43)
+def test_pieces_of_another_study_are_computed_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pieces of a bed with another stiffness have the same names."""
     text = at_rest.text_of("eigenfrequencies", "positions = 3\nmode_counts = [4, 8]")
     write(here, text)
     write(here, text.replace("210 GPa", "70 GPa"), "soft.toml")
@@ -286,9 +295,10 @@ print("\\n" + json.dumps([name for name in names if name]))
 """
 
 
+@pytest.mark.fault(43)
 @pytest.mark.parametrize("kind", ["double-peak", "influence", "stability"])
-def test_fault_43_the_key_covers_every_source_that_a_run_loads(kind: str, here: Path) -> None:
-    """Fault 43: the engine's sources and those of the studies, for marched, measuring and resting kinds alike."""
+def test_the_key_covers_every_source_that_a_run_loads(kind: str, here: Path) -> None:
+    """The engine's sources and those of the studies, for marched, measuring and resting kinds alike."""
     bed = steel(15.0, modes=3, damping_ratio=0.02)
     shuttle = {"kind": "sinusoidal", "centre": 7.5, "amplitude": 3.0, "frequency": 0.3, "cycles": 2}
     car = {"car": {"on": "bed", "kind": "mass", "mass": 50.0, "motion": shuttle}}
@@ -300,8 +310,9 @@ def test_fault_43_the_key_covers_every_source_that_a_run_loads(kind: str, here: 
     assert len(ours) > 60 and ours <= set(sources())
 
 
-def test_fault_43_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 43: another text of any source is another key, above all of peaks, indices and every kind of study."""
+@pytest.mark.fault(43)
+def test_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another text of any source is another key, above all of peaks, indices and every kind of study."""
     known = {path.relative_to(PROGRAM).as_posix() for path in sources()}
     assert {
         "studies/findings/peaks.py",
@@ -322,8 +333,9 @@ def test_fault_43_the_key_follows_sources(tmp_path: Path, monkeypatch: pytest.Mo
     assert run_key(study, ["a"]) != run_key(study, ["b"])
 
 
-def test_fault_43_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fault 43: the key stands in the part itself, not only in the folder's file."""
+@pytest.mark.fault(43)
+def test_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The key stands in the part itself, not only in the folder's file."""
     write(here, SCENES)
     interrupted(monkeypatch, 1)
     key, name = Path("small.nc.parts/key").read_text(encoding="utf-8").splitlines()

@@ -25,6 +25,7 @@ def refused(text: str | Path) -> str:
     return str(error.value)
 
 
+@pytest.mark.fault(1, 5)
 @pytest.mark.parametrize(
     ("raw", "words"),
     [
@@ -54,6 +55,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
     assert "null" in refused("a\0b")
 
 
+@pytest.mark.fault(4, 45)
 @pytest.mark.parametrize(
     ("value", "words"),
     [
@@ -68,6 +70,9 @@ def test_what_is_no_file(tmp_path: Path) -> None:
         ("1_" * 4000 + "1", ["64 bits"]),
         ("[1.0, [2.0, nan]]", ["length.1.1"]),
         ("{ a = inf }", ["length.a"]),
+        ("1e31", ["0 or of a size from 1e-50 to 1e+30", "received 1e31"]),
+        ("-5e-324", ["of a size", "received -5e-324"]),
+        ('"1e28 km"', ["of a size", '"1e28 km"']),
     ],
 )
 @pytest.mark.parametrize("sample", [SAMPLE, MINIMAL])
@@ -83,6 +88,7 @@ def test_line_of_a_number() -> None:
     assert f"line {line}: body.bed.length" in refused(SAMPLE.replace("length = 15.0", "length = 1e999"))
 
 
+@pytest.mark.fault(5)
 @pytest.mark.parametrize(
     "text",
     [
@@ -107,6 +113,7 @@ def test_text_is_kept() -> None:
     assert document.data == tomllib.loads(SAMPLE)
 
 
+@pytest.mark.fault(1)
 def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
     (tmp_path / "marked.toml").write_bytes(b"\xef\xbb\xbf" + SAMPLE.encode())
     assert read_document(tmp_path / "marked.toml").source.sha256 == hashlib.sha256(SAMPLE.encode()).hexdigest()

@@ -98,6 +98,7 @@ def test_numbers_and_units() -> None:
         assert study.value(path) == value
 
 
+@pytest.mark.fault(2, 3, 9, 10, 11)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

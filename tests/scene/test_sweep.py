@@ -61,6 +61,7 @@ def test_no_sweep() -> None:
     assert cases.columns_of([0]) == {} and cases.values_of(0) == {}
 
 
+@pytest.mark.fault(14)
 def test_a_million_cases() -> None:
     paths = {"a": SPEED, "b": MASS, "c": RATIO}
     cases = sweep("\n".join(axis(name, path, "from = 0.01, to = 0.1, count = 100") for name, path in paths.items()))
@@ -128,6 +129,7 @@ def test_sobol_is_joint_and_repeatable() -> None:
     assert (mixed.dims, mixed.shape) == (("variant", "d"), (256, 2))
 
 
+@pytest.mark.fault(9, 14, 15)
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -189,6 +191,7 @@ def test_refusals(text: str, words: list[str]) -> None:
 END, LENGTH = "carriage.table.motion.end", "body.bed.length"
 
 
+@pytest.mark.fault(11)
 def test_conditions_between_axes() -> None:
     base = BASE.replace("at = 14.9", "at = 8.0")
     ends = f'a = {{ of = "{END}", from = 10, to = 15, count = 6 }}'

@@ -134,6 +134,7 @@ def test_datasets_that_an_archive_cannot_hold_are_refused(path):
     assert list(path.parent.iterdir()) == []
 
 
+@pytest.mark.fault(26)
 def test_a_full_disk_at_any_operation_leaves_the_old_archive(path, monkeypatch):
     write_archive(path, march())
     old = path.read_bytes()

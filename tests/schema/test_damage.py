@@ -37,6 +37,7 @@ def test_other_files_are_refused(tmp_path, content):
     refused(path, "not a netCDF-4 file|damaged")
 
 
+@pytest.mark.fault(37)
 @pytest.mark.parametrize("part", [0.001, 0.3, 0.9, 0.9999])
 def test_truncated_archives_are_refused(path, part):
     content = path.read_bytes()
@@ -47,6 +48,7 @@ def test_truncated_archives_are_refused(path, part):
             output_state(path, ATTRIBUTES["study_sha256"])
 
 
+@pytest.mark.fault(38)
 def test_a_foreign_netcdf_is_refused(tmp_path):
     path = tmp_path / "a.nc"
     xr.Dataset({"t2m": ("time", np.ones(3))}, attrs={"Conventions": "CF-1.6"}).to_netcdf(path)
@@ -58,6 +60,7 @@ def change(path, action):
         action(dataset)
 
 
+@pytest.mark.fault(38)
 def test_a_newer_schema_is_refused(path):
     change(path, lambda dataset: dataset.setncattr("schema_version", 3))
     refused(path, "newer version; expected schema_version up to 2, received 3")
@@ -68,6 +71,7 @@ def test_the_schema_of_before_estimated_errors_is_refused(path):
     refused(path, "before archives held estimated_error.*expected schema_version 2, received 1.*run the study again")
 
 
+@pytest.mark.fault(38)
 def test_missing_and_added_variables_are_found(path):
     change(path, lambda dataset: dataset.renameVariable("midspan_max", "midspam_max"))
     refused(path, "missing.*without /midspan_max float64 4x3")
@@ -98,6 +102,7 @@ def test_changed_texts_and_attributes_are_found(path, action):
     assert not summary.whole and "not those" in summary.damage
 
 
+@pytest.mark.fault(38)
 def test_a_small_file_that_claims_terabytes_is_refused_before_loading(tmp_path):
     path = tmp_path / "a.nc"
     with netCDF4.Dataset(path, "w") as dataset:
@@ -116,6 +121,7 @@ def test_an_archive_of_equal_numbers_is_not_taken_for_a_bomb(tmp_path):
     assert open_archive(path).root.status.size == 3_000_000
 
 
+@pytest.mark.fault(37)
 def test_zero_rows_and_types_of_others_are_refused(tmp_path):
     path = tmp_path / "a.nc"
     with netCDF4.Dataset(path, "w") as dataset:
@@ -129,6 +135,7 @@ def test_zero_rows_and_types_of_others_are_refused(tmp_path):
     refused(path, "types that archives do not have")
 
 
+@pytest.mark.fault(37)
 def test_a_flipped_bit_in_the_data_is_found_and_the_file_named(tmp_path):
     path = tmp_path / "a.nc"
     noise = np.random.default_rng(1).random((200, 200))
@@ -146,6 +153,7 @@ def test_a_flipped_bit_in_the_data_is_found_and_the_file_named(tmp_path):
     assert found > 25
 
 
+@pytest.mark.fault(44)
 def test_no_flipped_bit_gives_wrong_numbers_or_a_crash(path):
     """Some bits anywhere in a small archive: refused with the file's name, or read as if nothing were."""
     content = path.read_bytes()
@@ -171,6 +179,7 @@ def test_no_flipped_bit_gives_wrong_numbers_or_a_crash(path):
     assert outcomes == [0] * len(places)
 
 
+@pytest.mark.fault(37)
 def test_a_lost_chunk_is_not_read_as_fill_values(tmp_path):
     """The index of the chunks carries no checksum of HDF5: an entry that is lost gives NaN without an error."""
     path = tmp_path / "a.nc"
@@ -193,6 +202,7 @@ def h5(name, *arguments):
 pytestmark_hdf5 = pytest.mark.skipif(hdf5_library() is None, reason="the HDF5 library is linked statically")
 
 
+@pytest.mark.fault(40)
 @pytestmark_hdf5
 @pytest.mark.parametrize("group", [b"/", b"/audit"])
 def test_external_links_are_refused(path, group):
@@ -205,6 +215,7 @@ def test_external_links_are_refused(path, group):
     refused(path, "points at data in other files.*elsewhere", BadInput)
 
 
+@pytest.mark.fault(40)
 @pytestmark_hdf5
 def test_soft_links_are_refused(path):
     file = h5("H5Fopen", bytes(path), 1, 0)
@@ -213,6 +224,7 @@ def test_soft_links_are_refused(path):
     refused(path, "link again", BadInput)
 
 
+@pytest.mark.fault(40)
 @pytestmark_hdf5
 def test_external_storage_is_refused(path):
     outside = path.with_name("outside.bin")

@@ -19,6 +19,7 @@ def test_a_file_appears_whole(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 
+@pytest.mark.fault(26)
 def test_every_operation_can_fail_and_the_old_file_stays(tmp_path, monkeypatch):
     path = tmp_path / "a"
     failures = 0
@@ -59,6 +60,7 @@ def test_the_failures_of_the_netcdf_library_are_output_failures(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.fault(29)
 def test_leftovers_are_cleaned_and_nothing_else(tmp_path):
     for name in (".a.nc.123.wanderlast-tmp", ".b.nc.123.wanderlast-tmp", ".a.nc", "a.nc"):
         (tmp_path / name).touch()
@@ -79,6 +81,7 @@ def test_sidecar(tmp_path):
     assert not files.sidecar_matches(path)
 
 
+@pytest.mark.fault(27)
 def test_places_where_nothing_can_be_written_are_refused(tmp_path, monkeypatch):
     files.check_output_place(tmp_path / "a.nc")
     assert list(tmp_path.iterdir()) == []
@@ -101,6 +104,7 @@ def test_places_where_nothing_can_be_written_are_refused(tmp_path, monkeypatch):
     assert caught.value.exit_code == 74 and caught.value.path == tmp_path
 
 
+@pytest.mark.fault(28)
 def test_only_netcdf_files_are_ever_replaced(tmp_path):
     archive, text, pipe = tmp_path / "a.nc", tmp_path / "notes.txt", tmp_path / "pipe"
     archive.write_bytes(b"\x89HDF\r\n\x1a\n and more")
@@ -149,6 +153,7 @@ with store:
 """
 
 
+@pytest.mark.fault(26, 27)
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="unshare is not installed")
 def test_real_full_and_read_only_disks(tmp_path):
     full, read_only = tmp_path / "full", tmp_path / "read_only"

@@ -3,6 +3,7 @@
 import signal
 
 import numpy as np
+import pytest
 
 from results_schema.store import files
 from results_schema.store.archive import output_state, write_archive
@@ -41,6 +42,7 @@ def run(path):
     return len(open_chunks)
 
 
+@pytest.mark.fault(24)
 def test_a_kill_at_any_operation_is_resumed_to_the_same_bytes(tmp_path, monkeypatch):
     clean = tmp_path / "clean.nc"
     assert run(clean) == 2

@@ -133,6 +133,7 @@ DAMAGE = {
 }
 
 
+@pytest.mark.fault(29, 37)
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=list(DAMAGE))
 def test_damaged_parts_are_found_and_computed_again(path, damage):
     with PartStore(path, "key") as store:
@@ -186,6 +187,27 @@ def test_a_file_in_the_way_of_the_parts_is_refused(path):
     assert folder(path).read_text() == "mine"
 
 
+@pytest.mark.fault(49)
+@pytest.mark.parametrize(
+    ("theirs", "begun"), [("notes.txt", False), ("results.nc", False), ("notes.txt", True), ("sub/results.nc", True)]
+)
+def test_files_of_others_among_the_parts_are_left_alone(path, theirs, begun):
+    if begun:
+        with PartStore(path, "key") as store:
+            store.write(*part([0]))
+    found = folder(path) / theirs
+    found.parent.mkdir(parents=True, exist_ok=True)
+    found.write_text("mine")
+    before = {entry: entry.is_file() and entry.read_bytes() for entry in folder(path).rglob("*")}
+    for discard in (False, True):
+        name = theirs.partition("/")[0]
+        refused = pytest.raises(BadInput, match=rf"a\.nc\.parts: files that no run .* received {name}; remedy: move")
+        with refused, PartStore(path, "key", discard=discard):
+            pass
+    assert {entry: entry.is_file() and entry.read_bytes() for entry in folder(path).rglob("*")} == before
+
+
+@pytest.mark.fault(30)
 def test_a_second_run_is_refused_at_once_and_the_first_goes_on(path):
     with PartStore(path, "key") as store:
         with pytest.raises(ArchiveBusy) as caught, PartStore(path, "key"):
@@ -205,6 +227,7 @@ with PartStore(sys.argv[1], "key"):
 """
 
 
+@pytest.mark.fault(30)
 def test_a_lock_held_by_another_process_ends_with_it_even_when_killed(path):
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -219,6 +242,7 @@ def test_a_lock_held_by_another_process_ends_with_it_even_when_killed(path):
         assert finished(store).size == 0
 
 
+@pytest.mark.fault(26)
 def test_a_full_disk_at_any_operation_keeps_finished_chunks_whole(path, monkeypatch):
     for number in range(1, 100):
         monkeypatch.setattr(files, "FAULTS", FailNth(number))

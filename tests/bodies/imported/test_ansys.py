@@ -123,6 +123,7 @@ def words_of(table: dict[str, Any]) -> str:
     return f"{detail['loc']} {detail['ctx']}"
 
 
+@pytest.mark.fault(6)
 @pytest.mark.usefixtures("own_process")
 def test_damaged_matrices(tmp_path: Path) -> None:
     whole = (EXAMPLES / "file.full").read_bytes()

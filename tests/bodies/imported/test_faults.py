@@ -120,6 +120,7 @@ def slack(matrix: Any, at: int) -> None:
     matrix[:, at] = 0.0
 
 
+@pytest.mark.fault(6, 7)
 def test_faults(files: Files, tmp_path: Path) -> None:
     for name, (keys, words) in faults(tmp_path, files).items():
         table = {key: value for key, value in (files.table() | keys).items() if value is not None}
@@ -178,6 +179,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return found
 
 
+@pytest.mark.fault(2, 3, 4)
 @pytest.mark.parametrize("how", HOW)
 def test_every_key(small: Files, how: How) -> None:
     accepted(how, distinct(EVERY_KEY), lambda text: load(text.replace("FOLDER", str(small.folder))))

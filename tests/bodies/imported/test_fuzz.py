@@ -31,6 +31,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return found
 
 
+@pytest.mark.fault(6, 7)
 @pytest.mark.parametrize("name", list(EACH))
 def test_damaged_matrices(model: Files, name: str) -> None:
     path = model.folder / name
@@ -64,6 +65,7 @@ def parsed(text: str, reads: tuple[Callable[[list[Any]], Any], ...], raw: bytes)
     return True
 
 
+@pytest.mark.fault(6)
 @pytest.mark.parametrize(
     ("text", "reads"),
     [

@@ -122,6 +122,7 @@ def test_refusals(punched: tuple[Path, Files], keys: dict[str, Any], words: list
     assert all(word in found for word in words), found
 
 
+@pytest.mark.fault(6)
 @pytest.mark.usefixtures("own_process")
 def test_damaged_binary_matrices(tmp_path: Path) -> None:
     path, nodes = tmp_path / "cut.op4", str(MODELS / "cla_test_data" / "outboard.asm")

@@ -1,0 +1,21 @@
+"""Every fault of docs/faults.md has a test that says so."""
+
+from __future__ import annotations
+
+from tests import faults
+
+NUMBERS = [number for section in faults.FAULTS.values() for number in section]
+
+
+def test_they_are_numbered() -> None:
+    assert list(range(1, 51)) == NUMBERS
+
+
+def test_every_fault_has_a_test() -> None:
+    found = faults.covered()
+    assert set(found) <= set(NUMBERS)
+    assert set(NUMBERS) - set(found) <= faults.COMING
+
+
+def test_the_page_is_made_from_the_tests() -> None:
+    assert faults.PAGE.read_text(encoding="utf-8") == faults.page(), "run: python -m tests.faults"
