@@ -51,6 +51,13 @@ def root(row):
     return np.sqrt(row)
 
 
+def total(row):
+    """The sum of all lanes: first of those half the lanes apart, and so on."""
+    while len(row) > 1:
+        row = row[: len(row) // 2] + row[len(row) // 2 :]
+    return row[0]
+
+
 def everywhere(truths):
     """Whether all lanes are true."""
     return bool(np.all(truths))
@@ -180,6 +187,22 @@ def _type_root(context):
 def _lower_root(context, builder, called, values):
     kind = ir.FunctionType(_ROW, [_ROW])
     return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f64", (), kind), values)
+
+
+@type_callable(total)
+def _type_total(context):
+    return lambda row: types.float64 if row == ROW else None
+
+
+@lower_builtin(total, Row)
+def _lower_total(context, builder, called, values):
+    row, count = values[0], LANES
+    while count > 1:
+        count //= 2
+        nowhere, whole = ir.Constant(row.type, ir.Undefined), ir.VectorType(ir.IntType(32), count)
+        halves = [ir.Constant(whole, list(range(first, first + count))) for first in (0, count)]
+        row = builder.fadd(*(builder.shuffle_vector(row, nowhere, half) for half in halves))
+    return builder.extract_element(row, ir.Constant(ir.IntType(32), 0))
 
 
 @type_callable(everywhere)

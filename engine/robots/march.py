@@ -16,6 +16,8 @@ from results_schema.status import Status
 if TYPE_CHECKING:
     from engine.robots.model import RobotModel
 
+NEWTON = 1e-4  # of the tolerance: what is left of a step's corrections, over the largest motion
+
 
 def stretches(model: RobotModel, duration: float, step: float, every: int) -> Stretch:
     """The time (s) cut at the beginnings of moves, into steps no longer than ``step`` (s) of which ``every`` th is
@@ -24,7 +26,7 @@ def stretches(model: RobotModel, duration: float, step: float, every: int) -> St
     events = np.unique(np.concatenate([[0.0], starts[starts < duration]]))
     lengths = np.diff([*events, duration])
     steps = np.maximum(1, np.ceil(lengths / (step * every) - 1e-9)).astype(np.int64) * every
-    return Stretch(events, lengths / steps, steps, every)
+    return Stretch(events, lengths / steps, steps, every, (NEWTON * model.study.solver.tolerance) ** 2)
 
 
 def march(model: RobotModel, times: Stretch, scheme: Newmark) -> tuple[Record, Status]:

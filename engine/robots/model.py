@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.bodies.frame.frame import Frame
+from engine.kernels.layout import LANES
 from engine.kernels.robots.chain import inverse_dynamics
 from engine.kernels.robots.layout import (
     CENTRE,
@@ -146,14 +147,16 @@ def _tracks(rails: list[Rail], corrected: bool) -> tuple[Counts, Array, Array, A
     most, modes = max(one.ends.size for one in rails), np.array([one.omega.size for one in rails])
     tracks = np.stack([np.cumsum(modes) - modes, modes, [one.ends.size - 1 for one in rails]], axis=1)
     ends = np.full((len(rails), most), np.inf)
-    shapes = np.zeros((len(rails), most - 1, 4, 6, modes.max()))
+    shapes = np.zeros((len(rails), most - 1, modes.max(), 2, 2, LANES // 2))
     missed = np.zeros((len(rails), 6 * most * corrected, 6 * most * corrected))
     for b, one in enumerate(rails):
         size = one.ends.size
-        ends[b, :size], shapes[b, : size - 1, :, :, : one.omega.size] = one.ends, one.shapes
+        ends[b, :size] = one.ends
+        cubics = np.moveaxis(one.shapes, 3, 1).reshape(size - 1, one.omega.size, 2, 2, 6)
+        shapes[b, : size - 1, : one.omega.size, :, :, :6] = cubics
         if corrected:
             missed[b, : 6 * size, : 6 * size] = one.missed
-    return tracks, ends, shapes, missed
+    return tracks, ends, shapes.reshape(*shapes.shape[:4], LANES), missed
 
 
 class _Stands(NamedTuple):

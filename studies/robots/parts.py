@@ -30,21 +30,20 @@ COMPONENTS = ("x", "y", "z")
 def pieces(study: Study, question: Question) -> list[Piece]:
     """The work. Raises BadInput for what cannot be marched."""
     from engine.batch.plan import check_memory
-    from engine.robots.converge import levels, scheme_of
+    from engine.robots.converge import Ladder, scheme_of
     from engine.scene.sweep import expand
 
     cases, base = expand(study), study.without_sweep()
     scheme_of(study)
-    coarsest = next(levels(base, question.duration or 1.0))
-    duration = question.duration or float(coarsest.model.done.max()) + question.after
-    each = BUILD_SECONDS + LEVELS_TAKEN * STEP_SECONDS * duration / coarsest.step * len(study.robot) / 3.0
+    ladder = Ladder.of(base, question.duration, question.after)
+    each = BUILD_SECONDS + LEVELS_TAKEN * STEP_SECONDS * ladder.duration / ladder.step * len(study.robot) / 3.0
     check_memory(study, cases.size, 8 * cases.size * 40 * len(study.robot))
     size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
     found: list[Piece] = []
     for first in range(0, cases.size, size):
         own = np.arange(first, min(first + size, cases.size), dtype=np.int64)
         compute = partial(_march, study, question, cases, own)
-        words = f"{own.size:,} variants over {duration:.4g} s"
+        words = f"{own.size:,} variants over {ladder.duration:.4g} s"
         found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     if question.one_at_a_time and len(study.robot) > 1:
         compute = partial(_without, base, question)

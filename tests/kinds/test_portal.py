@@ -143,7 +143,7 @@ def _robot(**more: Any) -> Callable[[], Study]:
         (_robot(moves=[{"to": [-1.0, 0, 0, 0, 0]}]), "robot.portal.moves.0.to"),
         (lambda: scene(robot={}), "robot"),
         (lambda: scene(kind="passage"), "robot"),
-        (lambda: scene(solver={"scheme": "fox-goodwin"}), "solver.scheme"),
+        (lambda: scene(solver={"scheme": "hht-alpha", "alpha": -0.1}), "solver.scheme"),
         (lambda: scene(solver={"fidelity": "static"}), "solver.fidelity"),
         (lambda: scene(output={"histories": {"every": 3}}), "output.histories"),
         (lambda: scene(sensor={"tip": {"body": "left", "at": 1.0}}), "sensor"),

@@ -12,7 +12,7 @@ from engine.robots.march import march, stretches
 from engine.robots.model import RobotModel, build
 from engine.scene.study import Study
 
-AVERAGE_ACCELERATION = Newmark(0.25, 0.5)
+AVERAGE_ACCELERATION, FOX_GOODWIN = Newmark(0.25, 0.5), Newmark(1 / 12, 0.5)
 
 
 def rail(y: float, modes: int = 6, stiffer: float = 1.0, elements: int = 8) -> dict[str, Any]:
@@ -129,11 +129,17 @@ def scene(rail_more: dict[str, Any] | None = None, **more: Any) -> Study:
     return Study(**(tables | more))
 
 
-def marched(study: Study, step: float, duration: float | None = None, every: int = 1) -> tuple[RobotModel, Record]:
-    """A scene marched by average acceleration with a step (s)."""
+def marched(
+    study: Study,
+    step: float,
+    duration: float | None = None,
+    every: int = 1,
+    scheme: Newmark = AVERAGE_ACCELERATION,
+) -> tuple[RobotModel, Record]:
+    """A scene marched with a step (s)."""
     model = build(study)
     until = float(model.done.max()) + 0.5 if duration is None else duration
-    return model, march(model, stretches(model, until, step, every), AVERAGE_ACCELERATION)[0]
+    return model, march(model, stretches(model, until, step, every), scheme)[0]
 
 
 def errors(record: Record) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from engine.kernels.floating.vectors import shared_vector
 from engine.kernels.jit import called, kernel
+from engine.kernels.layout import LANES
 from engine.kernels.robots.chain import STILL, driven, follow, weigh
 from engine.kernels.robots.layout import (
     ACTUAL,
@@ -18,7 +19,9 @@ from engine.kernels.robots.layout import (
     BASE,
     BEGUN,
     COLUMNS,
+    CUBICS,
     DRIVE,
+    EXTRA,
     FIRST,
     GRIP,
     GRIPPED,
@@ -37,6 +40,7 @@ from engine.kernels.robots.layout import (
     SUMS,
     TOLD,
     TOOL,
+    TOTALS,
     VALUE,
     VECTORS,
     WHOLE,
@@ -44,7 +48,7 @@ from engine.kernels.robots.layout import (
     Work,
 )
 from engine.kernels.robots.timing import planned
-from engine.kernels.robots.tracks import section
+from engine.kernels.robots.tracks import along_track, push_on, section
 from engine.kernels.robots.vectors import rotation
 
 
@@ -52,7 +56,7 @@ from engine.kernels.robots.vectors import rotation
 def room(system):
     """Empty arrays for a system."""
     R, J = system.coordinate.shape
-    n, N = system.shapes.shape[4], system.tracks[:, MODES].sum()
+    n, N = system.shapes.shape[2], system.tracks[:, MODES].sum()
     return Work(
         np.zeros((R, J, COLUMNS)),
         np.zeros((R, ROBOT)),
@@ -60,9 +64,11 @@ def room(system):
         np.zeros((R, 2, GRIPPED)),
         np.zeros((SIXES, 6)),
         np.zeros((VECTORS, system.springs.shape[0])),
-        np.zeros((R, 2, 6, n)),
+        np.zeros((CUBICS, LANES)),
+        np.ones(1),
         np.zeros((R, J, J + 6)),
         np.zeros((R, 2, 6, n)),
+        np.zeros((6, n)),
         np.zeros((N, N)),
         np.zeros((6 + J, 6 + J)),
     )
@@ -105,7 +111,7 @@ def ride(system, r, state, work):
     for g in range(2):
         body, share = system.body[r, g], system.share[r, g]
         if body >= 0:
-            section(system, body, joint[ACTUAL + VALUE] + share[6, 0], state, work.rows[r, g], six)
+            section(system, body, joint[ACTUAL + VALUE] + share[6, 0], state, work, work.grips[r, g])
             for o in range(work.six.shape[1]):
                 for i in range(work.six.shape[1]):
                     if share[o, i] != 0.0:
@@ -130,8 +136,7 @@ def evaluate(system, state, work, left):
     modes = work.elastic.shape[0]
     for k in range(left.shape[0]):
         left[k] = system.springs[k, 1] * state[k, 1] + system.springs[k, 0] * state[k, 0]
-        if k < modes:
-            left[k] += state[k, 2]
+        left[k] += (work.vectors[EXTRA, k] + (k < modes)) * state[k, 2]
     for r in range(work.robots.shape[0]):
         links, robot, count = work.links[r], work.robots[r], system.counts[r, JOINTS]
         for j in range(count):
@@ -152,7 +157,7 @@ def evaluate(system, state, work, left):
             k = system.coordinate[r, j]
             links[j, DRIVE] = needed
             if k >= 0:
-                links[j, DRIVE] = links[j, TOLD] - left[k]
+                links[j, DRIVE] = links[j, TOLD] - left[k] + work.vectors[EXTRA, k] * state[k, 2]
                 left[k] += needed - links[j, TOLD]
         load(system, r, work, left)
 
@@ -168,37 +173,46 @@ def load(system, r, work, left):
                 for o in range(work.six.shape[1]):
                     total += system.share[r, g, o, i] * work.robots[r, WRENCH + o]
                 work.grips[r, g, GRIP + i] = total
-                for k in range(system.tracks[body, MODES]):
-                    left[system.tracks[body, FIRST] + k] += work.rows[r, g, i, k] * total
+            push_on(system, body, work.grips[r, g], work, left)
 
 
 @called
 def factorise(matrix, count):
-    """Cholesky: the lower half takes the place of a symmetric positive matrix (lower half)."""
-    for i in range(count):
-        for j in range(i + 1):
-            x = matrix[i, j]
-            for k in range(j):
-                x -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = np.sqrt(x) if i == j else x / matrix[j, j]
+    """Cholesky of a symmetric positive matrix (upper half): its factor L takes the place of the lower half, and L^T
+    that of the upper, so that both are read along rows."""
+    for k in range(count):
+        own = matrix[k]
+        own[k] = np.sqrt(own[k])
+        by = 1.0 / own[k]
+        for j in range(k + 1, count):
+            own[j] *= by
+            matrix[j, k] = own[j]
+        for i in range(k + 1, count):
+            row, part = matrix[i], own[i]
+            for j in range(i, count):
+                row[j] -= part * own[j]
 
 
 @called
-def forward(lower, count, x):
+def forward(factors, count, x):
     """x = L^-1 x."""
-    for i in range(count):
-        for k in range(i):
-            x[i] -= lower[i, k] * x[k]
-        x[i] /= lower[i, i]
+    for k in range(count):
+        row = factors[k]
+        part = x[k] / row[k]
+        x[k] = part
+        for i in range(k + 1, count):
+            x[i] -= part * row[i]
 
 
 @called
-def backward(lower, count, x):
+def backward(factors, count, x):
     """x = L^-T x."""
-    for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            x[i] -= lower[k, i] * x[k]
-        x[i] /= lower[i, i]
+    for k in range(count - 1, -1, -1):
+        row = factors[k]
+        part = x[k] / row[k]
+        x[k] = part
+        for i in range(k):
+            x[i] -= part * row[i]
 
 
 @called
@@ -208,12 +222,12 @@ def prepare(system, of_rate, of_place, work):
     elastic, found, J = work.elastic, work.inertia, system.coordinate.shape[1]
     N = elastic.shape[0]
     for k in range(N):
-        for m in range(k):
+        for m in range(k, N):
             elastic[k, m] = 0.0
-        elastic[k, k] = 1.0 + of_rate * system.springs[k, 1] + of_place * system.springs[k, 0]
+        elastic[k, k] = 1.0 + work.vectors[EXTRA, k] + of_rate * system.springs[k, 1] + of_place * system.springs[k, 0]
     for r in range(work.robots.shape[0]):
         lower, robot, joints = work.lower[r], work.robots[r], system.counts[r, JOINTS]
-        solid, tool = work.six[SOLID:].reshape(12), shared_vector(system.robots, r, TOOL)
+        solid, tool = work.six[SOLID:TOTALS].reshape(12), shared_vector(system.robots, r, TOOL)
         weigh(system.chain[r], joints, robot, tool, work.links[r], found, solid)
         count = 0
         for j in range(joints):
@@ -223,9 +237,10 @@ def prepare(system, of_rate, of_place, work):
             own = 0
             for i in range(j + 1):
                 if system.coordinate[r, i] >= 0:
-                    lower[count, own] = found[6 + i, 6 + j]
+                    lower[own, count] = found[6 + i, 6 + j]
                     own += 1
             lower[count, count] += of_rate * system.springs[k, 1] + of_place * system.springs[k, 0]
+            lower[count, count] += work.vectors[EXTRA, k]
             for i in range(work.six.shape[1]):
                 lower[count, J + i] = found[i, 6 + j]
             count += 1
@@ -242,73 +257,90 @@ def prepare(system, of_rate, of_place, work):
 
 @called
 def add_base(system, r, inertia, work):
-    """What the base of robot r, with an inertia (6, 6), adds to the matrix of the modes."""
-    for g in range(2):
-        if system.body[r, g] >= 0:
-            rows, share, pairs = work.rows[r, g], system.share[r, g], work.pairs[r, g]
-            for o in range(work.six.shape[1]):
-                for k in range(pairs.shape[1]):
-                    pairs[o, k] = 0.0
-                for i in range(work.six.shape[1]):
-                    if share[o, i] != 0.0:
-                        for k in range(pairs.shape[1]):
-                            pairs[o, k] += share[o, i] * rows[i, k]
-    for g in range(2):
-        for h in range(2):
-            one, other = system.body[r, g], system.body[r, h]
-            if one < 0 or other < 0 or one < other:
-                continue
-            first, second = system.tracks[one, FIRST], system.tracks[other, FIRST]
-            for i in range(work.six.shape[1]):
-                for k in range(system.tracks[other, MODES]):
-                    x = 0.0
-                    for o in range(work.six.shape[1]):
-                        x += inertia[i, o] * work.pairs[r, h, o, k]
-                    for m in range(system.tracks[one, MODES]):
-                        work.elastic[first + m, second + k] += work.pairs[r, g, i, m] * x
-
-
-@called
-def along_base(system, r, i, x, work):
-    """Motion i of the base of robot r by x of the modes."""
-    found = 0.0
+    """What the base of robot r, with an inertia (6, 6), adds to the matrix of the modes (upper half)."""
     for g in range(2):
         body = system.body[r, g]
         if body >= 0:
-            for k in range(system.tracks[body, MODES]):
-                found += work.pairs[r, g, i, k] * x[system.tracks[body, FIRST] + k]
-    return found
+            share, pairs, modes = system.share[r, g], work.pairs[r, g], system.tracks[body, MODES]
+            for o in range(pairs.shape[0]):
+                for k in range(modes):
+                    pairs[o, k] = 0.0
+            for i in range(pairs.shape[0]):
+                for k in range(modes):
+                    here = along_track(system, body, work.grips[r, g], i, k)
+                    for o in range(pairs.shape[0]):
+                        pairs[o, k] += share[o, i] * here
+    for h in range(2):
+        other = system.body[r, h]
+        if other < 0:
+            continue
+        second, modes = system.tracks[other, FIRST], system.tracks[other, MODES]
+        for i in range(work.across.shape[0]):
+            across = work.across[i]
+            for k in range(modes):
+                across[k] = 0.0
+            for o in range(work.across.shape[0]):
+                row, part = work.pairs[r, h, o], inertia[i, o]
+                for k in range(modes):
+                    across[k] += part * row[k]
+        for g in range(2):
+            one = system.body[r, g]
+            if one < 0 or one > other:
+                continue
+            for m in range(system.tracks[one, MODES]):
+                row = work.elastic[system.tracks[one, FIRST] + m]
+                for i in range(work.across.shape[0]):
+                    across, part = work.across[i], work.pairs[r, g, i, m]
+                    for k in range(modes):
+                        row[second + k] += part * across[k]
 
 
 @called
 def solve(system, work, x):
     """x (N) becomes the solution for a right-hand side x of the matrix of `prepare`."""
-    modes, J = work.elastic.shape[0], system.coordinate.shape[1]
+    modes, J, totals = work.elastic.shape[0], system.coordinate.shape[1], work.six[TOTALS]
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
         forward(lower, count, x[first:])
-        for i in range(work.six.shape[1]):
-            total = 0.0
+        for i in range(totals.shape[0]):
+            totals[i] = 0.0
             for c in range(count):
-                total += lower[c, J + i] * x[first + c]
-            for g in range(2):
-                body = system.body[r, g]
-                if body >= 0:
+                totals[i] += lower[c, J + i] * x[first + c]
+        for g in range(2):
+            body = system.body[r, g]
+            if body >= 0:
+                begin = system.tracks[body, FIRST]
+                for i in range(totals.shape[0]):
+                    row, part = work.pairs[r, g, i], totals[i]
                     for k in range(system.tracks[body, MODES]):
-                        x[system.tracks[body, FIRST] + k] -= work.pairs[r, g, i, k] * total
+                        x[begin + k] -= part * row[k]
         first += count
     forward(work.elastic, modes, x)
     backward(work.elastic, modes, x)
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
-        for i in range(work.six.shape[1]):
-            total = along_base(system, r, i, x, work)
-            for c in range(count):
-                x[first + c] -= lower[c, J + i] * total
+        along_base(system, r, x, work, totals)
+        for c in range(count):
+            for i in range(totals.shape[0]):
+                x[first + c] -= lower[c, J + i] * totals[i]
         backward(lower, count, x[first:])
         first += count
+
+
+@called
+def along_base(system, r, x, work, totals):
+    """The six motions of the base of robot r by x of the modes."""
+    for i in range(totals.shape[0]):
+        totals[i] = 0.0
+    for g in range(2):
+        body = system.body[r, g]
+        if body >= 0:
+            begin = system.tracks[body, FIRST]
+            for k in range(system.tracks[body, MODES]):
+                for i in range(totals.shape[0]):
+                    totals[i] += work.pairs[r, g, i, k] * x[begin + k]
 
 
 @called

@@ -7,7 +7,7 @@ of six: translation and rotation, force and moment.
 
 from typing import NamedTuple
 
-from engine.kernels.layout import FloatArray, IntArray
+from engine.kernels.layout import LANES, FloatArray, IntArray
 
 # columns of System.counts: joints, moves, and whether drives are told the forces of the whole plan
 JOINTS, MOVES_TOLD, WHOLE = range(3)
@@ -41,12 +41,17 @@ PLANNED_TOOL, ACTUAL_TOOL, AHEAD, WRENCH, PAYLOAD, ROBOT = 0, 3, 6, 12, 18, 19
 # columns of Work.doing
 BEGUN, PHASE = range(2)
 # columns of Work.grips, by rail: wrench on the robot, motion that the modes miss, loads on the ends of an element, the
-# motion by those of the ends (6, 12), the place, the element
-GRIP, MISSING, LOADS, BY_ENDS, AT, ELEMENT, GRIPPED = 0, 6, 12, 24, 96, 97, 98
-# rows of Work.six: sums of `section`, what becomes of them at the base, and the inertia of a solid (10 in two rows)
-SUMS, MOVED, SOLID, SIXES = 0, 6, 12, 14
-# rows of Work.vectors
-CHANGE, MOMENTUM, VECTORS = 0, 1, 2
+# motion by those of the ends (6, 12), the element with the distance from its beginning, what the modes go up there
+GRIP, MISSING, LOADS, BY_ENDS, ELEMENT, INTO, UP_THERE, GRIPPED = 0, 6, 12, 24, 96, 97, 98, 99
+# rows of Work.six: sums of `section`, what becomes of them at the base, the inertia of a solid (10 in two rows), and
+# what a solution has for a base
+SUMS, MOVED, SOLID, TOTALS, SIXES = 0, 6, 12, 14, 15
+# rows of Work.vectors: of a correction; momenta, and a vector to begin with; inertia by which the scheme has no
+# limit of its step, and that of coordinates which go without; accelerations of the step before
+CHANGE, MOMENTUM, EXTRA, SOFT, BEFORE, VECTORS = 0, 1, 2, 3, 4, 5
+# rows of Work.cubics: sums of modes' cubics times y, y' and y''; a load for such cubics
+CUBIC, LOADED, CUBICS = 0, 6, 8
+SECOND_HALF = LANES // 2  # of a row of cubics: what is there belongs to the power above that in the first half
 
 # what a robot does at a time: moves, holds, works
 MOVES, HOLDS, WORKS = range(3)
@@ -60,9 +65,9 @@ class System(NamedTuple):
     coordinates, of modes omega^2 and 2 zeta omega.
     body (R, 2): that a robot stands on, -1 for none;  share (R, 2, 7, 6): motion of the base by that of the track's
     axis, and in the first of row 6 its place on that track less that of the robot;  tracks (B, 3): columns above;
-    ends (B, E + 1): ends of a track's elements, m;  shapes (B, E, 4, 6, n): motion of the axis per mode, cubics in the
-    distance from an end, constant first;  missed (B, 6 (E + 1), 6 (E + 1)): motions of the ends per unit load on them
-    that the modes miss.
+    ends (B, E + 1): ends of a track's elements, m;  shapes (B, E, n, 2, LANES): motion of the axis per mode, cubics in
+    the distance from an end: constants in the first half of row 0, linear terms in its second, then row 1;  missed (B,
+    6 (E + 1), 6 (E + 1)): motions of the ends per unit load on them that the modes miss.
     moves (R, M, MOVE): columns above;  stays (R, M + 1, J + 2): joints before and after moves, the payload from the
     beginning of a move on, and s up to which a robot works after it.
     """
@@ -85,9 +90,9 @@ class System(NamedTuple):
 
 class Work(NamedTuple):
     """What an evaluation leaves behind: links (R, J, COLUMNS), robots (R, ROBOT), doing (R, 2), grips (R, 2, GRIPPED),
-    six (SIXES, 6), vectors (VECTORS, N): columns above;  rows (R, 2, 6, n): motion of rails under robots per mode. Of
-    the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs (R, 2, 6, n): motion of bases per mode;
-    elastic (N, N); inertia (6 + J, 6 + J) of a robot."""
+    six (SIXES, 6), vectors (VECTORS, N), cubics (CUBICS, LANES): above;  newton (1): by what factor the work of
+    corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs (R, 2, 6, n): motion
+    of bases per mode; across (6, n): the same times an inertia; elastic (N, N); inertia (6 + J, 6 + J) of a robot."""
 
     links: FloatArray
     robots: FloatArray
@@ -95,28 +100,36 @@ class Work(NamedTuple):
     grips: FloatArray
     six: FloatArray
     vectors: FloatArray
-    rows: FloatArray
+    cubics: FloatArray
+    newton: FloatArray
     lower: FloatArray
     pairs: FloatArray
+    across: FloatArray
     elastic: FloatArray
     inertia: FloatArray
 
 
 class Stretch(NamedTuple):
-    """Times between events: start (P), step (P): s;  steps (P): how many;  every: steps between observed stations."""
+    """Times between events: start (P), step (P): s;  steps (P): how many;  every: steps between observed stations;
+    close: of the largest elastic energy, what a step's corrections may leave."""
 
     start: FloatArray
     step: FloatArray
     steps: IntArray
     every: int
+    close: float
 
 
 class Pace(NamedTuple):
-    """A step (s), and what a change of the acceleration at its end is there to rate and place (Newmark)."""
+    """A step (s), what a change of the acceleration at its end is there to rate and place (Newmark), the inertia per
+    stiffness that lets any step be stable, the time (s) that such steps go on, and how close corrections come."""
 
     step: float
     of_rate: float
     of_place: float
+    lacking: float
+    until: float
+    close: float
 
 
 class Record(NamedTuple):

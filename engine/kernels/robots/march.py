@@ -8,17 +8,15 @@ from engine.kernels.jit import called, kernel
 from engine.kernels.layout import NOT_CONVERGED, SOUND
 from engine.kernels.robots.dynamics import evaluate, plan_at, prepare, room, solve
 from engine.kernels.robots.layout import (
-    ACTUAL,
     ACTUAL_TOOL,
-    AT,
+    BEFORE,
     BEGUN,
     CHANGE,
     DRIVE,
-    FIRST,
+    EXTRA,
     GRIP,
     JOINTS,
     MISSING,
-    MODES,
     MOMENTUM,
     MOVED,
     PAYLOAD,
@@ -33,7 +31,9 @@ from engine.kernels.robots.layout import (
     SEEN_PLANNED,
     SEEN_WRENCH,
     SINCE,
+    SOFT,
     SUNK,
+    UP_THERE,
     VALUE,
     WRENCH,
     Pace,
@@ -41,8 +41,12 @@ from engine.kernels.robots.layout import (
 from engine.kernels.robots.timing import number_of
 from engine.kernels.robots.tracks import give
 
-CLOSE = 1e-10  # of the elastic energy: what a correction may still do
+RESTING = 1e-10  # of the elastic energy: what a correction may still do at rest
 MOST_CORRECTIONS, MOST_SETTLING, STARTING = 12, 200, 3
+GROWS = 2.0  # from step to step, by which corrections may fall less than those last seen
+#: Of the limit of a scheme's step: the inertia of robots changes while they move. With 0.6 no march of the portal grew;
+#: where joints and modes were judged one by one one did, at 12 steps a period. Powers are taken after the last to go.
+WITHIN, POWERS = 0.6, 6
 REUSED = 3  # corrections of a step after which its matrix is made anew
 FAR = 0.1  # m or rad that a joint has gone since then
 
@@ -58,10 +62,11 @@ def march(system, stretches, newmark, record):
     energy = elastic_energy(system, state)
     for p in range(stretches.start.shape[0]):
         start, h = stretches.start[p], stretches.step[p]
-        pace = Pace(h, newmark.gamma * h, newmark.beta * h * h)
+        until = h * stretches.steps[p]
+        pace = Pace(h, newmark.gamma * h, newmark.beta * h * h, lacking(newmark) * h * h, until, stretches.close)
         if p > 0:
             strike(system, start, state, work, left)
-        begin(system, start, state, work, left)
+        begin(system, start, pace, state, work, left)
         for n in range(stretches.steps[p] + 1):
             if n > 0:
                 energy, close = step(system, start + n * h, pace, state, work, left, energy)
@@ -136,7 +141,7 @@ def settle(system, state, work, left):
             state[k, 0] -= by
             change = max(change, by**2 * system.springs[k, 0])
             largest = max(largest, state[k, 0] ** 2 * system.springs[k, 0])
-        if change <= CLOSE**2 * largest:
+        if change <= RESTING**2 * largest:
             return SOUND
     return NOT_CONVERGED
 
@@ -147,7 +152,7 @@ def strike(system, t, state, work, left):
     along."""
     plan_at(system, t, work)
     for k in range(left.shape[0]):
-        work.vectors[MOMENTUM, k] = 0.0
+        work.vectors[MOMENTUM, k], work.vectors[EXTRA, k] = 0.0, 0.0
     add_momenta(system, 1.0, state, work, left)
     for r in range(work.robots.shape[0]):
         payload = payload_of(system, r, number_of(system, r, t))
@@ -177,9 +182,26 @@ def add_momenta(system, sign, state, work, left):
 
 
 @called
-def begin(system, t, state, work, left):
+def lacking(newmark):
+    """How far beta of a scheme of Newmark's is below that which has no limit of its step."""
+    return max(0.0, 0.25 * (newmark.gamma + 0.5) ** 2 - newmark.beta)
+
+
+@called
+def begin(system, t, pace, state, work, left):
     """The moves that begin at a time, and accelerations for their loads."""
     load_at(system, t, work)
+    for k in range(left.shape[0]):
+        work.vectors[EXTRA, k] = 0.0
+        work.vectors[SOFT, k] = pace.lacking * system.springs[k, 0]
+    if pace.lacking > 0.0:
+        for when in (t + pace.until, t):
+            plan_at(system, when, work)
+            evaluate(system, state, work, left)
+            prepare(system, 0.0, 0.0, work)
+            hold_back(system, work)
+    for k in range(left.shape[0]):
+        work.vectors[EXTRA, k] = pace.lacking * system.springs[k, 0] - work.vectors[SOFT, k]
     plan_at(system, t, work)
     evaluate(system, state, work, left)
     prepare(system, 0.0, 0.0, work)
@@ -188,18 +210,47 @@ def begin(system, t, state, work, left):
         solve(system, work, left)
         for k in range(left.shape[0]):
             state[k, 2] -= left[k]
+    for k in range(left.shape[0]):
+        work.vectors[BEFORE, k] = state[k, 2]
+    work.newton[0] = 1.0
     for r in range(work.links.shape[0]):
         work.links[r, 0, SINCE] = np.inf  # that matrix is none of a step's
+
+
+@called
+def hold_back(system, work):
+    """Take coordinates out of those that are slow enough for the step, one after another, until these are stable
+    together: lacking h^2 k of them, SOFT, has no eigenvalue above ``WITHIN`` beside the inertia that is prepared."""
+    soft, vector, change = work.vectors[SOFT], work.vectors[MOMENTUM], work.vectors[CHANGE]
+    for k in range(soft.shape[0]):
+        vector[k] = 1.0 / (1.0 + k % 7)
+    steady = 0
+    while steady < POWERS:
+        for k in range(soft.shape[0]):
+            change[k] = soft[k] * vector[k]
+        solve(system, work, change)
+        above, below, worst, most = 0.0, 0.0, 0, -1.0
+        for k in range(soft.shape[0]):
+            above += change[k] * soft[k] * change[k]
+            below += change[k] * soft[k] * vector[k]
+            if soft[k] * change[k] ** 2 > most:
+                worst, most = k, soft[k] * change[k] ** 2
+        if above > WITHIN * below:  # a quotient of Rayleigh's: the eigenvalue is no smaller
+            soft[worst], steady = 0.0, -1
+        size = np.sqrt(above)
+        if size == 0.0:
+            return
+        for k in range(soft.shape[0]):
+            vector[k] = change[k] / size
+        steady += 1
 
 
 @called
 def step(system, t, pace, state, work, left, energy):
     """One step to a time: the largest elastic energy so far, and whether Newton's method came close enough."""
     plan_at(system, t, work)
-    fresh, h = stays(work), pace.step
-    for k in range(state.shape[0]):
-        state[k, 0] += h * state[k, 1] + 0.5 * h * h * state[k, 2]
-        state[k, 1] += h * state[k, 2]
+    fresh, before = stays(work), 0.0
+    foretell(pace, state, work)
     for corrected in range(MOST_CORRECTIONS + 1):
         evaluate(system, state, work, left)
         if not fresh or corrected == REUSED:
@@ -210,11 +261,28 @@ def step(system, t, pace, state, work, left, energy):
                     work.links[r, j, SINCE] = work.links[r, j, PLANNED + VALUE]
         done = correct(system, state, pace, work, left)
         energy = max(energy, elastic_energy(system, state))
-        if done <= CLOSE * energy:
+        if corrected > 0:
+            work.newton[0] = done / before
+        if done * min(1.0, work.newton[0]) <= pace.close * energy:
+            work.newton[0] *= GROWS
             return energy, True
         if not np.isfinite(done):
             return done, False
+        before = done
     return energy, False
+
+
+@called
+def foretell(pace, state, work):
+    """Coordinates a step on, with accelerations that go on as they did."""
+    h = pace.step
+    for k in range(state.shape[0]):
+        now = state[k, 2]
+        more = now - work.vectors[BEFORE, k]
+        work.vectors[BEFORE, k] = now
+        state[k, 0] += h * state[k, 1] + 0.5 * h * h * now + pace.of_place * more
+        state[k, 1] += h * now + pace.of_rate * more
+        state[k, 2] += more
 
 
 @called
@@ -246,9 +314,6 @@ def correct(system, state, pace, work, left):
 def observe(system, t, state, work, left, record, station):
     """A station of the record."""
     evaluate(system, state, work, left)
-    for r in range(work.robots.shape[0]):
-        for g in range(2):
-            work.grips[r, g, AT] = work.links[r, 0, ACTUAL + VALUE] + system.share[r, g, 6, 0]
     if system.missed.shape[1] > 0:
         give(system, work.grips)
     for k in range(state.shape[0]):
@@ -260,7 +325,7 @@ def observe(system, t, state, work, left, record, station):
         seen[SEEN_PHASE] = work.doing[r, PHASE]
         for j in range(system.counts[r, JOINTS]):
             record.drive[station, r, j] = work.links[r, j, DRIVE]
-        missing, turn = sink(system, r, state, work, record.grips[station, r])
+        missing, turn = sink(system, r, work, record.grips[station, r])
         lever = add(shared_vector(work.robots, r, ACTUAL_TOOL), times(-1.0, shared_vector(work.links[r], 0, PLACE)))
         beyond = add(missing, cross(turn, lever))
         for k in range(3):
@@ -271,18 +336,15 @@ def observe(system, t, state, work, left, record, station):
 
 
 @called
-def sink(system, r, state, work, seen):
+def sink(system, r, work, seen):
     """What rails do under robot r, into seen (2, OF_GRIP); motion and rotation of its base that their modes miss."""
     base = work.six[MOVED]
     for o in range(work.six.shape[1]):
         base[o] = 0.0
     for g in range(2):
-        body, grip = system.body[r, g], work.grips[r, g]
-        if body >= 0:
-            sunk = grip[MISSING + 2]
-            for k in range(system.tracks[body, MODES]):
-                sunk += work.rows[r, g, 2, k] * state[system.tracks[body, FIRST] + k, 0]
-            seen[g, SUNK] = -sunk
+        grip = work.grips[r, g]
+        if system.body[r, g] >= 0:
+            seen[g, SUNK] = -(grip[MISSING + 2] + grip[UP_THERE])
             for o in range(work.six.shape[1]):
                 seen[g, o] = grip[GRIP + o]
                 for i in range(work.six.shape[1]):

@@ -1,7 +1,23 @@
 """Rails under robots: how the axis of a track moves, per mode and as a whole, and what its modes miss."""
 
+from engine.kernels.floating.vectors import no_vector
 from engine.kernels.jit import called
-from engine.kernels.robots.layout import AT, BY_ENDS, ELEMENT, ELEMENTS, FIRST, GRIP, LOADS, MISSING, MODES
+from engine.kernels.robots.layout import (
+    BY_ENDS,
+    CUBIC,
+    ELEMENT,
+    ELEMENTS,
+    FIRST,
+    GRIP,
+    INTO,
+    LOADED,
+    LOADS,
+    MISSING,
+    MODES,
+    SECOND_HALF,
+    UP_THERE,
+)
+from engine.kernels.vector import lanes_at, put_lanes, total
 
 
 @called
@@ -18,36 +34,63 @@ def element_at(system, body, s):
 
 
 @called
-def section(system, body, s, state, rows, sums):
-    """The axis of a track at a place: rows (6, n), its motion per mode B; sums (6, 6): B y, B y', B y'', B' y, B' y'
-    and B'' y of the modes of the body, derivatives of B by the place."""
+def section(system, body, s, state, work, grip):
+    """The axis of a track at a place, into work.six (6, 6): B y, B y', B y'', B' y, B' y' and B'' y of the modes of the
+    body, derivatives of the motion per mode B by the place; the place into columns of ``grip``."""
     e, x = element_at(system, body, s)
-    shapes, first = system.shapes[body, e], system.tracks[body, FIRST]
-    for i in range(rows.shape[0]):
-        q, v, a, dq, dv, ddq = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(system.tracks[body, MODES]):
-            c1, c2, c3 = shapes[1, i, k], shapes[2, i, k], shapes[3, i, k]
-            here = shapes[0, i, k] + x * (c1 + x * (c2 + x * c3))
-            slope = c1 + x * (2.0 * c2 + 3.0 * x * c3)
-            place, rate = state[first + k, 0], state[first + k, 1]
-            rows[i, k] = here
-            q += here * place
-            v += here * rate
-            a += here * state[first + k, 2]
-            dq += slope * place
-            dv += slope * rate
-            ddq += (2.0 * c2 + 6.0 * x * c3) * place
-        sums[0, i], sums[1, i], sums[2, i], sums[3, i], sums[4, i], sums[5, i] = q, v, a, dq, dv, ddq
+    first, sums, cubics = system.tracks[body, FIRST], work.six, work.cubics
+    y_low, v_low, a_low = no_vector()
+    y_high, v_high, a_high = no_vector()
+    for k in range(system.tracks[body, MODES]):
+        low, high = lanes_at(system.shapes, (body, e, k, 0)), lanes_at(system.shapes, (body, e, k, 1))
+        y, v, a = state[first + k, 0], state[first + k, 1], state[first + k, 2]
+        y_low, v_low, a_low = y_low + y * low, v_low + v * low, a_low + a * low
+        y_high, v_high, a_high = y_high + y * high, v_high + v * high, a_high + a * high
+    for row, lanes in ((0, y_low), (1, v_low), (2, a_low), (3, y_high), (4, v_high), (5, a_high)):
+        put_lanes(cubics, (CUBIC + row,), lanes)
+    for i in range(6):
+        for order in range(3):
+            c0, c1 = cubics[CUBIC + order, i], cubics[CUBIC + order, SECOND_HALF + i]
+            c2, c3 = cubics[CUBIC + 3 + order, i], cubics[CUBIC + 3 + order, SECOND_HALF + i]
+            sums[order, i] = c0 + x * (c1 + x * (c2 + x * c3))
+            if order < 2:
+                sums[3 + order, i] = c1 + x * (2.0 * c2 + 3.0 * x * c3)
+            if order == 0:
+                sums[5, i] = 2.0 * c2 + 6.0 * x * c3
+    grip[ELEMENT], grip[INTO], grip[UP_THERE] = e, x, sums[0, 2]
 
 
 @called
-def hermite(system, body, s, grip):
-    """The motion of the axis at a place by displacements and rotations of its element's ends, into columns of ``grip``:
-    cubics of bending, u_y' = r_z and u_z' = -r_y."""
-    e, x = element_at(system, body, s)
+def push_on(system, body, grip, work, left):
+    """The wrench of a robot on a rail, in columns of ``grip``, added to what is left (N) of the modes."""
+    e, power, cubics = int(grip[ELEMENT]), 1.0, work.cubics
+    for row in range(LOADED, LOADED + 2):
+        for half in (0, SECOND_HALF):
+            for i in range(6):
+                cubics[row, half + i] = power * grip[GRIP + i]
+            power *= grip[INTO]
+    low, high = lanes_at(cubics, (LOADED,)), lanes_at(cubics, (LOADED + 1,))
+    for k in range(system.tracks[body, MODES]):
+        by = low * lanes_at(system.shapes, (body, e, k, 0)) + high * lanes_at(system.shapes, (body, e, k, 1))
+        left[system.tracks[body, FIRST] + k] += total(by)
+
+
+@called
+def along_track(system, body, grip, i, k):
+    """Motion i of the axis of a track, where a robot stands on it, by mode k."""
+    e, x, half = int(grip[ELEMENT]), grip[INTO], SECOND_HALF + i
+    cubic = system.shapes[body, e, k]
+    return cubic[0, i] + x * (cubic[0, half] + x * (cubic[1, i] + x * cubic[1, half]))
+
+
+@called
+def hermite(system, body, grip):
+    """The motion of the axis at the place of ``grip`` by displacements and rotations of its element's ends, into other
+    columns of it: cubics of bending, u_y' = r_z and u_z' = -r_y."""
+    e, x = int(grip[ELEMENT]), grip[INTO]
     length = system.ends[body, e + 1] - system.ends[body, e]
     u = x / length
-    for k in range(BY_ENDS, AT):
+    for k in range(BY_ENDS, ELEMENT):
         grip[k] = 0.0
     shapes = (1.0 - u * u * (3.0 - 2.0 * u), x * (1.0 - u) ** 2, u * u * (3.0 - 2.0 * u), x * u * (u - 1.0))
     slopes = (6.0 * u * (u - 1.0) / length, (1.0 - u) * (1.0 - 3.0 * u), 6.0 * u * (1.0 - u) / length, u * (3 * u - 2))
@@ -60,7 +103,6 @@ def hermite(system, body, s, grip):
         grip[60 + first + 1], grip[60 + first + 5] = slope, turn_slope
         grip[24 + first + 2], grip[24 + first + 4] = shape, -turn
         grip[48 + first + 2], grip[48 + first + 4] = -slope, turn_slope
-    grip[ELEMENT] = e
 
 
 @called
@@ -71,7 +113,7 @@ def give(system, grips):
         for g in range(2):
             if system.body[r, g] >= 0:
                 own = grips[r, g]
-                hermite(system, system.body[r, g], own[AT], own)
+                hermite(system, system.body[r, g], own)
                 for k in range(12):
                     own[LOADS + k] = 0.0
                     for i in range(6):
