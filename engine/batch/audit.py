@@ -5,7 +5,7 @@ references of pilots have.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -40,6 +40,9 @@ MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may b
 TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 to 49 with 32 and 16 modes
 
 
+_NONE = np.zeros((0, 0)), np.zeros((0, 0))
+
+
 class Audit(NamedTuple):
     """n variants that were audited, by their flat numbers: observed and told errors, and those of the truth itself (R,
     n); variants whose truth is not known are left out."""
@@ -50,6 +53,14 @@ class Audit(NamedTuple):
     doubt: Array
     left_out: int
 
+    @classmethod
+    def of_each(cls, found: Mapping[int, tuple[Array, Array] | None]) -> Audit:
+        """Observed and told errors (R,) of every variant; None where they are not known."""
+        known = {variant: pair for variant, pair in sorted(found.items()) if pair is not None}
+        observed, told = (np.stack([pair[k] for pair in known.values()], axis=1) for k in (0, 1)) if known else _NONE
+        variants = np.array(list(known), dtype=np.int64)
+        return cls(variants, observed, told, np.full_like(observed, np.nan), len(found) - len(known))
+
 
 def sampled(plan: Plan) -> Counts:
     """The variants to audit, drawn at random by the study alone: where their number is left open 1 % of them, 16 to
@@ -58,17 +69,24 @@ def sampled(plan: Plan) -> Counts:
     if wanted == 0:
         return np.zeros(0, dtype=np.int64)
     pilots = np.zeros(0, dtype=np.int64) if plan.choice is None else plan.choice.pilots
-    drawn = np.random.default_rng(SEED).permutation(plan.size)
-    others = drawn[~np.isin(drawn, pilots)]
-    count = audit_size(plan) if wanted == "auto" else int(wanted)
-    return np.sort(others[:count])
+    return drawn(plan.size, audit_size(plan) if wanted == "auto" else int(wanted), pilots)
+
+
+def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
+    """So many of ``size`` variants, none of some of them."""
+    everyone = np.random.default_rng(SEED).permutation(size)
+    return np.sort(everyone[~np.isin(everyone, but)][:count])
 
 
 def audit_size(plan: Plan) -> int:
     """How many variants are audited where the study leaves that open."""
-    count = int(np.clip(np.rint(PART * plan.size), min(FEWEST, plan.size), MOST))
-    allowed = max(MOST_TIME * plan.seconds, FREE_SECONDS)
-    while count and _seconds(plan, count) > allowed:
+    return enough(plan.size, plan.seconds, partial(_seconds, plan))
+
+
+def enough(size: int, whole: float, seconds: Callable[[int], float]) -> int:
+    """How many of ``size`` variants are audited in a run that takes some time (s); seconds: of an audit of so many."""
+    count = int(np.clip(np.rint(PART * size), min(FEWEST, size), MOST))
+    while count and seconds(count) > max(MOST_TIME * whole, FREE_SECONDS):
         count //= 2
     return count
 

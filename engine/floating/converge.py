@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,7 +76,7 @@ def levels(study: Study, duration: float) -> Iterator[Level]:
     every, factor = int(np.ceil(coarsest / STATIONS)), 1
     for level in range(LEVELS):
         modes = FIRST_MODES * 2**level
-        if (fixed != "auto" and level > 1) or (is_open and modes > MOST_MODES):
+        if is_open and modes > MOST_MODES:
             return
         own = build(study, modes) if is_open and level else model
         # more modes are faster ones: a scheme with a limit needs more than twice the steps for twice as many
@@ -127,7 +128,7 @@ def converge(
     V = values.size
     found: Outcome | None = None
     active = np.arange(V)
-    for level in levels(study, longest):
+    for level in islice(levels(study, longest), LEVELS if study.solver.steps == "auto" else 2):
         if halted():
             raise Halted
         model, own = level.model, values.part(active)
@@ -156,6 +157,32 @@ def converge(
     status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
     error[:, lost(found.status)] = np.nan
     return Converged(found, error, modes, steps, scheme, gravest(status, found.status))
+
+
+def observed(
+    study: Study,
+    values: VariantValues,
+    duration: Array,
+    longest: float,
+    halted: Callable[[], bool] = lambda: False,
+) -> tuple[Array, Array]:
+    """What `converge` reports beside one level beyond that of each variant: how far results are off, and the errors
+    told of them (R, V); NaN where there is no such level, or no values. Raises Halted."""
+    found = converge(study, values, duration, longest, halted)
+    apart, left = np.full_like(found.error, np.nan), ~lost(found.status)
+    for level in levels(study, longest):
+        lanes = np.flatnonzero(left & (found.steps < level.steps))
+        if halted():
+            raise Halted
+        if lanes.size:
+            beyond = march(
+                level.model, values.part(lanes), duration[lanes], level.steps, _stations(level), weights(level.scheme)
+            )
+            apart[:, lanes] = differences(level.model, _part(found.outcome, lanes), outcome(level.model, beyond))
+            left[lanes] = False
+        if not left.any():
+            break
+    return np.where(np.isfinite(apart), apart, np.nan), found.error
 
 
 def _stations(level: Level) -> Counts:

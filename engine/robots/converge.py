@@ -156,11 +156,13 @@ def marched(level: Level, zero: str) -> tuple[Record, Outcome]:
     return record, outcome(level.model, record, status, zero)
 
 
-def observed(study: Study, duration: float | None, after: float, zero: str) -> tuple[Array, Array] | None:
+def observed(
+    study: Study, duration: float | None, after: float, zero: str, halted: Callable[[], bool] = lambda: False
+) -> tuple[Array, Array] | None:
     """What a study without sweep reports, beside one level beyond: how far each result (results,) is off, and the error
-    told of it; None where there is no such level, or no values."""
+    told of it; None where there is no such level, or no values. Raises Halted."""
     ladder = Ladder.of(study, duration, after)
-    found = climb(ladder, zero)
+    found = climb(ladder, zero, halted)
     beyond = ladder.level(found.level + 1)
     if beyond is None or not found.status.values_kept:
         return None

@@ -72,7 +72,10 @@ def _audit(seen: Forecast) -> str:
     wanted = seen.plan.study.solver.audit
     if wanted == "auto" and not seen.plan.converges and seen.plan.choice is None:
         return ""
-    variants = audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size)
+    return _audited(audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size), wanted)
+
+
+def _audited(variants: int, wanted: int | str) -> str:
     if variants:
         return f" Then {counted(variants, 'variant')} are audited." if variants > 1 else " Then 1 variant is audited."
     return (
@@ -99,6 +102,8 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
         f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
         f"{size(parts.disk_bytes)} on the disk."
     )
+    if kind.audit_seconds:
+        cost += _audited(parts.audited, study.solver.audit)
     return Preview(tuple(table for table in tables if table.rows), cost, tuple(parts.remarks))
 
 

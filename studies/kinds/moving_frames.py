@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from pydantic import Field
@@ -10,14 +10,14 @@ from pydantic import Field
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Time
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.variables import declare
 from studies.moving import findings
-from studies.moving.parts import gather
+from studies.moving.parts import AUDIT_SECONDS, gather
 from studies.moving.variables import RESULTS
-from studies.protocol.parts import Piece
+from studies.protocol.parts import Piece, Work
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.results import Results
 
@@ -30,6 +30,12 @@ class Question(Spec):
     duration: Time = Field(gt=0)
 
 
+def _duration(study: Study) -> Callable[[Mapping[str, Array], int], Array]:
+    """(V,) s of variants by their columns."""
+    seconds = question_of(study, Question).duration
+    return lambda columns, size: np.full(size, seconds)
+
+
 class MovingFrames(PiecedKind):
     """The kind "moving-frames"."""
 
@@ -38,6 +44,7 @@ class MovingFrames(PiecedKind):
     question = "How do the bodies and their carriages move, and what do they feel?"
     settings = Question
     sweeps = True
+    audit_seconds = AUDIT_SECONDS
     moves_frames = True
     drawn_by = "studies.pictures.moving_frames"
 
@@ -57,12 +64,12 @@ class MovingFrames(PiecedKind):
     def pieces(self, study: Study) -> Sequence[Piece]:
         from studies.moving.parts import pieces
 
-        seconds = question_of(study, Question).duration
+        return pieces(study, _duration(study))
 
-        def duration(columns: Mapping[str, Array], size: int) -> Array:
-            return np.full(size, seconds)
+    def again(self, study: Study, variants: Counts, work: Work) -> Mapping[int, tuple[Array, Array] | None]:
+        from studies.moving.parts import again
 
-        return pieces(study, duration)
+        return again(study, _duration(study), variants, work)
 
     def remarks(self, study: Study) -> Sequence[str]:
         from studies.moving.parts import remarks

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from engine.scene.study import Study
-    from studies.protocol.parts import Piece
+    from results_schema.arrays import Array, Counts
+    from studies.protocol.parts import Piece, Work
     from studies.results.results import Results
 
 declare("portal", *RESULTS)
@@ -30,6 +31,7 @@ class Portal(PiecedKind):
     settings = Question
     sweeps = True
     moves_robots = True
+    audit_seconds = 2.2  # levels of 12, 24, 48 and 96 steps a period after those of 12, 24 and 48
     drawn_by = "studies.pictures.portal"
 
     def check(self, study: Study) -> None:
@@ -49,6 +51,11 @@ class Portal(PiecedKind):
         from studies.robots.parts import pieces
 
         return pieces(study, question_of(study, Question))
+
+    def again(self, study: Study, variants: Counts, work: Work) -> Mapping[int, tuple[Array, Array] | None]:
+        from studies.robots.parts import again
+
+        return again(study, question_of(study, Question), variants, work)
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         from studies.robots.parts import gather

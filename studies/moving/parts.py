@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 PIECE_SECONDS = 8.0  # of one piece, about
 STEP_SECONDS, COORDINATE_SECONDS = 5e-7, 3e-7  # of a step, and for each coordinate besides; for sizes of pieces only
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
+AUDIT_SECONDS = 4.0  # of an audited variant over one of a run: a level beyond, in lanes of which most stand empty
 NEWTON_STEPS = 4  # from a straight line, for roots to rounding
 LOOKED_AT = 32  # scenes, and variants of each, for what is said beforehand
 BLOCKS = 4  # of lanes in one job at most: those that need more steps fill the lanes anew
@@ -141,6 +142,32 @@ def _march(
     run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
     parts = [found[first] for first in sorted(found)]
     return _plain({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+def again(
+    study: Study, duration: Callable[[Mapping[str, Array], int], Array], variants: Counts, work: Work
+) -> dict[int, tuple[Array, Array] | None]:
+    """Observed and told errors of some variants, scene by scene on threads."""
+    from engine.batch.execution import run_jobs
+    from engine.floating.converge import observed
+    from engine.scene.sweep import expand
+    from engine.scene.variants import VariantValues
+
+    cases, found = expand(study), dict[int, tuple[Array, Array] | None]()
+
+    def job(scene: Scene) -> None:
+        own = scene.variants[np.isin(scene.variants, variants)]
+        longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
+        columns = cases.columns_of(own)
+        values = VariantValues(scene.study, columns, own.size)
+        apart, told = observed(scene.study, values, duration(columns, own.size), longest, work.halted)
+        for lane, variant in enumerate(own.tolist()):
+            known = bool(np.isfinite(apart[:, lane]).any())
+            found[variant] = (apart[:, lane], told[:, lane]) if known else None
+
+    ours = [scene for scene in scenes(study, cases) if np.isin(scene.variants, variants).any()]
+    run_jobs([partial(job, scene) for scene in ours], work.threads)
+    return found
 
 
 def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Counts) -> dict[str, NDArray[Any]]:

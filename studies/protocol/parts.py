@@ -249,7 +249,7 @@ class Pieces:
         if study.output.unreduced:
             what = "a study that measures has no variants to compute again"
             raise study.source.fault("output.unreduced", what, expected="0")
-        if study.solver.audit not in ("auto", 0):
+        if study.solver.audit not in ("auto", 0) and not kind.audit_seconds:
             what = "a study of this kind marches no variants to audit"
             raise study.source.fault("solver.audit", what, expected='0 or "auto"')
         self.kind, self.study = kind, study
@@ -257,6 +257,18 @@ class Pieces:
         self.remarks = kind.remarks(study)
         self.names: Sequence[str] = [piece.name for piece in self.pieces]
         self.disk_bytes = PIECES_BYTES + 2 * sum(piece.size for piece in self.pieces)
+
+    @property
+    def audited(self) -> int:
+        """How many variants are computed again."""
+        from engine.batch.audit import enough
+        from engine.scene.sweep import expand
+
+        wanted, cases = self.study.solver.audit, expand(self.study)
+        if wanted != "auto" or not self.kind.audit_seconds:
+            return 0 if wanted == "auto" else min(int(wanted), cases.size)
+        whole = sum(piece.seconds for piece in self.pieces)
+        return enough(cases.size, whole, lambda count: count * self.kind.audit_seconds * whole / cases.size)
 
     def compute(self, store: Store, work: Work) -> int:
         """Compute the pieces that the store does not hold, each beside this thread, so that a request to stop is heard

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from engine.observation.cycle_reduction import Reduction
     from engine.scene.study import Study
     from engine.study_file.spec import Spec
+    from results_schema.arrays import Array, Counts
     from studies.pictures.common.figures import Figure
     from studies.protocol.parts import Parts, Piece
     from studies.results.results import Index, Results
@@ -102,9 +103,13 @@ class Kind:
 
 
 class PiecedKind(Kind, ABC):
-    """A kind that is computed in pieces of its own instead of by a march of variants."""
+    """A kind that is computed in pieces of its own instead of by a march of variants.
+
+    audit_seconds: of an audited variant, over those of one in a run; 0 where none is audited.
+    """
 
     sweeps = False
+    audit_seconds = 0.0
 
     def check_tables(self, study: Study) -> None:
         if study.sweep.axes and not self.sweeps:
@@ -128,6 +133,11 @@ class PiecedKind(Kind, ABC):
     def remarks(self, study: Study) -> Sequence[str]:
         """What a user should know before believing the study."""
         return ()
+
+    def again(self, study: Study, variants: Counts, work: Work) -> Mapping[int, tuple[Array, Array] | None]:
+        """Some variants computed again, with more of what the study leaves open: the error observed and that told of
+        every result (R,), of each; None where there is nothing to compare. Raises Halted."""
+        return {}
 
     @abstractmethod
     def pieces(self, study: Study) -> Sequence[Piece]:

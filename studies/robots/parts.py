@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.arrays import Counts
+from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 from studies.protocol.parts import Piece, Work, usual
 
@@ -76,6 +76,22 @@ def _march(study: Study, question: Question, cases: Cases, variants: Counts, wor
     return _plain(
         arrays | {"number": variants, "kept": np.array([v for v in variants.tolist() if v in kept], np.int64)}
     )
+
+
+def again(study: Study, question: Question, variants: Counts, work: Work) -> dict[int, tuple[Array, Array] | None]:
+    """Observed and told errors of some variants, on threads."""
+    from engine.batch.execution import run_jobs
+    from engine.robots.converge import observed
+    from engine.scene.sweep import expand
+
+    cases, found = expand(study), dict[int, tuple[Array, Array] | None]()
+
+    def job(variant: int) -> None:
+        own = cases.study_of(study, variant)
+        found[variant] = observed(own, question.duration, question.after, question.zero, work.halted)
+
+    run_jobs([partial(job, int(variant)) for variant in variants], work.threads)
+    return found
 
 
 def _numbers(converged: Converged) -> dict[str, NDArray[Any]]:

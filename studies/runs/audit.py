@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from studies.results.results import Results
 if TYPE_CHECKING:
     from engine.batch.audit import Audit
     from engine.batch.plan import Plan
+    from engine.scene.sweep import Cases
+    from studies.protocol.parts import Pieces
 
 
 GROUP = "/audit"
@@ -43,12 +45,36 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
 
     choose(plan, work.threads, work.stop.event)
     variants = sampled(plan)
-    kept = ~lost(_flat(plan, dataset["status"])[variants])
+    kept = ~lost(_flat(plan.cases, dataset["status"])[variants])
     found = _on_threads(plan, variants[kept], work)
     work.check()
     if not found.variants.size:
         return {}
-    return {GROUP: _dataset(plan, dataset, found, int(np.count_nonzero(~kept)) + found.left_out)}
+    left_out = int(np.count_nonzero(~kept)) + found.left_out
+    return {GROUP: _group(plan.cases, dataset, found.variants, _of_plan(plan, dataset, found), left_out)}
+
+
+def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
+    """The same of a study whose kind computes it in pieces."""
+    from engine.batch.audit import Audit, drawn
+    from engine.scene.sweep import expand
+    from engine.scene.variants import VariantValues
+
+    cases = expand(parts.study)
+    variants = drawn(cases.size, parts.audited)
+    kept = ~lost(_flat(cases, dataset["status"])[variants])
+    try:
+        found = Audit.of_each(parts.kind.again(parts.study, variants[kept], work)) if kept.any() else None
+    except Halted:
+        work.check()
+        raise
+    work.check()
+    if found is None or not found.variants.size:
+        return {}
+    values = VariantValues(parts.study, cases.columns_of(found.variants), found.variants.size)
+    errors = _Errors(found.observed.T, found.told.T, np.broadcast_to(values.tighter, found.variants.shape))
+    left_out = int(np.count_nonzero(~kept)) + found.left_out
+    return {GROUP: _group(cases, dataset, found.variants, errors, left_out)}
 
 
 def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
@@ -63,34 +89,46 @@ def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
         raise
 
 
-def _flat(plan: Plan, array: xr.DataArray) -> NDArray[Any]:
+def _flat(cases: Cases, array: xr.DataArray) -> NDArray[Any]:
     """(V,) a result of every variant by its flat number."""
-    return np.asarray(array.transpose(*plan.cases.dims).values).reshape(plan.size)
+    return np.asarray(array.transpose(*cases.dims).values).reshape(cases.size)
 
 
-def _dataset(plan: Plan, dataset: xr.Dataset, found: Audit, left_out: int) -> xr.Dataset:
+class _Errors(NamedTuple):
+    """Of n audited variants: observed and told (n, R), and solver.tolerance over that of the study (n,)."""
+
+    observed: Array
+    told: Array
+    tighter: Array
+
+
+def _of_plan(plan: Plan, dataset: xr.Dataset, found: Audit) -> _Errors:
     from engine.accuracy.results import results_of
 
     names, derived = [result.name for result in results_of(plan.asked)], derived_from(plan.study)
     whole = [str(name) for name in dataset["result"].values]
     rows = [[names.index(own) for own in ([name] if name in names else derived[name])] for name in whole]
     observed = np.where(np.isfinite(found.observed), found.observed, np.nan)
+    seen, told = (np.stack([errors[own].max(axis=0) for own in rows], axis=1) for errors in (observed, found.told))
+    return _Errors(seen, told, plan.cases_tolerance[found.variants])
+
+
+def _group(cases: Cases, dataset: xr.Dataset, variants: Counts, errors: _Errors, left_out: int) -> xr.Dataset:
+    """The group with its axes."""
     arrays: dict[str, NDArray[Any]] = {
-        "observed_error": np.stack([observed[own].max(axis=0) for own in rows], axis=1),
-        "estimated_error": np.stack([found.told[own].max(axis=0) for own in rows], axis=1),
+        "observed_error": errors.observed,
+        "estimated_error": errors.told,
         "tolerance": np.asarray(dataset["tolerance"].values),
-        "tolerance_asked": plan.cases_tolerance[found.variants],
-        "variant_status": _flat(plan, dataset["status"])[found.variants],
+        "tolerance_asked": errors.tighter,
+        "variant_status": _flat(cases, dataset["status"])[variants],
         "left_out": np.array(left_out),
     }
     declared = {variable.name: variable for variable in declarations(GROUP)}
-    own = {
-        axis.name: ("sample", axis.values[plan.cases.positions(found.variants)[axis.dim]], dataset[axis.name].attrs)
-        for axis in plan.cases.axes
-    }
+    positions = cases.positions(variants)
+    own = {axis.name: ("sample", axis.values[positions[axis.dim]], dataset[axis.name].attrs) for axis in cases.axes}
     coordinates = {
-        "sample": ("sample", found.variants, axes()["sample"].attributes()),
-        "result": ("result", whole, axes()["result"].attributes()),
+        "sample": ("sample", variants, axes()["sample"].attributes()),
+        "result": ("result", dataset["result"].values, axes()["result"].attributes()),
     }
     return xr.Dataset(
         {name: declared[name].holding(array) for name, array in arrays.items()},

@@ -28,12 +28,13 @@ from studies.protocol.stopping import Stop
 from studies.protocol.study import compared, kind_of
 from studies.results.results import Results
 from studies.runs.archived import with_first_frequency
-from studies.runs.audit import GROUP, audit_group
+from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces
 from studies.runs.identity import check_unchanged, files_of, run_key
 from studies.runs.provenance import attributes
 from studies.runs.unreduced import unreduced_group
 
 Progress = Callable[[int, int], None]
+AUDITING = "audit: some variants once more with more of everything"
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,7 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
     from engine.batch.dataset import model_groups
 
     plan = parts.plan
-    work.stage("audit: some variants once more with more of everything")
+    work.stage(AUDITING)
     audit = audit_group(plan, root, work)
     models = with_first_frequency(model_groups(plan.base), Results(root, plan.study))
     return models | unreduced_group(plan, root, work.check) | audit
@@ -124,10 +125,12 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
 
 @groups_beside.register
 def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.Dataset]:
-    """The bodies of the scene without its sweep."""
+    """The bodies of the scene without its sweep, and the audit."""
     from engine.batch.dataset import model_groups
 
-    return model_groups(base_scene(parts.study))
+    if parts.audited:
+        work.stage(AUDITING)
+    return model_groups(base_scene(parts.study)) | audit_group_of_pieces(parts, root, work)
 
 
 def _write(run: _Run, root: xr.Dataset, store: PartStore, groups: Mapping[str, xr.Dataset]) -> float:
