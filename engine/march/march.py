@@ -89,7 +89,7 @@ class March:
         """The impulse and the new accelerations of a segment's event, and its first station."""
         if not self.unseen(segment, before):
             return
-        model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment))
+        model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment), table.numbers)
         if segment.strikes:
             active = np.zeros(model.ties, dtype=np.bool_)
             active[: len(model.carriages)] = segment.active[: len(model.carriages)]
@@ -107,7 +107,7 @@ class March:
 
     def step(self, segment: Segment, table: SegmentTable, observed: Observed) -> Codes:
         """The steps of a segment, from its station 0, which is settled and seen."""
-        stepped = self.lanes.steps_of(self.step_size(segment))
+        stepped = self.lanes.steps_of(self.step_size(segment), table.numbers)
         scheme = self.tables.scheme
         return step_kernel(table.ties)(table.ties, stepped, self.state, *observed, scheme, segment.first)
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
-from engine.model import track
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along, StationPath, ways
 from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
-from engine.model.track import tabulate_ties
+from engine.model.track import closed, tie_rows, ties_of
 from engine.observation import kinks, signals
 from engine.observation.contact_forces import contact_forces
 from engine.observation.readings import Sensor
@@ -35,8 +34,9 @@ SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
 
 class SegmentTable(NamedTuple):
-    """What the march needs of one segment besides its lanes."""
+    """What the march needs of one segment besides its lanes. numbers: of the scene's ties that count in it."""
 
+    numbers: Counts
     ties: Ties
     watch: Observation
     unrecorded: Observation
@@ -44,7 +44,7 @@ class SegmentTable(NamedTuple):
     @property
     def bytes(self) -> int:
         """Size in memory."""
-        return sum(array.nbytes for part in self for array in part)
+        return sum(array.nbytes for part in self[1:] for array in part)
 
 
 class StaticUnit(NamedTuple):
@@ -153,8 +153,9 @@ class SceneTables:
 
     def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
         along = self._ways(segments)
+        numbers = ties_of(self.model, np.any([segment.active for segment in segments], axis=0))
         if not missed:
-            found = residual(self.model, along), tabulate_missed(self.model, self.signals, along)
+            found = residual(self.model, along, numbers), tabulate_missed(self.model, self.signals, along, numbers)
             if self.timeline.repeats:
                 missed.extend(found)
         else:
@@ -164,18 +165,17 @@ class SceneTables:
         unrecorded, others = (
             (last_signals(watch, contacts), self.signals[-contacts:]) if contacts else (watch, self.signals)
         )
-        ties = tabulate_ties(self.model, along, self.scheme, found[0])
+        rows = tie_rows(self.model, along, numbers, found[0])
         if len(segments) == 1:
-            return [SegmentTable(ties, watch, unrecorded)]
-        ends = np.cumsum([segment.steps + 1 for segment in segments])
-        return [
-            SegmentTable(
-                track.along_part(ties, self.model, self.scheme, part),
-                signals.along_part(watch, self.signals, part),
-                signals.along_part(unrecorded, others, part),
-            )
-            for part in map(slice, [0, *ends[:-1]], ends)
-        ]
+            return [SegmentTable(numbers, closed(self.model, rows, self.scheme), watch, unrecorded)]
+        tables, ends = list[SegmentTable](), np.cumsum([segment.steps + 1 for segment in segments])
+        for segment, part in zip(segments, map(slice, [0, *ends[:-1]], ends), strict=True):
+            own = ties_of(self.model, segment.active)
+            places = np.searchsorted(numbers, own)
+            ties = closed(self.model, rows.part(part, own), self.scheme)
+            watched = signals.along_part(watch, self.signals, part, places)
+            tables.append(SegmentTable(own, ties, watched, signals.along_part(unrecorded, others, part, places)))
+        return tables
 
     def _missed_of(self, key: SegmentKey) -> Missed:
         """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate

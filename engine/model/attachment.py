@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.model.ties import Attachment
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import BodyPart, SceneModel
@@ -96,20 +96,20 @@ def along_shapes(part: BodyPart, s: Array, highest: int = 0) -> Array:
     return part.modal.along.derivatives(s, range(highest + 1))
 
 
-def residual(model: SceneModel, along: Along) -> Array:
-    """(S, ties, ties) flexibility that the kept modes miss between the contacts of bodies that ride and every tie, m/N;
-    (0, 0, 0) where there are none, or no static correction."""
-    ties = model.ties
-    felt = [r for r, spring in enumerate(model.springs, start=model.first_spring) if spring.held and not spring.rigid]
+def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
+    """(S, ties, ties) flexibility that the kept modes miss between the contacts of bodies that ride and some ties, by
+    their numbers, m/N; (0, 0, 0) where there are none, or no static correction."""
+    springs = dict(enumerate(model.springs, start=model.first_spring))
+    felt = [place for place, r in enumerate(ties) if r in springs and springs[r].held and not springs[r].rigid]
     if not felt or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))
-    found, known = np.zeros((along[0].s.size, ties, ties)), dict[tuple[Attachment, Attachment], Array]()
+    found, known = np.zeros((along[0].s.size, ties.size, ties.size)), dict[tuple[Attachment, Attachment], Array]()
     for r in felt:
-        for s in range(ties):
+        for s in range(ties.size):
             if s in felt and s < r:
                 found[:, r, s] = found[:, s, r]
                 continue
-            for one, other in shared(model, r, s, along):
+            for one, other in shared(model, ties[r], ties[s], along):
                 first, second = sorted((one.unit, other.unit), key=str)  # dead loads and springs hold the same places
                 if (first, second) not in known:
                     known[first, second] = residual_flexibility(model, first, second, along)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import LANES, Lanes
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
@@ -77,16 +77,17 @@ class LaneTable:
     time_scale: Array
     gravity: Array
 
-    def steps_of(self, step: Array) -> Lanes:
-        """The kernels' lanes for a step h (blocks, LANES) in s."""
+    def steps_of(self, step: Array, ties: Counts | None = None) -> Lanes:
+        """The kernels' lanes for a step h (blocks, LANES) in s; ties: numbers of some, where not of all."""
         h = step[:, None, :]
+        own = np.arange(self.mass.shape[1]) if ties is None else ties
         return Lanes(
             stiffness=(self.omega[:, None] * h) ** 2,
             damping=self.rates * h,
             inverse_modal_mass=self.inverse_modal_mass,
-            coupling_mass=self.mass + self.joint + self.damper * h,
-            coupling_stiffness=self.spring * h**2,
-            load=self.weight * h**2,
+            coupling_mass=(self.mass + self.joint).take(own, 1) + self.damper.take(own, 1) * h,
+            coupling_stiffness=self.spring.take(own, 1) * h**2,
+            load=self.weight.take(own, 1) * h**2,
             gravity=self.gravity,
             step=step,
         )

@@ -5,6 +5,7 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
 from engine.model.attachment import along_shapes, holds, residual, shape_derivatives
 from engine.model.attachment import rows as shape_rows
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.kernels.layout import Alpha, Newmark
@@ -24,50 +25,84 @@ if TYPE_CHECKING:
     from engine.model.timeline import Segment
 
 
-def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha, missed: Array | None = None) -> Ties:
-    """Rows of every tie at every station; row w of station 0 holds P alone, for the start of a segment (`along_part`
-    for several in a row). missed: of `attachments.residual`, where it is known."""
-    stations, modes = along[0].s.size, model.omega.size
-    rows, reaches = np.zeros((stations, modes, model.ties, 4)), np.zeros((modes, model.ties), dtype=np.bool_)
-    drive, level = np.zeros((stations, model.ties)), np.zeros((stations, model.ties))
-    for r, attachments in enumerate(model.attachments):
-        for attachment in attachments:
+def ties_of(model: SceneModel, active: Sequence[bool]) -> Counts:
+    """Numbers of the ties that count where riders are on their bodies or not (``active``): those of carriages that are
+    off theirs push nothing. No table is without any, so the first one stays where all are."""
+    on = [any(active[load.rider] for load in carriage.loads) for carriage in model.carriages]
+    on[0] |= not any(on)
+    others = [True] * (model.first_push - len(on))
+    return np.flatnonzero([*on, *others, *(active[push.carriage] for push in model.pushes)])
+
+
+class TieRows(NamedTuple):
+    """Some ties, by their numbers, at the stations of one or several segments: rows, drive, level and residual as of
+    `engine.kernels.layout.Ties`, without what a scheme makes of them."""
+
+    ties: Counts
+    rows: Array
+    drive: Array
+    level: Array
+    residual: Array
+
+    def part(self, stations: slice, ties: Counts) -> TieRows:
+        """Some of the stations, and some of the ties."""
+        own = np.searchsorted(self.ties, ties)
+        rows, drive, level, missed = self.rows[stations], self.drive[stations], self.level[stations], self.residual
+        if own.size < self.ties.size:
+            rows, drive, level = rows.take(own, 2), drive.take(own, 1), level.take(own, 1)
+            missed = among(missed, own)
+        return TieRows(ties, rows, drive, level, missed[stations])
+
+
+def among(missed: Array, ties: Counts) -> Array:
+    """(stations, ..., ties, ties) residual flexibilities between some of the ties."""
+    return missed.take(ties, 1).take(ties, 2) if missed.size else missed
+
+
+def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None = None) -> TieRows:
+    """Rows of some ties at every station. missed: of `attachments.residual`, where it is known."""
+    stations = along[0].s.size
+    rows, drive = np.zeros((stations, model.omega.size, ties.size, 4)), np.zeros((stations, ties.size))
+    level = np.zeros_like(drive)
+    for place, r in enumerate(ties):
+        for attachment in model.attachments[r]:
             if holds(attachment, along):
                 motion = _motion(model, r, attachment, along)
                 shapes = shape_derivatives(model, attachment, along, motion.highest)
-                add_attachment(
-                    rows, r, model.bodies[attachment.body].modes.start, attachment.factor, shapes, motion.factors
-                )
-    for r, carriage in enumerate(model.carriages):
-        if along[r].active and carriage.inertia == "mass":
-            drive[:, r] = _curved_sag(model, carriage.attachments[0], along)
-    for r, spring in enumerate(model.springs, start=model.first_spring):
-        if spring.mode is not None:
-            rows[:, spring.mode, r, FORCE] = -1.0
-            rows[:, spring.mode, r, RATE] = -1.0 if spring.damped else 0.0
-        if along[spring.rider].active:
-            under = _sag_under(model, spring, model.attachments[r][0], along)
-            drive[:, r], level[:, r] = np.where(along[spring.rider].on, under, 0.0)
-    for r, push in enumerate(model.pushes, start=model.first_push):
-        if along[push.carriage].active:
-            _add_push(rows, model, r, push, along[push.carriage])
-    inertial, springs = _kinds(model)
-    close_rows(rows, inertial, scheme.beta, scheme.gamma, reaches)
-    damped = [False] * len(model.carriages) + [True for _ in model.dampers] + [s.damped for s in model.springs]
-    moves = inertial | np.array([*damped, *(False for _ in model.pushes)], dtype=np.bool_)
+                first = model.bodies[attachment.body].modes.start
+                add_attachment(rows, place, first, attachment.factor, shapes, motion.factors)
+        if r >= model.first_push:
+            push = model.pushes[r - model.first_push]
+            if along[push.carriage].active:
+                _add_push(rows, model, place, push, along[push.carriage])
+        elif r >= model.first_spring:
+            spring = model.springs[r - model.first_spring]
+            if spring.mode is not None:
+                rows[:, spring.mode, place, FORCE] = -1.0
+                rows[:, spring.mode, place, RATE] = -1.0 if spring.damped else 0.0
+            if along[spring.rider].active:
+                under = _sag_under(model, spring, model.attachments[r][0], along)
+                drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
+        elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
+            drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
+    return TieRows(ties, rows, drive, level, residual(model, along, ties) if missed is None else missed)
+
+
+def closed(model: SceneModel, found: TieRows, scheme: Newmark | Alpha) -> Ties:
+    """Ties along a segment with the implicit part of their rows, w, in place; that of station 0 holds P alone."""
+    inertial, moves, springs = (kind[found.ties] for kind in _kinds(model))
+    reaches = np.zeros(found.rows.shape[1:3], dtype=np.bool_)
+    close_rows(found.rows, inertial, scheme.beta, scheme.gamma, reaches)
     prescribed, reactive = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
     unity[model.first_spring : model.first_push] = [0.0 if spring.rigid else 1.0 for spring in model.springs]
-    missed = residual(model, along) if missed is None else missed
-    return Ties(rows, drive, level, reactive, prescribed, moves, springs, missed, unity, reaches)
+    own = found.rows, found.drive, found.level
+    return Ties(*own, reactive, prescribed, moves, springs, found.residual, unity[found.ties], reaches)
 
 
-def along_part(ties: Ties, model: SceneModel, scheme: Newmark | Alpha, part: slice) -> Ties:
-    """The same along some of the stations, as a segment of their own."""
-    rows, reaches = ties.rows[part], np.zeros_like(ties.reaches)
-    close_rows(rows, _kinds(model)[0], scheme.beta, scheme.gamma, reaches)
-    drive, level, missed = (array[part] for array in (ties.drive, ties.level, ties.residual))
-    return ties._replace(rows=rows, drive=drive, level=level, residual=missed, reaches=reaches)
+def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha) -> Ties:
+    """All ties along a segment."""
+    return closed(model, tie_rows(model, along, np.arange(model.ties)), scheme)
 
 
 def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: StationPath) -> None:
@@ -79,14 +114,16 @@ def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: Stati
     rows[:, -1, r, CURVE] = way.dds
 
 
-def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Per tie, whether its acceleration enters its force, and whether its gap does."""
+def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Per tie, whether its acceleration enters its force, whether any of its kinematics do, and whether its gap does."""
     inertial = [carriage.inertia != "force" for carriage in model.carriages]
     inertial += [False for _ in model.dampers] + [spring.rigid for spring in model.springs]
     inertial += [True for _ in model.pushes]
+    damped = [False for _ in model.carriages] + [True for _ in model.dampers]
+    damped += [spring.damped for spring in model.springs] + [False for _ in model.pushes]
     springs = [False] * model.first_spring + [not spring.rigid for spring in model.springs]
     springs += [False for _ in model.pushes]
-    return np.array(inertial, dtype=np.bool_), np.array(springs, dtype=np.bool_)
+    return np.array(inertial, dtype=np.bool_), np.logical_or(inertial, damped), np.array(springs, dtype=np.bool_)
 
 
 class _Motion(NamedTuple):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engine.kernels.layout import Observation
 from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.readings import Sensor, SpotSensor, SprungSensor
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
@@ -56,15 +56,15 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     )
 
 
-def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: Along) -> Array:
-    """(stations, signals, ties) static responses per unit force of each tie that the kept modes miss."""
-    return np.ascontiguousarray(np.stack([s.missed(model, along) for s in signals], axis=1))
+def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: Along, ties: Counts) -> Array:
+    """(stations, signals, ties) static responses per unit force of some ties that the kept modes miss."""
+    return np.ascontiguousarray(np.stack([s.missed(model, along)[:, ties] for s in signals], axis=1))
 
 
 def tabulate_watch(
     model: SceneModel, signals: tuple[Signal, ...], along: Along, missed: Array | None = None
 ) -> Observation:
-    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known."""
+    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known; else of all ties."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
@@ -76,7 +76,7 @@ def tabulate_watch(
         on_a=_stacked(rows["a"], modes),
         signal=np.array([number for number, _ in ordered], dtype=np.int64),
         order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
-        static=tabulate_missed(model, signals, along) if missed is None else missed,
+        static=tabulate_missed(model, signals, along, np.arange(model.ties)) if missed is None else missed,
         offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
         counted=counted,
@@ -89,15 +89,15 @@ def _summed(signals: tuple[Signal, ...], counted: NDArray[np.bool_]) -> NDArray[
     return np.array([s.is_summed for s in signals], dtype=np.bool_) & counted.all(axis=0)
 
 
-def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice) -> Observation:
-    """The same along some of the stations, as a segment of their own."""
+def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice, ties: Counts) -> Observation:
+    """The same along some of the stations, as a segment of their own, with some of the ties that it has, by place."""
     counted = watch.counted[part]
     on_q, on_v, on_a = (rows[part] if len(rows) > 1 else rows for rows in (watch.on_q, watch.on_v, watch.on_a))
     return watch._replace(
         on_q=on_q,
         on_v=on_v,
         on_a=on_a,
-        static=watch.static[part],
+        static=watch.static[part].take(ties, 2),
         offset=watch.offset[part],
         counted=counted,
         summed=_summed(signals, counted),

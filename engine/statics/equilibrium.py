@@ -79,7 +79,7 @@ def flexibility(model: SceneModel, along: Along) -> Array:
         for s in range(model.ties):
             for one, other in shared(model, r, s, along):
                 found[:, r, s] += modal_flexibility_between(model, one, other, along)
-    missed = residual(model, along)
+    missed = residual(model, along, np.arange(model.ties))
     return found + missed if missed.size else found
 
 
