@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.march.envelopes import envelope_names
 from engine.model.lane_table import weights
-from engine.observation.contact_forces import contact_forces
+from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
@@ -79,7 +79,7 @@ class Pair:
 
     def contact_force(self, name: str, carriage: int) -> Array:
         """An extreme of a contact force, over the weight."""
-        forces = contact_forces(self.model)
+        forces = contacts_that_react(self.model)
         histories = self.apart[len(self.apart) - len(forces) :]
         apart = histories[[force.carriage == carriage for force in forces]].max(axis=0)
         return _over(np.maximum(self.gap(name), HISTORY_PART * apart), np.abs(self._weights[carriage]))
@@ -124,7 +124,9 @@ def _of_accelerations(asked: Asked) -> Iterator[Entry]:
 
 
 def _of_contact_forces(asked: Asked) -> Iterator[Entry]:
-    for c, name in enumerate(asked.study.carriage):
+    for c, (name, carriage) in enumerate(asked.study.carriage.items()):
+        if not carriage.reacts:
+            continue
         for own in (f"{name}_contact_force_{end}" for end in ENDS):
             yield Result(own, name), partial(Pair.contact_force, name=own, carriage=c)
         own = f"{name}_contact_force_min_position"

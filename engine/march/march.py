@@ -17,7 +17,7 @@ from engine.march.initial_state import initial_state
 from engine.march.stepper import go
 from engine.model.lane_table import from_blocks, lane_table
 from engine.model.track import tabulate_blow
-from engine.observation.contact_forces import contact_forces
+from engine.observation.contact_forces import contacts_that_react
 from engine.observation.histories import rows_sampled
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
@@ -178,7 +178,7 @@ def _bounds(tables: SceneTables, lanes: LaneTable) -> Array:
     own = sum(part.modal.mass for part in model.bodies if part.own_weight)
     weight = np.abs(lanes.weight[:, : len(model.carriages)]).sum(axis=1) + own * lanes.gravity
     scale = tables.static_scales * MEANINGLESS
-    contact = MEANINGLESS * np.abs(lanes.weight[:, [force.carriage for force in contact_forces(model)]])
+    contact = MEANINGLESS * np.abs(lanes.weight[:, [force.carriage for force in contacts_that_react(model)]])
     sensors = scale[None, :, None] * weight[:, None]
     loose = [model.bodies[sensor.body].modal.rigid_modes > 0 for sensor in tables.sensors]
     sensors = np.where(np.array(loose)[None, :, None], np.inf, sensors)  # a rigid body may go anywhere

@@ -18,7 +18,7 @@ from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weights
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
-from engine.observation.contact_forces import contact_forces
+from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
 from engine.scene.variants import VariantValues
@@ -199,6 +199,8 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
     """Extremes of every contact force, and where it first was negative."""
     found: Flat = {}
     for c, carriage in enumerate(tables.model.carriages):
+        if not tables.model.study.carriage[carriage.name].reacts:
+            continue
         statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
         seen = (statistics[:, layout.LARGEST_AT] >= 0.0).any(axis=0)
         least = np.argmin(statistics[:, layout.SMALLEST], axis=0)[
@@ -226,7 +228,7 @@ def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
 
 def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
     """Numbers of the contact forces of a carriage among all contact forces."""
-    return [number for number, force in enumerate(contact_forces(model)) if force.carriage == carriage]
+    return [number for number, force in enumerate(contacts_that_react(model)) if force.carriage == carriage]
 
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
@@ -234,7 +236,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     bad = np.concatenate([marched.statistics[:, layout.DIVERGED_AT], marched.unrecorded[:, layout.DIVERGED_AT]])
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     sensors = len(marched.statistics) - len(marched.unrecorded)
-    reactive = [number for number, force in enumerate(contact_forces(model)) if model.reacts(force.carriage)]
+    reactive = [number for number, force in enumerate(contacts_that_react(model)) if model.reacts(force.carriage)]
     below = np.concatenate(
         [
             marched.statistics[[sensors + c for c in reactive], layout.BELOW_AT],

@@ -19,7 +19,7 @@ from engine.model.station_path import Along, StationPath, ways
 from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import closed, tie_rows, ties_of
 from engine.observation import kinks, signals
-from engine.observation.contact_forces import contact_forces
+from engine.observation.contact_forces import contacts_that_react
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
 from engine.statics.static_response import static_readings
@@ -95,7 +95,7 @@ class SceneTables:
     def signals(self) -> tuple[Signal, ...]:
         """Sensors, then contact forces unless only sensors are read; between them every carriage's acceleration across,
         where that is read."""
-        return self.sensors if self.readings == "sensors" else (*self.sensors, *contact_forces(self.model))
+        return self.sensors if self.readings == "sensors" else (*self.sensors, *contacts_that_react(self.model))
 
     @cached_property
     def coarser(self) -> SceneTables:

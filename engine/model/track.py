@@ -115,7 +115,7 @@ def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: Stati
 
 
 def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Per tie, whether its acceleration enters its force, whether any of its kinematics do, and whether its gap does."""
+    """Per tie, whether its acceleration enters its force, whether any of its kinematics do, and whether its gap."""
     inertial = [carriage.inertia != "force" for carriage in model.carriages]
     inertial += [False for _ in model.dampers] + [spring.rigid for spring in model.springs]
     inertial += [True for _ in model.pushes]

@@ -105,6 +105,12 @@ def contact_row(model: SceneModel, carriage: int, contact: int | None = None) ->
     return found
 
 
+def contacts_that_react(model: SceneModel) -> tuple[ContactForce, ...]:
+    """The contact forces that are results: not those of plain forces, which press as they are written."""
+    known = model.study.carriage
+    return tuple(one for one in contact_forces(model) if known[model.carriages[one.carriage].name].reacts)
+
+
 def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:
     """The contact force of every carriage; of a body that rides, that of every contact."""
     found: list[ContactForce] = []

@@ -65,6 +65,11 @@ class Carriage(Spec):
         return self.moving_mass > 0.0
 
     @property
+    def reacts(self) -> bool:
+        """Whether its contact force may be another than its keys say: a plain force presses as it is written."""
+        return bool(self.masses)
+
+    @property
     def suspension(self) -> Suspension | None:
         """Its sprung mass."""
         return None
@@ -264,6 +269,10 @@ class BodyCarriage(Carriage):
 
     @property
     def inertial(self) -> bool:
+        return True
+
+    @property
+    def reacts(self) -> bool:
         return True
 
     @property
