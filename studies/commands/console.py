@@ -210,7 +210,7 @@ def show_outcome(outcome: Outcome) -> None:
     _heading(outcome.results.attrs["title"])
     paragraphs(*answer_of(results))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
-        _ranges(summary.asked(results), results.study.output.percentiles)
+        _ranges(summary.in_tables(results), results.study.output.percentiles)
     accuracy = told_accuracy(outcome.audit, results)
     statuses = _about_statuses(summary.counts(outcome.results), summary.noun(outcome.results), results.study.expected)
     paragraphs(*statuses, *([f"Accuracy: {accuracy}"] if accuracy else []))

@@ -29,7 +29,7 @@ from studies.pictures.common import estimates, unreduced
 from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, found_of
-from studies.reporting.summary import asked, noun
+from studies.reporting.summary import in_tables, noun
 from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
 from studies.runs import audit
@@ -278,7 +278,7 @@ def _sweep_row(results: Results, place: int) -> Row:
 def _results(results: Results) -> list[tuple[str, ...]]:
     """Name, sensor, smallest and largest with their places, and percentiles, of the results that answer."""
     rows: list[tuple[str, ...]] = []
-    for found in asked(results):
+    for found in in_tables(results):
         ends = [found.said(end.value, 4) for end in (found.smallest, found.largest)]
         between = [found.said(value, 4) for value in found.percentiles]
         rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where, *between))

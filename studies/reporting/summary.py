@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from engine.scene.trains import axle_name
 from results_schema.late import xr
 from results_schema.status import Status, label
 from studies.findings.numerics_used import ERROR, WORK, is_marched
@@ -158,6 +159,18 @@ def asked(study_results: Results) -> list[Range]:
     beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
     found = [one for one in ranges(study_results) if one.name not in beside]
     return sorted(found, key=lambda one: not one.sensor)
+
+
+def in_tables(study_results: Results) -> list[Range]:
+    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest."""
+    found = asked(study_results)
+    for name, train in study_results.study.train.items():
+        for end, sign in (("max", 1.0), ("min", -1.0)):
+            names = {f"{axle_name(name, axle)}_contact_force_{end}" for axle in range(train.count)}
+            own = [one for one in found if one.name in names]
+            worst = max(own, key=lambda one: max(sign * one.smallest.value, sign * one.largest.value), default=None)
+            found = [one for one in found if one not in own or one is worst]
+    return found
 
 
 def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:

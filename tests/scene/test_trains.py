@@ -7,13 +7,16 @@ from typing import Any
 import pytest
 
 import engine
+import studies
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
 from studies.commands.preview import preview
 from studies.protocol.study import kind_of
 from studies.reporting.drawing import page_of
+from studies.reporting.summary import in_tables
 from studies.results.findings_common import told_trains
+from studies.results.results import Results
 from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
 
 WAY = cruise(0.0, 1.0, 0.8)
@@ -202,3 +205,19 @@ def test_check_and_draw_tell_the_trains() -> None:
     (told,) = told_trains(given)
     assert told in preview(kind_of(given).parts(given), 1).tables[0].rows
     assert told in [(row.name, row.value) for row in page_of(given, ()).facts]
+
+
+def test_tables_show_the_axles_with_the_largest_and_the_smallest_contact_force() -> None:
+    sweep = {"speed": {"of": "train.tram.motion.speed", "values": SPEED}}
+    results = Results.of(studies.run(train(mass(0.2, WAY) | REGULAR, kind="passage", sweep=sweep)))
+    forces = {f"tram_{n}_contact_force_{end}" for n in (1, 2, 3) for end in ("min", "max")}
+    assert forces <= set(results.dataset.data_vars)
+    values = {name: results.dataset[name].values for name in forces}
+    largest = max((name for name in forces if name.endswith("max")), key=lambda name: values[name].max())
+    smallest = min((name for name in forces if name.endswith("min")), key=lambda name: values[name].min())
+    assert {one.name for one in in_tables(results)} & forces == {largest, smallest}
+
+
+def test_forces_have_no_contact_forces() -> None:
+    found = engine.run(train(force(2.0, WAY) | REGULAR))
+    assert not [name for name in [*found.data_vars, *found["result"].values] if "contact_force" in str(name)]

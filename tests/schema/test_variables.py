@@ -50,7 +50,9 @@ def test_expand_fills_names_units_and_texts():
     assert found["root_max_position"].units == "m"
     assert found["robot_arm_contact_force_min"].units == "N"
     assert found["midspan"].lead == "history"
-    assert not [name for name in expand("march", {}, {"axle": False}) if "contact_force" in name or "separation" in name]
+    assert not [
+        name for name in expand("march", {}, {"axle": False}) if "contact_force" in name or "separation" in name
+    ]
     assert "status" in found and "{" not in "".join(v.name + v.long_name + v.meaning for v in found.values())
 
 
