@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
 
 from engine.scene.motion_base import Motion
@@ -14,6 +15,7 @@ from engine.scene.motions import AnyMotion
 from engine.study_file.document import Document
 from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form, refuse
 from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, fault
+from results_schema.arrays import Array
 
 MAX_AXLES = 200
 
@@ -71,6 +73,14 @@ class Train(Spec):
     def load(self) -> float:
         """N or kg of all its axles together."""
         return sum(sum(self.own(key)) * self.scale(key) for key in self.loads)
+
+    def in_step(self, wavelength: Array) -> Array:
+        """The part of its load that pushes in step with a wave of so many m (L,): the train's spectrum
+        |sum P_k exp(2 pi i x_k/wavelength)| (EN 1991-2, annex E, without the span and its damping) over sum P_k."""
+        places = np.array(self.distances) * self.spacing_scale
+        loads = np.sum([self.own(key) for key in self.loads], axis=0)
+        turned = np.exp(2j * np.pi * places / wavelength[:, None]) @ loads
+        return np.asarray(np.abs(turned) / loads.sum())
 
     @property
     def each(self) -> tuple[str, ...]:

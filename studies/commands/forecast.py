@@ -1,4 +1,4 @@
-"""What a run will take, from about three seconds of it: pilots of a large sweep, or some variants of a small one."""
+"""What a run will take, from some seconds of it: how some variants converge, and pilots of a large sweep."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from studies.results.formatting import counted
 from studies.results.results import spread
 
 SECONDS = 3.0  # that measuring may take
+PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
 # What is said of the next three was measured with the built-in studies on two threads; the spread is over these.
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 5 to 23
@@ -49,14 +50,17 @@ class Looked(NamedTuple):
 
 
 @one_thread()
-def forecast(plan: Plan, threads: int, seconds: float = SECONDS, rounds: Sequence[int] = ROUNDS) -> Forecast:
-    """What is measured within about three seconds: how some variants converge, then as many pilots as there is time
-    for."""
+def forecast(
+    plan: Plan, threads: int, seconds: float = SECONDS, rounds: Sequence[int] = ROUNDS, patience: float = PATIENCE
+) -> Forecast:
+    """What is measured within so many seconds: how some variants converge, for which there is more ``patience``, then
+    as many pilots as there is time for."""
     around = AROUND * time.process_time()
     warm_up(plan)
-    end = time.perf_counter() + seconds
+    begun = time.perf_counter()
+    end = begun + seconds
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
-    looked = _converge(plan, groups, partial(_past, end))
+    looked = _converge(plan, groups, partial(_past, begun + patience))
     if plan.converges:
         found: Forecast | None = _of_convergence(plan, looked, threads)
     else:
@@ -98,7 +102,7 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     chunks = sum(1 for _ in plan.chunks(None, None))  # each has tables of its own, which take longer than its marches
     seconds = (looked.seconds * chunks + plan.seconds) / min(threads, chunks)
     if not looked.parts:
-        less = "three seconds were not enough for a variant to converge: this may take longer"
+        less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
@@ -107,7 +111,7 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
 def _without_pilots(plan: Plan, looked: Looked) -> Forecast:
     """A study whose pilots take longer than there is time."""
     pilots = usual_pilots(plan.size)
-    less = f"three seconds were not enough for pilots: a run measures {pilots}, and takes what they show to be enough"
+    less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     climbs = CLIMB * min(len(plan.grids), MOST_SCENES)
     if not looked.parts:
         return Forecast(plan, "", (), climbs * looked.seconds, f"{less}; this may take longer")

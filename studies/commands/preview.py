@@ -17,13 +17,14 @@ from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
 from engine.scene.study import Study
 from engine.scene.sweep import Axis, Cases, expand
+from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
-from studies.results.findings_common import told_trains
-from studies.results.formatting import counted, number, spanned, unit_text
+from studies.results.findings_common import speeds_in_step, told_trains
+from studies.results.formatting import counted, number, percent, quantity, spanned, unit_text
 from studies.results.results import typed_unit
 
 FREQUENCIES_SHOWN = 6
@@ -59,6 +60,7 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     seen = forecast(plan, threads)
     tables = (
         *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.study, plan.cases), _ratios(plan)),
+        *_in_step(plan),
         Table(seen.title, chosen.HEADINGS, seen.rows),
     )
     room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
@@ -201,6 +203,31 @@ def _ratios(plan: Plan) -> Table:
             found.setdefault(ratio, []).append(values)
     rows = [(ratio, spanned(np.concatenate(values))) for ratio, values in found.items()]
     return Table(f"Ratios of {name}", ("ratio", "range"), rows)
+
+
+def _in_step(plan: Plan) -> Iterator[Table]:
+    """Swept speeds at which the axles of a train come once in a first period."""
+    frequency, study = plan.base.first_omega / (2.0 * np.pi), plan.study
+    for name, train in study.train.items():
+        place = list(study.carriage).index(axle_name(name, 0))
+        speeds = [
+            grid.scene.carriages[place].rider.top_speed / grid.values.time_scale(axle_name(name, 0))
+            for grid in plan.grids
+        ]
+        lowest, highest = float(np.min(np.concatenate(speeds))), float(np.max(np.concatenate(speeds)))
+        typed = next(
+            (typed_unit(study, axis.name) for axis in plan.cases.axes if f"train.{name}.motion.speed" in axis.of), None
+        )
+        rows = [
+            (
+                quantity(speed, "m s-1", 3) if typed is None else f"{number(speed * typed.factor)} {typed.unit}",
+                quantity(speed / frequency, "m", 3),
+                percent(share),
+            )
+            for speed, share in (speeds_in_step(train, frequency, (lowest, highest)) if highest > lowest else [])
+        ]
+        heading = f"Speeds at which {name} pushes in step with the first frequency, {number(frequency)} Hz"
+        yield Table(heading, ("speed", "way in a period", "part of its load"), rows)
 
 
 def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from engine.scene.carriages import Carriage
 from engine.scene.study import Study
+from engine.scene.trains import Train
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity
@@ -37,6 +38,21 @@ def told_trains(study: Study) -> list[tuple[str, str]]:
         )
         for name, train in study.train.items()
     ]
+
+
+#: Wavelengths that are looked at between the lowest and the highest speed, and the part of a train's load that has to
+#: push in step to be told: a bogie of two axles does so far from any resonance of the whole train.
+WAVES, TOLD_IN_STEP = 4096, 0.3
+
+
+def speeds_in_step(train: Train, frequency: float, between: tuple[float, float]) -> list[tuple[float, float]]:
+    """Speeds (m/s), ascending, at which most of a train's load pushes in step with a frequency (Hz), with the parts of
+    the load: at speed/frequency m apart axles come once a period."""
+    wavelength = np.geomspace(*between, WAVES) / frequency
+    share = train.in_step(wavelength)
+    inside = (share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= TOLD_IN_STEP)
+    peaks = 1 + np.flatnonzero(inside)
+    return [(float(wavelength[peak] * frequency), float(share[peak])) for peak in peaks]
 
 
 def in_words(results: Results, index: Index) -> str:

@@ -15,7 +15,7 @@ from studies.commands.preview import preview
 from studies.protocol.study import kind_of
 from studies.reporting.drawing import page_of
 from studies.reporting.summary import in_tables
-from studies.results.findings_common import told_trains
+from studies.results.findings_common import speeds_in_step, told_trains
 from studies.results.results import Results
 from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
 
@@ -221,3 +221,18 @@ def test_tables_show_the_axles_with_the_largest_and_the_smallest_contact_force()
 def test_forces_have_no_contact_forces() -> None:
     found = engine.run(train(force(2.0, WAY) | REGULAR))
     assert not [name for name in [*found.data_vars, *found["result"].values] if "contact_force" in str(name)]
+
+
+def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:
+    """At f d/k, by all of their load; five of them have no other maxima above 0.3 but near 0.25."""
+    regular = train(force(2.0, WAY) | {"axles": 5, "spacing": 3.0}).train["tram"]
+    found = speeds_in_step(regular, 2.0, (1.4, 7.0))
+    assert [speed for speed, _ in found] == pytest.approx([1.5, 2.0, 3.0, 6.0], rel=1e-3)
+    assert [share for _, share in found] == pytest.approx([1.0] * 4, abs=1e-3)
+
+
+def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
+    whole = train(force(2.0, WAY) | REGULAR, **swept(speed={"of": "train.tram.motion.speed", "values": [0.01, 1.0]}))
+    tables = preview(kind_of(whole).parts(whole), 1).tables
+    (table,) = [table for table in tables if "in step" in table.title]
+    assert len(table.rows) > 1 and table.headings == ("speed", "way in a period", "part of its load")
