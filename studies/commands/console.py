@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -21,7 +23,7 @@ from results_schema.status import Status, label
 from studies.commands.error_exit import drop_stdout
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.reporting.answers import answer_of
-from studies.results.formatting import counted, number, quantity
+from studies.results.formatting import counted, duration, number, quantity
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy, told_audit
 
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80  # of output that no terminal shows
 LONGEST_CELL = 400
+SECONDS_PER_LINE = 30.0  # of what a run tells where no terminal shows a bar: ten lines in a log of five minutes
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
 _NUMBER = re.compile(r"-?[\d.,e-]+( [^\s\d]\S*)*")
@@ -117,11 +120,15 @@ class Bar(NamedTuple):
 
 
 @contextmanager
-def progress_bar(label: str) -> Iterator[Bar]:
-    """A progress bar on standard error, if that is a terminal."""
+def progress_bar(label: str, seconds: float = SECONDS_PER_LINE) -> Iterator[Bar]:
+    """A progress bar on standard error; where that is no terminal, a line every so many seconds."""
     console = Console(stderr=True)
+    if not console.is_terminal:
+        with _progress_lines(label, seconds) as lines:
+            yield lines
+        return
     columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, TimeRemainingColumn(), console=console, disable=not console.is_terminal, transient=True)
+    bar = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
     with bar:
         task = bar.add_task(label, total=None)
 
@@ -129,6 +136,41 @@ def progress_bar(label: str) -> Iterator[Bar]:
             bar.update(task, completed=finished, total=total)
 
         yield Bar(show, partial(say_stage, label, console=bar.console))
+
+
+@contextmanager
+def _progress_lines(label: str, seconds: float) -> Iterator[Bar]:
+    """Lines by a thread of their own, as long as the block lasts."""
+    now: dict[str, Any] = {"words": "", "resumed": None, "finished": 0, "total": 0}
+    ended, started = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        while not ended.wait(seconds):
+            warn(progress_line(label, time.monotonic() - started, **now))
+
+    def show(finished: int, total: int) -> None:
+        resumed = finished if now["resumed"] is None else now["resumed"]
+        now.update(resumed=resumed, finished=finished, total=total)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield Bar(show, lambda words: now.update(words=words))
+    finally:
+        ended.set()
+        teller.join()
+
+
+def progress_line(label: str, seconds: float, *, words: str, resumed: int | None, finished: int, total: int) -> str:
+    """How far a run is after some seconds; resumed: of what is finished, what was so before.
+
+    >>> progress_line("bridge", 62.0, words="marching", resumed=40, finished=80, total=400)
+    'bridge: marching; 80 of 400 after 62 s, about 8.3 min left'
+    """
+    doing = f"{label}: {words}; " if words else f"{label}: "
+    done = finished - (resumed or 0)
+    left = f", about {duration(seconds * (total - finished) / done)} left" if done else ""
+    return f"{doing}{finished:,} of {total:,} after {duration(seconds)}{left}"
 
 
 def say_stage(label: str, words: str, console: Console | None = None) -> None:

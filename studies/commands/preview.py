@@ -24,7 +24,7 @@ from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
 from studies.results.findings_common import speeds_in_step, told_trains
-from studies.results.formatting import counted, number, percent, quantity, spanned, unit_text
+from studies.results.formatting import counted, duration, number, percent, quantity, spanned, unit_text
 from studies.results.results import typed_unit
 
 FREQUENCIES_SHOWN = 6
@@ -115,17 +115,6 @@ def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:
     yield _bodies(base)
     yield from _checks(base)
     yield _sweep(study, cases)
-
-
-def duration(seconds: float) -> str:
-    """A time as people say it.
-
-    >>> duration(0.02), duration(42.0), duration(4000.0)
-    ('0.1 s', '42 s', '1.1 h')
-    """
-    if seconds < 100.0:
-        return f"{number(max(seconds, 0.1), 2)} s"
-    return f"{number(seconds / 60, 2)} min" if seconds < 3600 else f"{number(seconds / 3600, 2)} h"
 
 
 def size(count: int) -> str:

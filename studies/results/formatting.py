@@ -129,6 +129,17 @@ def spanned(values: Iterable[float], words: Callable[[float], str] = number) -> 
     return " to ".join(dict.fromkeys((words(min(known)), words(max(known))))) if known else "none"
 
 
+def duration(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> duration(0.02), duration(42.0), duration(4000.0)
+    ('0.1 s', '42 s', '1.1 h')
+    """
+    if seconds < 100.0:
+        return f"{number(max(seconds, 0.1), 2)} s"
+    return f"{number(seconds / 60, 2)} min" if seconds < 3600 else f"{number(seconds / 3600, 2)} h"
+
+
 def counted(count: int, noun: str) -> str:
     """A number with its noun.
 

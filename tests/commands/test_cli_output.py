@@ -6,10 +6,12 @@ import os
 import pty
 import re
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
 
+from studies.commands.console import progress_bar
 from tests.studies.small import ROOT, SEPARATED, command, finish, write
 
 
@@ -76,6 +78,16 @@ def test_warnings_of_libraries_stay_away_from_the_screen(tmp_path: Path) -> None
     warned += "; c.process.set_up = lambda: (s(), warnings.warn('overflow', RuntimeWarning)); c.main()"
     done = shell(tmp_path, f'PYTHONWARNINGS= "$1" -c "{warned}" list')
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_long_run_tells_how_far_it_is_where_no_terminal_shows_a_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("small", seconds=0.01) as bar:
+        bar.say("marching")
+        bar.show(40, 400)
+        bar.show(80, 400)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"small: marching; 80 of 400 after 0.\d+ s, about \d\S* s left", lines[-1])
 
 
 def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:
