@@ -16,7 +16,7 @@ from engine.kernels.stepping.start import solve_initial_acceleration, strike, wa
 from engine.march.initial_state import initial_state
 from engine.march.stepper import go
 from engine.model.lane_table import from_blocks, lane_table
-from engine.model.track import tabulate_blow
+from engine.model.track import tabulate_blow, ties_with_inertia
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.histories import rows_sampled
 from results_schema.arrays import Array, Counts
@@ -91,12 +91,11 @@ class March:
             return
         model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment), table.numbers)
         if segment.strikes:
-            active = np.zeros(model.ties, dtype=np.bool_)
-            active[: len(model.carriages)] = segment.active[: len(model.carriages)]
-            active[model.first_push :] = [segment.active[push.carriage] for push in model.pushes]
-            mass = np.where(active[:, None], self.lanes.mass, 0.0)
             self._board(segment)
-            strike(tabulate_blow(model, segment, mass, self.lanes.time_scale), self.lanes.gravity, self.state)
+            struck = ties_with_inertia(model, segment.active)
+            if struck.size:
+                blow = tabulate_blow(model, segment, struck, self.lanes.mass.take(struck, 1), self.lanes.time_scale)
+                strike(blow, self.lanes.gravity, self.state)
         if segment.fresh:
             solve_initial_acceleration(table.ties, stepped, self.state)
         watch_start(table.ties, stepped, self.state, *observed, segment.first)

@@ -193,35 +193,35 @@ def rate_rows(model: SceneModel, ties: list[int], along: Along) -> tuple[Array, 
     return force, slope, sag
 
 
-def tabulate_blow(model: SceneModel, segment: Segment, mass: Array, time_scale: Array) -> Impulse:
+def ties_with_inertia(model: SceneModel, active: Sequence[bool]) -> Counts:
+    """Numbers of the ties that an impulse meets where riders are on their bodies or not (``active``)."""
+    carriages = [active[r] and carriage.inertia != "force" for r, carriage in enumerate(model.carriages)]
+    others = [False] * (model.first_push - len(carriages))
+    return np.flatnonzero([*carriages, *others, *(active[push.carriage] for push in model.pushes)])
+
+
+def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array, time_scale: Array) -> Impulse:
     """The impulse at the beginning of a segment.
 
-    mass (blocks, ties, LANES): kg, zero for ties without inertia;  time_scale (blocks, LANES): s per scene time.
+    ties: of `ties_with_inertia`;  mass (blocks, ties, LANES): kg;  time_scale (blocks, LANES): s per scene time.
     """
-    ties, modes = model.ties, model.omega.size
-    shape, slope, sag_slope, arrives = np.zeros((ties, modes)), np.zeros((ties, modes)), np.zeros(ties), np.zeros(ties)
-    speed = np.zeros_like(mass)
+    shape, slope = np.zeros((ties.size, model.omega.size)), np.zeros((ties.size, model.omega.size))
+    sag_slope, arrives, speed = np.zeros(ties.size), np.zeros(ties.size), np.zeros_like(mass)
     at = np.array([segment.start])
-    for r, carriage in enumerate(model.carriages):
-        if segment.active[r] and carriage.inertia != "force":
-            place = np.clip(carriage.rider.path(at, segment.start, segment.end).S, 0.0, carriage.rider.length)
-            part = model.bodies[carriage.body]
-            shape[r, part.modes] = part.modal.shape(place)[0]
-            slope[r, part.modes] = part.modal.shape(place, 1)[0]
-            sag_slope[r] = model.sag(carriage.body, place, 1)[0]
-    for r, push in enumerate(model.pushes, start=model.first_push):
-        if segment.active[push.carriage]:
-            rider, part = model.riders[push.carriage], model.bodies[model.carriages[push.carriage].body]
-            place = np.clip(rider.path(at, segment.start, segment.end).S, 0.0, rider.length)
-            shape[r, part.modes], slope[r, part.modes] = along_shapes(part, place, 1)[:, 0]
-    for strike in segment.strikes:
-        if strike.rider >= len(model.carriages):  # a contact on a spring meets no shock
-            continue
-        inertia = model.carriages[strike.rider].inertia
-        arrives[strike.rider] = float(strike.arrives and inertia != "force")
-        if inertia == "mass":
-            speed[:, strike.rider] = strike.speed / time_scale
-        for r, push in enumerate(model.pushes, start=model.first_push):
-            if push.carriage == strike.rider:
-                arrives[r], speed[:, r] = 1.0, push.convected * strike.speed / time_scale
+    for number, r in enumerate(ties):
+        push = model.pushes[r - model.first_push] if r >= model.first_push else None
+        owner = int(r) if push is None else push.carriage
+        carriage = model.carriages[owner]
+        part, rider = model.bodies[carriage.body], carriage.rider
+        place = np.clip(rider.path(at, segment.start, segment.end).S, 0.0, rider.length)
+        strike = next((strike for strike in segment.strikes if strike.rider == owner), None)
+        convected = carriage.inertia == "mass" if push is None else push.convected
+        if push is None:
+            shape[number, part.modes], slope[number, part.modes] = part.modal.shape_derivatives(place, range(2))[:, 0]
+            sag_slope[number] = model.sag(carriage.body, place, 1)[0]
+        else:
+            shape[number, part.modes], slope[number, part.modes] = along_shapes(part, place, 1)[:, 0]
+        if strike is not None:
+            arrives[number] = float(strike.arrives or push is not None)
+            speed[:, number] = convected * strike.speed / time_scale
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)
