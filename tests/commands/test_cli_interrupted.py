@@ -20,10 +20,8 @@ from studies.protocol.options import RunOptions
 from studies.protocol.parts import Gatherer
 from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
 from studies.runs.runner import run_to_archive
+from tests.studies.every_way import assert_same_results
 from tests.studies.small import LONG, SCENES, start, write
-
-# The only attributes in which a resumed archive may differ from an uninterrupted one.
-OF_TIME_AND_MACHINE = ("history", "machine", "run_seconds")
 
 
 @pytest.fixture(autouse=True)
@@ -55,18 +53,6 @@ def interrupted(
     with monkeypatch.context() as patch:
         after_parts(patch, parts, sent)
         assert main(["run", study]) == code
-
-
-def assert_same_results(first: xr.Dataset, second: xr.Dataset) -> None:
-    """Equal to the last bit, but for the time and the machine."""
-    for dataset in (first, second):
-        assert set(OF_TIME_AND_MACHINE) <= set(dataset.attrs)
-    strip = [d.assign_attrs({key: "" for key in OF_TIME_AND_MACHINE}) for d in (first, second)]
-    xr.testing.assert_identical(*strip)
-    compared = [name for name, array in first.data_vars.items() if array.dtype.kind == "f"]
-    assert len(compared) > 5
-    for name in compared:
-        assert first[name].values.tobytes() == second[name].values.tobytes()
 
 
 @pytest.mark.fault(21, 25)

@@ -33,10 +33,11 @@ from studies.runs.identity import PROGRAM, run_key, sources, sources_hash
 from studies.runs.runner import run_to_archive
 from tests.bodies.frames import PINNED, body, straight
 from tests.bodies.models import Files, in_process
-from tests.commands.test_cli_interrupted import assert_same_results, interrupted
+from tests.commands.test_cli_interrupted import interrupted
 from tests.engine.build import steel
 from tests.protocol.test_measuring import after_pieces
 from tests.studies import at_rest, imported
+from tests.studies.every_way import assert_same_results
 from tests.studies.small import SCENES, SMALL, write
 
 Captured = pytest.CaptureFixture[str]

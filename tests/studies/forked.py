@@ -1,0 +1,27 @@
+"""The command in forked processes of this one, which has loaded and compiled everything that they need."""
+
+from __future__ import annotations
+
+import os
+
+import dask.threaded
+
+from studies.commands.cli import main
+
+
+def forked(*arguments: str) -> int:
+    """The number of a process that runs the command, with its screen closed."""
+    number = os.fork()
+    if number == 0:
+        dask.threaded.pools.clear()  # of threads that this process does not have
+        dask.threaded.default_pool = None
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        os._exit(main(arguments))
+    return number
+
+
+def exit_code(number: int) -> int:
+    """What a process ends with; of a signal, its number as a negative one."""
+    return os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
