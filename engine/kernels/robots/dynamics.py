@@ -37,7 +37,6 @@ from engine.kernels.robots.layout import (
     ROBOT,
     SIXES,
     SOLID,
-    SUMS,
     TOLD,
     TOOL,
     TOTALS,
@@ -50,6 +49,7 @@ from engine.kernels.robots.layout import (
 from engine.kernels.robots.timing import planned
 from engine.kernels.robots.tracks import along_track, push_on, section
 from engine.kernels.robots.vectors import rotation
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 
 
 @kernel
@@ -65,6 +65,7 @@ def room(system):
         np.zeros((SIXES, 6)),
         np.zeros((VECTORS, system.springs.shape[0])),
         np.zeros((CUBICS, LANES)),
+        np.zeros((MOVED + 6, LANES)),
         np.ones(1),
         np.zeros((R, J, J + 6)),
         np.zeros((R, 2, 6, n)),
@@ -104,25 +105,26 @@ def plan_at(system, t, work):
 @called
 def ride(system, r, state, work):
     """The base of robot r: place, axes, angular velocity, acceleration less that of gravity, angular acceleration."""
-    joint, six, ahead = work.links[r, 0], work.six, work.robots[r, AHEAD : AHEAD + 6]
-    for p in range(work.six.shape[1]):
-        for o in range(work.six.shape[1]):
-            six[MOVED + p, o] = 0.0
+    joint, motions, ahead = work.links[r, 0], work.motions, work.robots[r, AHEAD : AHEAD + 6]
+    for o in range(work.six.shape[1]):
+        put_lanes(motions, (MOVED + o,), all_lanes(0.0))
     for g in range(2):
         body, share = system.body[r, g], system.share[r, g]
         if body >= 0:
             section(system, body, joint[ACTUAL + VALUE] + share[6, 0], state, work, work.grips[r, g])
             for o in range(work.six.shape[1]):
+                own = lanes_at(motions, (MOVED + o,))
                 for i in range(work.six.shape[1]):
                     if share[o, i] != 0.0:
-                        for p in range(work.six.shape[1]):
-                            six[MOVED + p, o] += share[o, i] * six[SUMS + p, i]
-    moved, rate, push = six[MOVED], six[MOVED + 1], six[MOVED + 2]
+                        own = own + share[o, i] * lanes_at(motions, (i,))
+                put_lanes(motions, (MOVED + o,), own)
+    moved, rate, push = motions[MOVED : MOVED + 6, 0], motions[MOVED : MOVED + 6, 1], motions[MOVED : MOVED + 6, 2]
     speed = joint[ACTUAL + RATE]
     for k in range(work.six.shape[1]):
-        ahead[k] = six[MOVED + 3, k] + (k == 0)
+        own = motions[MOVED + k]
+        ahead[k] = own[3] + (k == 0)
         rate[k] += speed * ahead[k]
-        push[k] += 2.0 * speed * six[MOVED + 4, k] + speed * speed * six[MOVED + 5, k] + joint[ACTUAL + PUSH] * ahead[k]
+        push[k] += 2.0 * speed * own[4] + speed * speed * own[5] + joint[ACTUAL + PUSH] * ahead[k]
     x, y, z = shared_vector(system.robots, r, BASE)
     place = (x + joint[ACTUAL + VALUE] + moved[0], y + moved[1], z + moved[2])
     acceleration = (push[0], push[1], push[2] + system.gravity)

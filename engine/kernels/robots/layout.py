@@ -43,9 +43,10 @@ BEGUN, PHASE = range(2)
 # columns of Work.grips, by rail: wrench on the robot, motion that the modes miss, loads on the ends of an element, the
 # motion by those of the ends (6, 12), the element with the distance from its beginning, what the modes go up there
 GRIP, MISSING, LOADS, BY_ENDS, ELEMENT, INTO, UP_THERE, GRIPPED = 0, 6, 12, 24, 96, 97, 98, 99
-# rows of Work.six: sums of `section`, what becomes of them at the base, the inertia of a solid (10 in two rows), and
-# what a solution has for a base
-SUMS, MOVED, SOLID, TOTALS, SIXES = 0, 6, 12, 14, 15
+# rows of Work.six: what modes miss at the base, the inertia of a solid (10 in two rows), what a solution has for a base
+MISSED_THERE, SOLID, TOTALS, SIXES = 0, 1, 3, 4
+# rows of Work.motions: six of the axis of a track, and what becomes of them at the base
+MOVED = 6
 # rows of Work.vectors: of a correction; momenta, and a vector to begin with; inertia by which the scheme has no
 # limit of its step, and that of coordinates which go without; accelerations of the step before
 CHANGE, MOMENTUM, EXTRA, SOFT, BEFORE, VECTORS = 0, 1, 2, 3, 4, 5
@@ -90,9 +91,10 @@ class System(NamedTuple):
 
 class Work(NamedTuple):
     """What an evaluation leaves behind: links (R, J, COLUMNS), robots (R, ROBOT), doing (R, 2), grips (R, 2, GRIPPED),
-    six (SIXES, 6), vectors (VECTORS, N), cubics (CUBICS, LANES): above;  newton (1): by what factor the work of
-    corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs (R, 2, 6, n): motion
-    of bases per mode; across (6, n): the same times an inertia; elastic (N, N); inertia (6 + J, 6 + J) of a robot."""
+    six (SIXES, 6), vectors (VECTORS, N), cubics (CUBICS, LANES), motions (12, LANES): above;  newton (1): by what
+    factor the work of corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs
+    (R, 2, 6, n): motion of bases per mode; across (6, n): the same times an inertia; elastic (N, N); inertia (6 + J,
+    6 + J) of a robot."""
 
     links: FloatArray
     robots: FloatArray
@@ -101,6 +103,7 @@ class Work(NamedTuple):
     six: FloatArray
     vectors: FloatArray
     cubics: FloatArray
+    motions: FloatArray
     newton: FloatArray
     lower: FloatArray
     pairs: FloatArray

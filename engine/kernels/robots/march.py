@@ -16,9 +16,9 @@ from engine.kernels.robots.layout import (
     EXTRA,
     GRIP,
     JOINTS,
+    MISSED_THERE,
     MISSING,
     MOMENTUM,
-    MOVED,
     PAYLOAD,
     PHASE,
     PLACE,
@@ -338,7 +338,7 @@ def observe(system, t, state, work, left, record, station):
 @called
 def sink(system, r, work, seen):
     """What rails do under robot r, into seen (2, OF_GRIP); motion and rotation of its base that their modes miss."""
-    base = work.six[MOVED]
+    base = work.six[MISSED_THERE]
     for o in range(work.six.shape[1]):
         base[o] = 0.0
     for g in range(2):

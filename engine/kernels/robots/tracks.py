@@ -35,29 +35,28 @@ def element_at(system, body, s):
 
 @called
 def section(system, body, s, state, work, grip):
-    """The axis of a track at a place, into work.six (6, 6): B y, B y', B y'', B' y, B' y' and B'' y of the modes of the
-    body, derivatives of the motion per mode B by the place; the place into columns of ``grip``."""
+    """The axis of a track at a place, into work.motions (6, 6): B y, B y', B y'', B' y, B' y' and B'' y of the modes of
+    the body, derivatives of the motion per mode B by the place; the place into columns of ``grip``."""
     e, x = element_at(system, body, s)
-    first, sums, cubics = system.tracks[body, FIRST], work.six, work.cubics
-    y_low, v_low, a_low = no_vector()
-    y_high, v_high, a_high = no_vector()
-    for k in range(system.tracks[body, MODES]):
-        low, high = lanes_at(system.shapes, (body, e, k, 0)), lanes_at(system.shapes, (body, e, k, 1))
-        y, v, a = state[first + k, 0], state[first + k, 1], state[first + k, 2]
-        y_low, v_low, a_low = y_low + y * low, v_low + v * low, a_low + a * low
-        y_high, v_high, a_high = y_high + y * high, v_high + v * high, a_high + a * high
-    for row, lanes in ((0, y_low), (1, v_low), (2, a_low), (3, y_high), (4, v_high), (5, a_high)):
-        put_lanes(cubics, (CUBIC + row,), lanes)
-    for i in range(6):
+    first, motions, cubics = system.tracks[body, FIRST], work.motions, work.cubics
+    for half in range(2):  # twelve registers of sums at once are what the processor has room for
+        y_sum, v_sum, a_sum = no_vector()
+        for k in range(system.tracks[body, MODES]):
+            own = lanes_at(system.shapes, (body, e, k, half))
+            y_sum = y_sum + state[first + k, 0] * own
+            v_sum = v_sum + state[first + k, 1] * own
+            a_sum = a_sum + state[first + k, 2] * own
+        put_lanes(cubics, (CUBIC + 3 * half,), y_sum)
+        put_lanes(cubics, (CUBIC + 3 * half + 1,), v_sum)
+        put_lanes(cubics, (CUBIC + 3 * half + 2,), a_sum)
+    for i in range(work.six.shape[1]):
         for order in range(3):
             c0, c1 = cubics[CUBIC + order, i], cubics[CUBIC + order, SECOND_HALF + i]
             c2, c3 = cubics[CUBIC + 3 + order, i], cubics[CUBIC + 3 + order, SECOND_HALF + i]
-            sums[order, i] = c0 + x * (c1 + x * (c2 + x * c3))
-            if order < 2:
-                sums[3 + order, i] = c1 + x * (2.0 * c2 + 3.0 * x * c3)
-            if order == 0:
-                sums[5, i] = 2.0 * c2 + 6.0 * x * c3
-    grip[ELEMENT], grip[INTO], grip[UP_THERE] = e, x, sums[0, 2]
+            motions[i, order] = c0 + x * (c1 + x * (c2 + x * c3))
+            motions[i, 3 + order] = c1 + x * (2.0 * c2 + 3.0 * x * c3)  # that of B' y'' gives way
+        motions[i, 5] = 2.0 * cubics[CUBIC + 3, i] + 6.0 * x * cubics[CUBIC + 3, SECOND_HALF + i]
+    grip[ELEMENT], grip[INTO], grip[UP_THERE] = e, x, motions[2, 0]
 
 
 @called
