@@ -37,11 +37,12 @@ PUBLIC = {"engine", "studies", "results_schema"}
 MOST_FILES = 15  # of a folder
 LONGEST_CHAIN = 16  # of files that need each other, one after the other
 HEAVY = {"numba", "scipy", "xarray", "pandas", "dask", "pint", "matplotlib", "netCDF4", "jinja2", "pydantic"} | {
-    "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",
+    "distributed", "pyyeti", "mapdl_archive", "ansys", "pyvista", "vtk",
 }  # fmt: skip
 # Packages that only these modules of ours may import.
 ONLY_IN = {
-    "dask": ("engine.batch.execution",),
+    "dask": ("engine.batch",),
+    "distributed": ("engine.batch",),
     "numba": ("engine.kernels",),
     "netCDF4": ("results_schema",),
     "click": ("studies",),

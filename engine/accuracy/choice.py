@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
+from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
-from engine.accuracy.reference import DOUBTED, Halted, Share, across_and_within
+from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
@@ -165,52 +167,96 @@ class Choice:
         return self.measured.march.reshape(-1, self.measured.march.shape[2])
 
 
-def choose(
-    asked: Asked,
-    cases: Cases,
-    grids: Sequence[SceneGrid],
-    members: Sequence[Counts],
-    share: Share,
-    halted: Halted,
-    most: int = PILOTS,
-) -> Choice:
-    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by at most so many pilots. Raises
-    Halted."""
-    pilots = pilots_of(cases, members, most)
-    climbs, span = [], tolerance_span(asked, cases)
-    parts = [pilots[np.isin(pilots, part)] for part in members]
-    across, within = across_and_within(share, sum(part.size > 0 for part in parts))
-    for grid, own in zip(grids, parts, strict=True):
-        if own.size:
-            # Pilots serve the tightest that has them for neighbours.
-            values = VariantValues.of(grid.scene.study, cases, own).all_as_tight(span[0])
-            climbs.append(Climb(grid.of_pilots(), values, ladder_of(asked, grid), halted, within, span))
-    across([climb.go for climb in climbs])
-    return _chosen(asked, cases, climbs, np.concatenate([own for own in parts if own.size]), share)
+class Pilots(NamedTuple):
+    """Pilots of a sweep (by flat numbers) and their scenes, which many variants share. span: of their tolerances."""
+
+    asked: Asked
+    cases: Cases
+    grids: Sequence[SceneGrid]
+    span: tuple[float, float]
+
+    def measured(self, pilots: Counts, scene: int, share: Share) -> tuple[int, Counts, Measured]:
+        """What some pilots of a scene find; with its number and theirs. Raises Halted, and Crashed."""
+        grid = self.grids[scene]
+        # Pilots serve the tightest that has them for neighbours.
+        values = VariantValues.of(grid.scene.study, self.cases, pilots).all_as_tight(self.span[0])
+        try:
+            return scene, pilots, Climb(grid.of_pilots(), values, self.ladder(scene), share, self.span).go()
+        except Crashed as crashed:
+            raise Crashed(pilots[crashed.lanes]) from None
+
+    def measured_in_turn(self, pilots: Counts, halted: Halted, scene: int) -> tuple[int, Counts, Measured]:
+        """The same as a job of its own."""
+        return self.measured(pilots, scene, InTurn(halted))
+
+    def ladder(self, scene: int) -> Ladder:
+        """The ladder of a scene."""
+        return ladder_of(self.asked, self.grids[scene])
+
+    def cost(self, scene: int) -> Array:
+        """(columns x cuts,) modes x steps of every rung; nothing for statics."""
+        grid, ladder = self.grids[scene], self.ladder(scene)
+        modes = [0 if c.fidelity == "static" else grid.model(c).body_modes for c in ladder.columns]
+        return np.asarray(np.outer(modes, grid.unit * np.array(ladder.cuts, dtype=np.float64)).reshape(-1))
 
 
-def _chosen(asked: Asked, cases: Cases, climbs: Sequence[Climb], order: Counts, share: Share) -> Choice:
-    """The choice, once the pilots (by flat numbers in the order of their climbs) are measured."""
-    measured, cost, span = _joined([climb.measured() for climb in climbs]), _cost(climbs[0]), climbs[0].span
+def choose(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Choice:
+    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by some ``drawn`` of them. Raises
+    Halted, and Crashed by flat numbers of pilots.
+
+    The marches of a single scene are shared out, several scenes are as wholes, as jobs that wait for jobs would hold
+    threads."""
+    parts = [drawn[np.isin(drawn, part)] for part in members]
+    of_scenes = [(scene, own) for scene, own in enumerate(parts) if own.size]
+    if len(of_scenes) == 1:
+        found = [pilots.measured(of_scenes[0][1], of_scenes[0][0], share)]
+    else:
+        jobs = [Job(partial(Pilots.measured_in_turn, scene=scene), own) for scene, own in of_scenes]
+        found = sorted(share(pilots, jobs), key=lambda one: (one[0], one[1][0]))
+    order = np.concatenate([own for _, own, _ in found])
+    return _chosen(pilots, of_scenes[0][0], order, _joined([measured for *_, measured in found]), share)
+
+
+class _Neighbours(NamedTuple):
+    """How variants find their neighbours among pilots, and with these their rung."""
+
+    asked: Asked
+    cases: Cases
+    order: Counts
+    weights: Array
+    pilots: Array
+    wanted: Array
+    ranked: NDArray[np.int32]
+    worth: int
+
+    def of(self, part: Counts, halted: Halted) -> tuple[Counts, Numbers, Numbers]:
+        """The neighbours and the rungs of a row of variants, with their flat numbers."""
+        neighbours = np.empty((part.size, min(NEIGHBOURS, self.order.size)), dtype=np.int32)
+        rung, tighter = np.empty(part.size, dtype=np.int32), cases_tolerance(self.asked.study, self.cases)[part]
+        nearest(coordinates(self.cases, part) * self.weights, self.pilots, neighbours)
+        inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
+        neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
+        cheapest(self.wanted, self.ranked, self.worth, neighbours, tighter, rung)
+        return part, neighbours, rung
+
+
+def _chosen(of: Pilots, scene: int, order: Counts, measured: Measured, share: Share) -> Choice:
+    """The choice, once the pilots (by flat numbers in the order of what they found) are measured."""
+    asked, cases, cost = of.asked, of.cases, of.cost(scene)
     pilots = coordinates(cases, order)
     weights = _weights(pilots, measured)
     pilots = np.ascontiguousarray((pilots * weights).T)
     ranked = np.argsort(cost, kind="stable").astype(np.int32)
     ranked = ranked[np.any(np.isfinite(measured.held.reshape(cost.size, -1)[ranked]), axis=1)]
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
-    errors = neighbour_errors_of(asked, measured, nearest_others(pilots, NEIGHBOURS), span)
-    tighter, rung = cases_tolerance(asked.study, cases), np.empty(cases.size, dtype=np.int32)
+    errors = neighbour_errors_of(asked, measured, nearest_others(pilots, NEIGHBOURS), of.span)
+    rung = np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=np.int32)
-
-    def choose_for(part: Counts) -> None:
-        own = slice(part[0], part[-1] + 1)
-        nearest(coordinates(cases, part) * weights, pilots, neighbours[own])
-        inside = np.flatnonzero((order >= part[0]) & (order <= part[-1]))
-        neighbours[order[inside]] = inside[:, None]  # pilots know their own errors
-        cheapest(errors.wanted, ranked, worth, neighbours[own], tighter[own], rung[own])
-
-    share([partial(choose_for, part) for part in np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))])
-    return Choice(climbs[0].ladder, results_of(asked), order, measured, neighbours, rung, errors)
+    rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
+    subject = _Neighbours(asked, cases, order, weights, pilots, errors.wanted, ranked, worth)
+    for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
+        neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
+    return Choice(of.ladder(scene), results_of(asked), order, measured, neighbours, rung, errors)
 
 
 def usual_pilots(size: int) -> int:
@@ -284,13 +330,6 @@ def _without_negative(columns: Array, wanted: Array) -> Array:
             rest = product[d] - gram[d] @ found + gram[d, d] * found[d]
             found[d] = max(0.0, rest / gram[d, d]) if gram[d, d] > 0.0 else 0.0
     return found
-
-
-def _cost(climb: Climb) -> Array:
-    """(columns x cuts,) modes x steps of every rung; nothing for statics."""
-    grid, ladder = climb.grid, climb.ladder
-    modes = [0 if c.fidelity == "static" else grid.model(c).body_modes for c in ladder.columns]
-    return np.asarray(np.outer(modes, grid.unit * np.array(ladder.cuts, dtype=np.float64)).reshape(-1))
 
 
 def _joined(parts: Sequence[Measured]) -> Measured:

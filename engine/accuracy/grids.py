@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -52,6 +52,18 @@ class SceneGrid:
     places: int = MOST_PLACES
     _models: dict[Numerics, SceneModel] = field(default_factory=dict)
     _readings: dict[tuple[str, int], StaticUnit] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process makes the same of: without what was built meanwhile."""
+        return {
+            "asked": self.asked,
+            "scene": self.scene,
+            "values": self.values,
+            "unit": self.unit,
+            "places": self.places,
+            "_models": {},
+            "_readings": {},
+        }
 
     @cached_property
     def grid(self) -> Grid:

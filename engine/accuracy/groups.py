@@ -5,14 +5,15 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import lcm
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from engine.accuracy.grids import MOST_COMPARED
+from engine.accuracy.jobs import InTurn
 from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import differences, results_of, tolerances, worst_held
@@ -26,7 +27,7 @@ from results_schema.status import Fidelity
 if TYPE_CHECKING:
     from engine.accuracy.choice import Choice
     from engine.accuracy.grids import SceneGrid
-    from engine.accuracy.reference import Halted
+    from engine.accuracy.jobs import Halted
     from engine.march.outcome import Flat, Outcome
     from engine.march.tables import SceneTables
     from engine.model.numerics import Numerics
@@ -118,6 +119,10 @@ class Group:
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process makes the same of: without what was built meanwhile."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
 
 @dataclass(eq=False)
 class MarchGroup(Group):
@@ -159,7 +164,8 @@ class MarchGroup(Group):
         return Found(now, used(self.tables, variants.size), choice.errors(variants), held)
 
     def forget(self) -> None:
-        self.tables.forget()
+        if "tables" in self.__dict__:
+            self.tables.forget()
 
 
 @dataclass(eq=False)
@@ -193,11 +199,11 @@ class ConvergingGroup(Group):
     ) -> Found:
         asked, results = self.grid.asked, results_of(self.grid.asked)
         levels = as_fixed(self.grid)
-        own = converge(self.grid, values, levels, ANSWER_PART, halted=halted)
+        own = converge(self.grid, values, levels, ANSWER_PART, share=InTurn(halted))
         tighter = values.tighter
         if is_free(self.grid):
             return Found(own.outcome, own.used, own.error, worst_held(own.error, results, tighter))
-        truth = converge(self.grid, values, in_full(self.grid), TRUTH_PART, halted=halted)
+        truth = converge(self.grid, values, in_full(self.grid), TRUTH_PART, share=InTurn(halted))
         apart = differences(asked, self.scene, values, own.outcome, truth.outcome) + truth.error
         left_open = len(levels.numerics) > 1
         held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)

@@ -7,15 +7,17 @@ as no worse.
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, swift_scheme_fits
-from engine.accuracy.reference import Converged, Halted, Share, as_fixed, converge, in_full, is_free
+from engine.accuracy.jobs import Halted, InTurn, Job, Share
+from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
 from engine.march.outcome import Asked, outcome
@@ -100,6 +102,85 @@ def _models(asked: Asked, grid: SceneGrid) -> list[str]:
     return [*found, "auto"]
 
 
+class March(NamedTuple):
+    """A march of n pilots (by their places) on a rung: error (R, n) of every result, held (n,), and modes x steps."""
+
+    column: int
+    rung: int
+    lanes: Counts
+    error: Array
+    held: Array
+    work: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rungs:
+    """Marches of pilots on the ladder, measured. truth: the references; aim: those within what the study fixes. span:
+    as of `Climb`."""
+
+    grid: SceneGrid
+    values: VariantValues
+    ladder: Ladder
+    span: tuple[float, float]
+    truth: Converged
+    aim: Converged
+    _rules: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+
+    def march(self, lanes: Counts, halted: Halted, column: int, rung: int) -> March:
+        """March some pilots on a rung. Raises Halted."""
+        model, by, values = self.model(column), self.ladder.cuts[rung], self.values.part(lanes)
+        tables = self.grid.once(model, by)
+        now = outcome(self.grid.asked, tables, values, self.grid.stations(model, by), halted)
+        tables.forget()
+        results = deciding(results_of(self.grid.asked), self.grid.asked.study.solver.tolerance)
+        error = differences(self.grid.asked, model, values, now, self.truth.outcome.of(lanes))
+        against = error
+        if self.aim is not self.truth:
+            against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
+        work = float(lanes.size * model.body_modes * tables.steps)
+        return March(column, rung, lanes, error, worst_held(against, results), work)
+
+    def climb(self, lanes: Counts, halted: Halted, column: int, floor: Array) -> list[March]:
+        """From the coarsest rung that each of some pilots may take, until nothing is gained; floor (P,): what the
+        column leaves. Raises Halted."""
+        cuts, fine = np.array(self.ladder.cuts), self.fine(column)
+        least, periods = self.least(column)
+        rung = np.searchsorted(cuts, np.maximum(least, FIRST / self.unit(column) * periods))
+        active, found = lanes[rung[lanes] < np.minimum(fine[lanes], cuts.size)], list[March]()
+        while active.size:
+            here = int(rung[active].min())
+            own = active[rung[active] == here]
+            found.append(self.march(own, halted, column, here))
+            small = found[-1].held <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
+            rung[own] += 1
+            done = own[small | (rung[own] >= np.minimum(fine[own], cuts.size))]
+            active = active[~np.isin(active, done)]
+        return found
+
+    def fine(self, column: int) -> Counts:
+        """(P,) the rung at which a column's modes are judged."""
+        least, periods = self.least(column)
+        of_period, of_grid = FINE.get(self.model(column).scheme.name, FINE[""])
+        wanted = np.maximum(least, np.maximum(of_period / self.unit(column) * periods, of_grid))
+        return np.searchsorted(np.array(self.ladder.cuts), wanted)
+
+    def least(self, column: int) -> tuple[Array, Array]:
+        """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
+        if column not in self._rules:
+            model = self.model(column)
+            periods = self.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
+            self._rules[column] = least_steps(model, self.values) / self.unit(column), periods
+        return self._rules[column]
+
+    def model(self, column: int) -> SceneModel:
+        """The scene with the numerics of a column."""
+        return self.grid.model(self.ladder.columns[column])
+
+    def unit(self, column: int) -> int:
+        """Steps of the lowest rung over one passage or cycle."""
+        return self.grid.unit * self.ladder.columns[column].scheme.stride
+
+
 @dataclass(eq=False)
 class Climb:
     """Pilots of one scene on the ladder. span: the least and the largest `solver.tolerance` that a variant wants, over
@@ -108,46 +189,42 @@ class Climb:
     grid: SceneGrid
     values: VariantValues
     ladder: Ladder
-    halted: Halted
-    share: Share
+    share: Share = field(default_factory=InTurn)
     span: tuple[float, float] = (1.0, 1.0)
-    truth: Converged = field(init=False)
-    aim: Converged = field(init=False)
+    rungs: Rungs = field(init=False)
     found: list[tuple[Counts, Array]] = field(init=False)
-    march: NDArray[np.int32] = field(init=False)
     held: Array = field(init=False)
+    march: NDArray[np.int32] = field(init=False)
     marched: NDArray[np.bool_] = field(init=False)
-    floor: dict[int, Array] = field(init=False)
-    enough: dict[str, Array] = field(init=False)
-    work: Array = field(init=False)
-    _rules: dict[int, tuple[Array, Array]] = field(default_factory=dict)
-    _finding: threading.Lock = field(default_factory=threading.Lock)
+    work: float = 0.0
+    floor: dict[int, Array] = field(default_factory=dict)
+    enough: dict[str, Array] = field(default_factory=dict)
 
-    def go(self) -> None:
+    def go(self) -> Measured:
         """Find the references of the pilots, what each model and number of modes can do for them, and with how many
-        steps. Raises Halted."""
-        refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, halted=self.halted, share=self.share)
-        full = refer(levels=in_full(self.grid))
-        self.truth, self.aim = full, full if is_free(self.grid) else refer(levels=as_fixed(self.grid))
+        steps. Raises Halted, and Crashed by the places of pilots."""
+        refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, share=self.share)
+        truth = refer(levels=in_full(self.grid))
+        aim = truth if is_free(self.grid) else refer(levels=as_fixed(self.grid))
+        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim)
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
-        self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(full.error)), np.inf))]
+        self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
         self.march = np.zeros(shape, dtype=np.int32)
         self.held = np.full(shape, np.inf)
-        self.marched, self.work = np.zeros(shape[:2], dtype=np.bool_), np.zeros(shape[0])
-        self.floor, self.enough = {}, {}
+        self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        self.share([partial(self._climb, column) for column in self.floor])
+        for marches in self.share(self.rungs, list(self._climbs())):
+            self._take(marches)
         for name, enough in self.enough.items():
             self._fill(name, enough)
+        return self._measured(truth, aim is truth)
 
-    def measured(self) -> Measured:
+    def _measured(self, truth: Converged, free: bool) -> Measured:
         """What the jobs found."""
-        work = float(self.work.sum() + self.truth.spent.sum())
+        work = float(self.work + truth.spent.sum())
         pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
-        return Measured(
-            error, pilot, self.march, self.held, self.truth.error, self.marched, work, self.aim is self.truth
-        )
+        return Measured(error, pilot, self.march, self.held, truth.error, self.marched, work, free)
 
     def _judge(self, name: str) -> None:
         """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave
@@ -156,9 +233,8 @@ class Climb:
         everywhere = np.ones(self.values.size, dtype=np.bool_)
         if name == "static" or len(self.ladder.cuts) == 1:
             for column in own:
-                self._march(
-                    column, 0, np.flatnonzero(self._least(column)[0] <= 1.0 if name != "static" else everywhere)
-                )
+                fits = self.rungs.least(column)[0] <= 1.0 if name != "static" else everywhere
+                self._march(column, {0: np.flatnonzero(fits)})
             return
         families: dict[int, list[int]] = {}
         for column in own:
@@ -176,35 +252,37 @@ class Climb:
     def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
         """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these
         would be more work than the reference."""
-        cuts, fine = np.array(self.ladder.cuts), self._fine(column)
         if not fits.any():
             return np.full(self.values.size, np.inf)
-        work = cuts[np.minimum(fine, cuts.size - 1)] * self._unit(column) * self._model(column).body_modes
-        lanes = np.flatnonzero(fits & (fine < cuts.size) & (work <= self.truth.used["work"]))
-        rungs = [int(rung) for rung in np.unique(fine[lanes])[::-1]]
-        self.share([partial(self._march, column, rung, lanes[fine[lanes] == rung]) for rung in rungs])
+        cuts, fine, rungs = np.array(self.ladder.cuts), self.rungs.fine(column), self.rungs
+        work = cuts[np.minimum(fine, cuts.size - 1)] * rungs.unit(column) * rungs.model(column).body_modes
+        lanes = np.flatnonzero(fits & (fine < cuts.size) & (work <= rungs.truth.used["work"]))
+        self._march(column, {int(rung): lanes[fine[lanes] == rung] for rung in np.unique(fine[lanes])[::-1]})
         found = np.full(self.values.size, np.inf)
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
 
-    def _climb(self, column: int) -> None:
-        """From the coarsest rung that each pilot may take, until nothing is gained."""
-        floor = self.floor[column]
-        worth = floor <= HOPELESS * self.span[1]
-        if not worth.any():
-            return
-        cuts, fine = np.array(self.ladder.cuts), self._fine(column)
-        least, periods = self._least(column)
-        rung = np.searchsorted(cuts, np.maximum(least, FIRST / self._unit(column) * periods))
-        active = np.flatnonzero(worth & (rung < np.minimum(fine, cuts.size)))
-        while active.size:
-            here = int(rung[active].min())
-            own = active[rung[active] == here]
-            self._march(column, here, own)
-            small = self.held[column, here, own] <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
-            rung[own] += 1
-            done = own[small | (rung[own] >= np.minimum(fine[own], cuts.size))]
-            active = active[~np.isin(active, done)]
+    def _climbs(self) -> Iterator[Job[list[March]]]:
+        """Of all columns that can hold the tolerance of some pilots at all."""
+        for column, floor in self.floor.items():
+            worth = np.flatnonzero(floor <= HOPELESS * self.span[1])
+            if worth.size:
+                yield Job(partial(Rungs.climb, column=column, floor=floor), worth)
+
+    def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
+        """March some pilots on each of some rungs."""
+        jobs = [Job(partial(Rungs.march, column=column, rung=rung), own) for rung, own in pilots.items() if own.size]
+        self._take(self.share(self.rungs, jobs))
+
+    def _take(self, marches: Iterable[March]) -> None:
+        """What marches found; of a column's, finer rungs are no worse."""
+        for column, rung, lanes, error, held, work in marches:
+            first = sum(pilot.size for pilot, _ in self.found)
+            self.marched[column, rung] = True
+            self.held[column, rung:, lanes] = held[:, None]
+            self.march[column, rung:, lanes] = first + np.arange(lanes.size)[:, None]
+            self.found.append((lanes, error.T))
+            self.work += work
 
     def _fill(self, name: str, enough: Array) -> None:
         """Pilots for which fewer modes were enough are no worse with more and the same steps, within their rules."""
@@ -215,51 +293,7 @@ class Climb:
             previous = before.get(numerics.scheme)
             lanes = np.flatnonzero((numerics.modes > enough) & ~np.isfinite(self.held[column]).any(axis=0))
             if previous is not None and lanes.size:
-                allowed = np.array(self.ladder.cuts)[:, None] >= self._least(column)[0][lanes]
+                allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
                 self.held[column][:, lanes] = np.where(allowed, self.held[previous][:, lanes], np.inf)
                 self.march[column][:, lanes] = np.where(allowed, self.march[previous][:, lanes], 0)
             before[numerics.scheme] = column
-
-    def _fine(self, column: int) -> Counts:
-        """(P,) the rung at which a column's modes are judged."""
-        least, periods = self._least(column)
-        of_period, of_grid = FINE.get(self._model(column).scheme.name, FINE[""])
-        wanted = np.maximum(least, np.maximum(of_period / self._unit(column) * periods, of_grid))
-        return np.searchsorted(np.array(self.ladder.cuts), wanted)
-
-    def _least(self, column: int) -> tuple[Array, Array]:
-        """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
-        if column not in self._rules:
-            model = self._model(column)
-            periods = self.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
-            self._rules[column] = least_steps(model, self.values) / self._unit(column), periods
-        return self._rules[column]
-
-    def _model(self, column: int) -> SceneModel:
-        return self.grid.model(self.ladder.columns[column])
-
-    def _unit(self, column: int) -> int:
-        """Steps of the lowest rung over one passage or cycle."""
-        return self.grid.unit * self.ladder.columns[column].scheme.stride
-
-    def _march(self, column: int, rung: int, lanes: Counts) -> None:
-        """March some pilots on a rung; finer ones are no worse."""
-        if not lanes.size:
-            return
-        model, by, values = self._model(column), self.ladder.cuts[rung], self.values.part(lanes)
-        tables = self.grid.once(model, by)
-        now = outcome(self.grid.asked, tables, values, self.grid.stations(model, by), self.halted)
-        tables.forget()
-        results = deciding(results_of(self.grid.asked), self.grid.asked.study.solver.tolerance)
-        error = differences(self.grid.asked, model, values, now, self.truth.outcome.of(lanes))
-        against = error
-        if self.aim is not self.truth:
-            against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
-        held = worst_held(against, results)
-        self.marched[column, rung] = True
-        self.held[column, rung:, lanes] = held[:, None]
-        with self._finding:
-            self.work[column] += lanes.size * model.body_modes * tables.steps
-            first = sum(pilot.size for pilot, _ in self.found)
-            self.found.append((lanes, error.T))
-        self.march[column, rung:, lanes] = first + np.arange(lanes.size)[:, None]

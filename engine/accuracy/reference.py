@@ -8,7 +8,7 @@ ratios vary by chance, five times that is told where it is far below d, and no l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -23,6 +23,7 @@ from engine.accuracy.grids import (
     swift_scheme_fits,
     unit_steps,
 )
+from engine.accuracy.jobs import InTurn, Job, Share
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
 from engine.march.outcome import Flat, Outcome, outcome, used
@@ -30,9 +31,6 @@ from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
-
-Halted = Callable[[], bool]
-Share = Callable[[Sequence[Callable[[], object]]], None]
 
 MODES = (4, 8, 16, 32, 64)  # of the levels: 64 are what a beam's closed forms were tested for
 #: Modes x steps over a passage or cycle of one march at most: some ten milliseconds. 24 modes and 4,800 steps hold 1e-3
@@ -71,19 +69,7 @@ class Beyond(NamedTuple):
     dear: float
 
 
-NO_FURTHER = Beyond(0, DEAR)
-
-
-def in_turn(jobs: Sequence[Callable[[], object]]) -> None:
-    """Jobs one after the other."""
-    for job in jobs:
-        job()
-
-
-def across_and_within(share: Share, scenes: int) -> tuple[Share, Share]:
-    """What does jobs of so many scenes, and what does those within one: a single scene is shared out, several are as
-    wholes, as jobs that wait for jobs would hold threads."""
-    return (in_turn, share) if scenes == 1 else (share, in_turn)
+NO_FURTHER, IN_TURN = Beyond(0, DEAR), InTurn()
 
 
 class Levels(NamedTuple):
@@ -134,21 +120,28 @@ def is_free(grid: SceneGrid) -> bool:
     return whole and terms and study.solver.scheme == "auto" and not grid.fixed
 
 
+class Marches(NamedTuple):
+    """Variants that are marched level by level."""
+
+    grid: SceneGrid
+    values: VariantValues
+    levels: Levels
+
+
 def converge(
     grid: SceneGrid,
     values: VariantValues,
     levels: Levels,
     part: float,
     beyond: Beyond = NO_FURTHER,
-    halted: Halted = lambda: False,
-    share: Share = in_turn,
+    share: Share = IN_TURN,
 ) -> Converged:
     """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and
-    levels ``beyond``; ``share`` does the marches of a level. Raises Halted."""
+    levels ``beyond``; ``share`` does the marches of a level. Raises Halted, and Crashed by the places of variants."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
-    march = partial(_march, grid, levels, halted=halted, share=share)
-    now, spent = march(values, 0)
+    march = partial(_march, Marches(grid, values, levels), share)
+    now, spent = march(np.arange(values.size), 0)
     found = Converged(
         now,
         np.full((len(results), values.size), np.nan),
@@ -163,7 +156,7 @@ def converge(
         if not active.size:
             break
         own = values.part(active)
-        now, spent = march(own, level)
+        now, spent = march(active, level)
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
         remaining = left_over(apart, change[:, active])
@@ -207,29 +200,33 @@ def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: 
     return replace(found, outcome=everything, error=errors, used=used_)
 
 
-def _march(
-    grid: SceneGrid, levels: Levels, values: VariantValues, level: int, *, halted: Halted, share: Share
-) -> tuple[Outcome, Flat]:
-    """One level of variants, each with its own number of steps."""
-    model, by = grid.model(levels.numerics[level]), _by(grid, values, levels, level)
-    marched: dict[int, tuple[Counts, Outcome, Flat]] = {}
-
-    def go(cut: int) -> None:
-        lanes, tables = np.flatnonzero(by == cut), grid.once(model, cut)
-        now = outcome(grid.asked, tables, values.part(lanes), grid.stations(model, cut), halted)
-        marched[cut] = lanes, now, used(tables, lanes.size)
-        tables.forget()
-
-    share([partial(go, int(cut)) for cut in np.unique(by)[::-1]])
+def _march(marches: Marches, share: Share, lanes: Counts, level: int) -> tuple[Outcome, Flat]:
+    """One level of some of the variants, ascending, each with its own number of steps."""
+    grid, values, levels = marches
+    by = _by(grid, values.part(lanes), levels, level)
+    cuts = [int(cut) for cut in np.unique(by)[::-1]]
+    marched = list(share(marches, [Job(partial(_on_cut, level=level, cut=cut), lanes[by == cut]) for cut in cuts]))
     if len(marched) == 1:
-        return next(iter(marched.values()))[1:]
-    found = next(iter(marched.values()))[1].of(np.zeros(values.size, dtype=np.int64))  # as large, yet to be filled
-    spent: Flat = {}
-    for lanes, now, taken in marched.values():
-        found = found.replaced(lanes, now)
+        return marched[0][1:]
+    found, spent = marched[0][1].of(np.zeros(lanes.size, dtype=np.int64)), Flat()  # as large, yet to be filled
+    for own, now, taken in marched:
+        here = np.searchsorted(lanes, own)
+        found = found.replaced(here, now)
         for name, column in taken.items():
-            spent.setdefault(name, np.zeros(values.size, dtype=column.dtype))[lanes] = column
+            spent.setdefault(name, np.zeros(lanes.size, dtype=column.dtype))[here] = column
     return found, spent
+
+
+def _on_cut(
+    marches: Marches, lanes: Counts, halted: Callable[[], bool], *, level: int, cut: int
+) -> tuple[Counts, Outcome, Flat]:
+    """Variants of a level that take as many steps."""
+    grid, values, levels = marches
+    model = grid.model(levels.numerics[level])
+    tables = grid.once(model, cut)
+    now = outcome(grid.asked, tables, values.part(lanes), grid.stations(model, cut), halted)
+    tables.forget()
+    return lanes, now, used(tables, lanes.size)
 
 
 def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Counts:

@@ -11,21 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.accuracy.grids import SceneGrid
-from engine.accuracy.groups import PACE, USED, Group
+from engine.accuracy.groups import PACE, USED
+from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
 from engine.accuracy.ladder import REFERENCE_PART
-from engine.accuracy.reference import (
-    DEAR,
-    Beyond,
-    Converged,
-    Halted,
-    Share,
-    across_and_within,
-    converge,
-    in_full,
-    in_turn,
-    usual_work,
-)
+from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, usual_work
 from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
@@ -109,40 +98,54 @@ def _seconds(plan: Plan, count: int) -> float:
     return found
 
 
-def audit(plan: Plan, variants: Counts, halted: Halted, share: Share = in_turn) -> Audit:
-    """Compute some variants again, by jobs that ``share`` does. Raises Halted."""
+def audit(plan: Plan, variants: Counts, share: Share = IN_TURN) -> Audit:
+    """Compute some variants again, by jobs that ``share`` does: the marches of a single scene, or scenes as wholes.
+    Raises Halted, and Crashed by flat numbers of variants."""
     parts = [variants[np.isin(variants, members)] for members in plan.members]
-    of_scenes = [(grid, own) for grid, own in zip(plan.grids, parts, strict=True) if own.size]
-    across, within = across_and_within(share, len(of_scenes))
-    found: list[Audit] = []
-
-    def of_scene(grid: SceneGrid, own: Counts) -> None:
-        values = VariantValues.of(grid.scene.study, plan.cases, own)
-        truth = converge(
-            grid, values, in_full(grid), REFERENCE_PART, beyond=Beyond(1, _dear(plan)), halted=halted, share=within
-        )
-        groups = [g for g in plan.groups if g.grid is grid and np.isin(own, g.variants).any()]
-        within([partial(compare, group, own, truth) for group in groups])
-
-    def compare(group: Group, own: Counts, truth: Converged) -> None:
-        found.append(_compared(plan, group, own, truth, halted))
-
-    across([partial(of_scene, *scene) for scene in of_scenes])
-    return joined(found, plan, variants.size)
+    of_scenes = [(scene, own) for scene, own in enumerate(parts) if own.size]
+    if len(of_scenes) == 1:
+        return joined(_of_scene(plan, *of_scenes[0], share), plan, variants.size)
+    found = share(plan, [Job(partial(_in_turn, scene=scene), own) for scene, own in of_scenes])
+    return joined([one for ones in found for one in ones], plan, variants.size)
 
 
-def _compared(plan: Plan, group: Group, variants: Counts, truth: Converged, halted: Halted) -> Audit:
-    """Those of some variants (n,), whose truth is known, that belong to a group."""
-    lanes = np.flatnonzero(np.isin(variants, group.variants))
-    own, true = variants[lanes], truth.outcome.of(lanes)
-    values = plan.values(group, own)
-    archived = group.found(values, own, plan.choice, halted, "histories")
-    known = ~lost(true.status) & ~lost(archived.outcome.status)
-    same = [truth.used[name][lanes] == archived.used[name] for name in USED]
-    known &= ~np.all(same, axis=0)  # a march is no second source of itself
-    observed = differences(plan.asked, group.scene, values, archived.outcome, true)
-    told = told_errors(archived, results_of(plan.asked))
-    return Audit(own[known], observed[:, known], told[:, known], truth.error[:, lanes[known]], 0)
+def _in_turn(plan: Plan, own: Counts, halted: Halted, scene: int) -> list[Audit]:
+    """The audit of some variants of a scene as one job."""
+    return _of_scene(plan, scene, own, InTurn(halted))
+
+
+def _of_scene(plan: Plan, scene: int, own: Counts, share: Share) -> list[Audit]:
+    """The audit of some variants of a scene, group by group."""
+    grid = plan.grids[scene]
+    values = VariantValues.of(grid.scene.study, plan.cases, own)
+    try:
+        truth = converge(grid, values, in_full(grid), REFERENCE_PART, Beyond(1, _dear(plan)), share)
+        groups = [number for number, group in enumerate(plan.groups) if group.grid is grid]
+        parts = [(number, np.flatnonzero(np.isin(own, plan.groups[number].variants))) for number in groups]
+        jobs = [Job(partial(_Audited.compared, group=number), lanes) for number, lanes in parts if lanes.size]
+        return list(share(_Audited(plan, own, truth), jobs))
+    except Crashed as crashed:
+        raise Crashed(own[crashed.lanes]) from None
+
+
+class _Audited(NamedTuple):
+    """Variants of a scene that are audited, and their truth."""
+
+    plan: Plan
+    variants: Counts
+    truth: Converged
+
+    def compared(self, lanes: Counts, halted: Halted, group: int) -> Audit:
+        """Those of them, whose truth is known, that belong to a group."""
+        plan, own, of = self.plan, self.variants[lanes], self.plan.groups[group]
+        values, true = plan.values(of, own), self.truth.outcome.of(lanes)
+        archived = of.found(values, own, plan.choice, halted, "histories")
+        known = ~lost(true.status) & ~lost(archived.outcome.status)
+        same = [self.truth.used[name][lanes] == archived.used[name] for name in USED]
+        known &= ~np.all(same, axis=0)  # a march is no second source of itself
+        observed = differences(plan.asked, of.scene, values, archived.outcome, true)
+        told = told_errors(archived, results_of(plan.asked))
+        return Audit(own[known], observed[:, known], told[:, known], self.truth.error[:, lanes[known]], 0)
 
 
 def joined(audits: Sequence[Audit], plan: Plan, asked: int) -> Audit:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import USED, Found, Group, marches_again
+from engine.accuracy.jobs import Halted
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
@@ -18,7 +19,15 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 from results_schema.statuses import gravest, lost
-from results_schema.store.rows import Rows, joined
+from results_schema.store.rows import Chunk, Rows, joined
+
+
+def march_chunk(plan: Plan, variants: Counts, halted: Halted, group: int, beside: int) -> Chunk:
+    """One chunk of a group, by its number, as a job; beside: chunks that are marched side by side, of which each may be
+    of another group. Raises Halted."""
+    plan.forget_before(group - beside)
+    arrays, selected = run_chunk(plan, plan.groups[group], variants, halted)
+    return Chunk(Rows(variants, arrays), selected)
 
 
 def run_chunk(

@@ -1,22 +1,20 @@
-"""Run a plan: chunks of variants as dask tasks on threads. The only file that knows dask and threads."""
+"""Run a plan: pilots, then chunks of variants, shared out to threads or workers."""
 
 from __future__ import annotations
 
-import os
-import queue
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any, TypeVar
+from typing import Unpack
 
 import numpy as np
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.groups import Group
-from engine.batch.plan import EVERY_MARCH, Plan, make_plan
+from engine.accuracy.jobs import Crashed, Halted, Job
+from engine.batch.places import Place, Shared, Threads, Where, cores, place, run_jobs
+from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
 from engine.march.richardson import march_pair, march_scheme
@@ -26,40 +24,37 @@ from engine.model.lane_table import in_whole_blocks, padded
 from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.arrays import Counts
-from results_schema.errors import BadInput, Interrupted
+from results_schema.errors import Interrupted
 from results_schema.late import xr
-from results_schema.store.rows import Chunk, Collector, Rows
+from results_schema.store.rows import Chunk, Collector
 
-T = TypeVar("T")
-Halted = Callable[[], bool]
 Sink = Callable[[Chunk], object]
 Progress = Callable[[int, int], object]
-
-_COUNTING = threading.Lock()
-WAITING = 4  # finished chunks per thread that may wait for the sink
 
 
 @one_thread()
 def run(
     study: Study,
     *,
-    threads: int | None = None,
     chunk: int | None = None,
     reduction: Reduction | None = None,
     results: str = EVERY_MARCH,
     progress: Progress | None = None,
+    **where: Unpack[Where],
 ) -> xr.Dataset:
-    """Run a study in memory and return the march's dataset. Raises BadInput.
+    """Run a study in memory and return the march's dataset. Raises BadInput, and WorkersGaveUp.
 
-    threads: default all processors. chunk: variants per task, chosen by time and memory otherwise; results do not
-    depend on either, bit for bit. reduction, results: as of `make_plan`. Until it returns, linear algebra keeps to
-    one thread in the whole process.
+    chunk: variants per task, chosen by time and memory otherwise; results do not depend on it, nor on where they are
+    computed, bit for bit. reduction, results: as of `make_plan`. threads: default all processors. workers: processes of
+    this machine to run on. scheduler: the address of a dask scheduler whose workers to run on. Until it returns, linear
+    algebra keeps to one thread in the whole process.
     """
     from engine.batch.dataset import build
 
     plan = make_plan(study, reduction=reduction, results=results)
     collector = Collector(plan.size)
-    execute(plan, collector.add, threads=threads, chunk=chunk, progress=progress)
+    with place(**where) as here:
+        execute(plan, collector.add, here, chunk=chunk, progress=progress)
     return build(plan, collector.arrays, collector.selected)
 
 
@@ -67,8 +62,8 @@ def run(
 def execute(
     plan: Plan,
     sink: Sink,
+    here: Place | None = None,
     *,
-    threads: int | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
     stop: threading.Event | None = None,
@@ -78,12 +73,15 @@ def execute(
 
     Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
     """
-    if threads is not None and threads < 1:
-        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))
+    from engine.batch.chunk import march_chunk
+    from engine.batch.crashed import crashed_chunks
+
+    here = here or Threads(cores())
     warm_up(plan)
-    choose(plan, threads, stop)
-    tasks = list(plan.chunks(done, chunk))
-    left = Counter(id(group) for group, _ in tasks)
+    choose(plan, here, stop)
+    tasks = [
+        Job(partial(march_chunk, group=number, beside=here.beside), part) for number, part in plan.chunks(done, chunk)
+    ]
     finished = 0 if done is None else int(done.size)
 
     def take(found: Chunk) -> None:
@@ -93,7 +91,10 @@ def execute(
         if progress is not None:
             progress(finished, plan.size)
 
-    share_out([partial(_task, plan, task, left) for task in tasks], threads or cores(), take, stop=stop)
+    with _interrupted():
+        crashed = here.share_out(plan, tasks, take, _asked(stop))
+        for found in crashed_chunks(plan, crashed, Shared(here, _asked(stop))):
+            take(found)
 
 
 def warm_up(plan: Plan) -> None:
@@ -102,25 +103,43 @@ def warm_up(plan: Plan) -> None:
         _first_steps(grid)
 
 
-def choose(plan: Plan, threads: int | None, stop: threading.Event | None) -> None:
-    """What the variants are computed with, measured on threads. Raises Interrupted when ``stop`` is set."""
+def choose(plan: Plan, here: Place, stop: threading.Event | None) -> None:
+    """What the variants are computed with, measured by pilots; those that end every process are left out. Raises
+    Interrupted when ``stop`` is set."""
+    without = NOBODY
+    with _interrupted():
+        while True:
+            try:
+                return plan.choose(Shared(here, _asked(stop)), without=without)
+            except Crashed as crashed:
+                without = np.union1d(without, crashed.lanes)
+
+
+@contextmanager
+def _interrupted() -> Iterator[None]:
+    """Whatever is given up because somebody asked to stop is an interruption."""
     try:
-        plan.choose(partial(run_jobs, threads=threads or cores()), partial(_any_set, (stop,)))
+        yield
     except Gone:
         raise Interrupted("stopped; finished work is kept", remedy="run again to go on") from None
+
+
+def _asked(stop: threading.Event | None) -> Halted:
+    """Whether somebody asked to stop."""
+    return (lambda: False) if stop is None else stop.is_set
 
 
 def march_seconds(plan: Plan, threads: int | None = None, repeats: int = 1) -> float:
     """Wall time of marching every variant once with the study's sensors alone, without compiling, tabulating, and
     gathering results; the mean over ``repeats`` marches in a row."""
     nothing, stride = np.zeros(0, dtype=np.int64), plan.base.scheme.stride
-    tables = {id(b): SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in plan.groups}
-    workers = threads or cores()
+    groups, workers = plan.groups, threads or cores()
+    tables = [SceneTables(b.scene, b.steps, plan.asked.window, "sensors", stride) for b in groups]
     chunks = list(plan.chunks(None, -(-plan.size // (4 * workers)))) * repeats
     if stride > 1:
-        pairs = [(tables[id(group)], plan.values(group, padded(part)), nothing, part.size) for group, part in chunks]
+        pairs = [(tables[n], plan.values(groups[n], padded(part)), nothing, part.size) for n, part in chunks]
         return seconds_of_jobs([partial(march_pair, *pair) for pair in pairs], workers) / repeats
-    marches = [prepare(tables[id(group)], plan.values(group, padded(part)), nothing) for group, part in chunks]
+    marches = [prepare(tables[n], plan.values(groups[n], padded(part)), nothing) for n, part in chunks]
     return seconds_of(marches, workers) / repeats
 
 
@@ -141,109 +160,9 @@ def seconds_of_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> float
     return time.perf_counter() - start
 
 
-def cores() -> int:
-    """Threads where nobody says how many."""
-    return os.cpu_count() or 1
-
-
-def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
-    """Jobs on threads; on the caller's own where that is to be the only one. The only place that shares out work."""
-    if threads == 1:
-        for job in jobs:
-            job()
-        return
-    import dask.threaded
-
-    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
-    dask.threaded.get(graph, list(graph), num_workers=threads)
-
-
-def share_out(
-    jobs: Sequence[Callable[[Halted], T]],
-    threads: int,
-    sink: Callable[[T], object],
-    *,
-    stop: threading.Event | None = None,
-    grace: float = np.inf,
-) -> None:
-    """Jobs on threads beside the calling one, which hands result after result to ``sink``, in the order they finish.
-
-    A job is given what tells whether to give up. Raises what a job or the sink raised, and Interrupted when ``stop`` is
-    set, after the jobs in flight have ended or so many seconds of ``grace``.
-    """
-    halt, results = threading.Event(), queue.Queue[Any](maxsize=WAITING * threads)
-    halted = partial(_any_set, (halt, stop))
-    worker = threading.Thread(
-        target=run_jobs, args=([partial(_do, job, results, halted) for job in jobs], threads), daemon=True
-    )
-    worker.start()
-    try:
-        for _ in jobs:
-            found = _next(results, stop)
-            if isinstance(found, BaseException):
-                raise found
-            sink(found)
-    finally:
-        halt.set()
-        end = time.monotonic() + grace
-        while worker.is_alive() and time.monotonic() < end:
-            _drain(results)
-            worker.join(0.01)
-
-
-def _do(job: Callable[[Halted], object], results: queue.Queue[Any], halted: Halted) -> None:
-    """One job; what it raises travels to the caller as its result."""
-    if halted():
-        return
-    try:
-        found: object = job(halted)
-    except BaseException as error:
-        found = error
-    while not halted():  # wait for room in the queue, unless the caller has gone
-        with suppress(queue.Full):
-            results.put(found, timeout=0.05)
-            return
-
-
 def _first_steps(grid: SceneGrid) -> None:
     """March one variant over the first segment of a scene with hardly any steps."""
     tables = SceneTables(grid.scene, 4, grid.asked.window, refinement=2)
     with suppress(Gone):
         values = in_whole_blocks(grid.values.part(np.zeros(1, dtype=np.int64)))
         march_scheme(tables, values, np.zeros(0, dtype=np.int64), 1, lambda: True)
-
-
-def _task(plan: Plan, task: tuple[Group, Counts], left: Counter[int], halted: Halted) -> Chunk:
-    """One chunk. The last of a scene drops its tables."""
-    from engine.batch.chunk import run_chunk
-
-    group, variants = task
-    try:
-        arrays, selected = run_chunk(plan, group, variants, halted)
-    finally:
-        with _COUNTING:
-            left[id(group)] -= 1
-            last = left[id(group)] == 0
-        if last:
-            group.forget()
-    return Chunk(Rows(variants, arrays), selected)
-
-
-def _next(results: queue.Queue[Any], stop: threading.Event | None) -> Any:
-    """The next finished chunk, or Interrupted."""
-    while True:
-        if stop is not None and stop.is_set():
-            raise Interrupted("stopped; finished work is kept", remedy="run again to go on")
-        try:
-            return results.get(timeout=0.05)
-        except queue.Empty:
-            continue
-
-
-def _drain(results: queue.Queue[Any]) -> None:
-    while not results.empty():
-        results.get_nowait()
-
-
-def _any_set(events: tuple[threading.Event | None, ...]) -> bool:
-    return any(event is not None and event.is_set() for event in events)

@@ -13,11 +13,11 @@ from math import prod
 
 import numpy as np
 
-from engine.accuracy.choice import PILOTS, Choice, choose
+from engine.accuracy.choice import PILOTS, Choice, Pilots, choose, pilots_of, tolerance_span
 from engine.accuracy.grids import SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
+from engine.accuracy.jobs import Share
 from engine.accuracy.ladder import ladder_of
-from engine.accuracy.reference import Share
 from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES
 from engine.march.envelopes import check_places, places_read
@@ -51,6 +51,7 @@ NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
 #: about as much as the convergence of two hundred variants of one scene.
 FEW, FEW_IN_SCENE = 256, 16
+NOBODY: Counts = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(eq=False)
@@ -68,6 +69,7 @@ class Plan:
     results: str
     choice: Choice | None = None
     _groups: tuple[Group, ...] = field(default=())
+    _forgotten: int = 0
 
     @property
     def size(self) -> int:
@@ -102,10 +104,13 @@ class Plan:
         """(V,) `solver.tolerance` of every variant over the study's."""
         return cases_tolerance(self.study, self.cases)
 
-    def choose(self, share: Share, halted: Callable[[], bool], pilots: int = PILOTS) -> None:
-        """Measure pilots and choose, where the study has many variants. Raises Halted."""
+    def choose(self, share: Share, pilots: int = PILOTS, without: Counts = NOBODY) -> None:
+        """Measure pilots, at most so many and ``without`` some variants, and choose, where the study has many variants.
+        Raises Halted, and Crashed by flat numbers of pilots."""
         if not self.converges and self.choice is None:
-            self.choice = choose(self.asked, self.cases, self.grids, self.members, share, halted, pilots)
+            of = Pilots(self.asked, self.cases, self.grids, tolerance_span(self.asked, self.cases))
+            drawn = np.setdiff1d(pilots_of(self.cases, self.members, pilots), without)
+            self.choice = choose(of, self.members, drawn, share)
             self._groups = ()  # those of before the choice told sizes only
             self.__dict__.pop("seconds", None)
 
@@ -170,13 +175,19 @@ class Plan:
         """Expected peak: results, a chunk per thread, and the program itself."""
         return needed_memory(self.disk_bytes)
 
-    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[Group, Counts]]:
-        """The tasks that are left; ``chunk`` fixes the number of variants of each."""
-        for group in self.groups:
+    def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[int, Counts]]:
+        """The tasks that are left, each with the number of its group; ``chunk`` fixes the variants of each."""
+        for number, group in enumerate(self.groups):
             left = group.variants if done is None else group.variants[~np.isin(group.variants, done)]
             size = chunk or _even(left.size, self.lanes_per_chunk(group))
             for first in range(0, left.size, size):
-                yield group, left[first : first + size]
+                yield number, left[first : first + size]
+
+    def forget_before(self, number: int) -> None:
+        """Drop the tables of groups before one, which no chunk needs any more: chunks come in their order."""
+        for group in self.groups[self._forgotten : max(number, 0)]:
+            group.forget()
+        self._forgotten = max(self._forgotten, number)
 
     def lanes_per_chunk(self, group: Group) -> int:
         """Variants of one task, by time and memory."""

@@ -100,7 +100,12 @@ def draw(study: str, folder: Path | None) -> None:
 @click.argument("study")
 @click.option("-o", "archive", type=_FILE, metavar="ARCHIVE.nc", help="Where to write; default: <study>.nc, here.")
 @click.option("--overwrite", is_flag=True, help="Replace another archive, and unfinished parts of another study.")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+@click.option(
+    "--workers", type=click.IntRange(min=0), default=0, metavar="N", help="Run in N processes of this machine."
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler, tcp://... or tls://..."
+)
 @click.option("-v", "--verbose", is_flag=True, help="Tell also how it was computed.")
 @_THREADS
 @_JSON

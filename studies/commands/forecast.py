@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from engine.accuracy.choice import MOST_SCENES, PILOTS, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
-from engine.batch.execution import run_jobs, warm_up
+from engine.batch.execution import warm_up
+from engine.batch.places import Shared, Threads
 from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
@@ -127,7 +128,7 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
         if not looked.parts or started + LONGER * took > end:
             break
         try:
-            trial.choose(partial(run_jobs, threads=threads), partial(_past, end), pilots)
+            trial.choose(Shared(Threads(threads), partial(_past, end)), pilots)
         except Halted:
             break
         took = time.perf_counter() - started

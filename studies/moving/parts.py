@@ -120,7 +120,7 @@ def _march(
     work: Work,
 ) -> xr.Dataset:
     """The results of some variants of one scene, whose longest takes so many seconds, on threads."""
-    from engine.batch.execution import run_jobs
+    from engine.batch.places import run_jobs
     from engine.batch.plan import shown
     from engine.floating.converge import converge
     from engine.floating.model import build
@@ -148,7 +148,7 @@ def again(
     study: Study, duration: Callable[[Mapping[str, Array], int], Array], variants: Counts, work: Work
 ) -> dict[int, tuple[Array, Array] | None]:
     """Observed and told errors of some variants, scene by scene on threads."""
-    from engine.batch.execution import run_jobs
+    from engine.batch.places import run_jobs
     from engine.floating.converge import observed
     from engine.scene.sweep import expand
     from engine.scene.variants import VariantValues

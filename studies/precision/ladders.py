@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from engine.batch.execution import run_jobs
+from engine.batch.places import Shared, Threads
 from engine.batch.plan import make_plan
 from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
@@ -167,5 +166,5 @@ def around(study: Study, tolerance: float) -> Study:
 def chosen_tables(study: Study, work: Work) -> SceneTables:
     """The tables of the march that is chosen for the first variant of a study of many. Raises Halted."""
     plan = make_plan(study)
-    plan.choose(partial(run_jobs, threads=work.threads), work.halted)
+    plan.choose(Shared(Threads(work.threads), work.halted))
     return next(group.tables for group in plan.groups if 0 in group.variants)

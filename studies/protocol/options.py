@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from results_schema.errors import BadInput
+if TYPE_CHECKING:
+    from engine.batch.places import Where
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """threads: None takes all cores. scheduler: address of a dask scheduler. Raises BadInput for what cannot be."""
+    """threads, workers, scheduler: as of `engine.batch.places.Where`. Raises BadInput for what cannot be."""
 
     overwrite: bool = False
     threads: int | None = None
+    workers: int = 0
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        if self.scheduler is not None:
-            what, where, received = "running on a dask scheduler is not built yet", "--scheduler", self.scheduler
-            raise BadInput(what, where=where, received=received, remedy="leave it out: the study runs on this machine")
+        from engine.batch.places import check_place
+
+        check_place(**self.where)
+
+    @property
+    def where(self) -> Where:
+        """Where to run."""
+        return {"threads": self.threads, "workers": self.workers, "scheduler": self.scheduler}

@@ -4,7 +4,6 @@ so a killed run goes on from there, and put together at the end.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,17 +12,20 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from engine.accuracy.jobs import Job
+from engine.march.stepper import Halted
 from results_schema.arrays import Counts
-from results_schema.errors import Interrupted, OutputFailed
+from results_schema.errors import Interrupted, OutputFailed, WorkersGaveUp
 from results_schema.late import xr
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
-from studies.protocol.stopping import Stop
+from studies.protocol.stopping import AskedElsewhere, Stop
 from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.execution import Progress
+    from engine.batch.places import Place
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind
 
@@ -33,9 +35,10 @@ SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 
 
 class Work:
-    """How parts are computed: on how many threads, who is told of the progress, and whether somebody asked to stop.
+    """How parts are computed: where, who is told of the progress, and whether somebody asked to stop.
 
-    stage: told in words what is being done. chunk: variants of a task where that is fixed, as of `engine.run`.
+    threads: of this process, where no place is given. stage: told in words what is being done. chunk: variants of a
+    task where that is fixed, as of `engine.run`.
     """
 
     def __init__(
@@ -45,16 +48,24 @@ class Work:
         progress: Progress | None = None,
         chunk: int | None = None,
         stage: Callable[[str], None] | None = None,
+        place: Place | None = None,
     ) -> None:
-        self.threads = (os.cpu_count() or 1) if threads is None else threads
+        from engine.batch.places import Threads, cores
+
+        self.place: Place = place or Threads(threads or cores())
         self.stop = stop or Stop()
         self.progress: Progress = progress or (lambda finished, total: None)
         self.stage: Callable[[str], None] = stage or (lambda words: None)
         self.chunk = chunk
 
+    @property
+    def threads(self) -> int:
+        """Threads that a piece may use."""
+        return self.place.threads
+
     def halted(self) -> bool:
         """Whether somebody has asked to stop; as the `halted` of `engine.march.march.march`."""
-        return self.stop.event.is_set()
+        return self.stop.asked
 
     def check(self) -> None:
         """Raise Interrupted if somebody has asked to stop."""
@@ -142,10 +153,10 @@ class Variants:
         work.progress(int(done.size), self.plan.size)
         if done.size < self.plan.size:
             work.stage("measuring what each variant needs, then marching")
-            how: dict[str, Any] = {"threads": work.threads, "chunk": work.chunk, "stop": work.stop.event}
+            how: dict[str, Any] = {"chunk": work.chunk, "stop": work.stop.event}
             try:
                 with Gatherer(lambda chunk: store.write(chunk.name, chunk.tables)) as parts:
-                    execute(self.plan, parts.add, progress=work.progress, done=done, **how)
+                    execute(self.plan, parts.add, work.place, progress=work.progress, done=done, **how)
             except Interrupted:
                 work.check()
                 raise
@@ -241,7 +252,8 @@ class Piece:
 
 
 class Pieces:
-    """Pieces by name, computed one after another. Raises BadInput where the study asks for what only variants have."""
+    """Pieces by name: one after another on the threads of this process, side by side on workers. Raises BadInput where
+    the study asks for what only variants have."""
 
     noun, words = "piece", "the pieces and the archive"
 
@@ -270,38 +282,52 @@ class Pieces:
         whole = sum(piece.seconds for piece in self.pieces)
         return enough(cases.size, whole, lambda count: count * self.kind.audit_seconds * whole / cases.size)
 
-    def compute(self, store: Store, work: Work) -> int:
-        """Compute the pieces that the store does not hold, each beside this thread, so that a request to stop is heard
-        while it is in a kernel."""
-        from engine.batch.execution import share_out
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process makes them of the study."""
+        return Pieces, (self.kind, self.study)
 
-        done = [name for name in self.names if name in store.finished()]
-        work.progress(len(done), len(self.names))
-        left = [piece for piece in self.pieces if piece.name not in done]
-        for count, piece in enumerate(left, len(done) + 1):
+    def compute(self, store: Store, work: Work) -> int:
+        """Compute the pieces that the store does not hold, beside this thread, so that a request to stop is heard while
+        one is in a kernel."""
+        held = store.finished()
+        left = {piece.name: piece for piece in self.pieces if piece.name not in held}
+        done = len(self.names) - len(left)
+        work.progress(done, len(self.names))
+
+        def keep(found: tuple[str, xr.Dataset]) -> None:
+            name, dataset = found
+            store.write(name, {"/": from_dataset(dataset)})
+            del left[name]
+            work.progress(len(self.names) - len(left), len(self.names))
+            tell()
+
+        def tell() -> None:
+            if left:
+                work.stage(next(iter(left.values())).words)
+
+        tell()
+        nobody = np.zeros(1, dtype=np.int64)
+        jobs = [Job(partial(_compute, name=name, threads=work.threads), nobody) for name in left]
+        try:
+            crashed = work.place.apart.share_out(self, jobs, keep, work.halted, grace=GRACE_SECONDS)
+        except Halted:
             work.check()
-            work.stage(piece.words)
-            try:
-                keep = partial(_keep, store, piece.name)
-                job = partial(_compute, piece, work)
-                share_out([job], 1, keep, stop=work.stop.event, grace=GRACE_SECONDS)
-            except Interrupted:
-                work.check()
-                raise
-            work.progress(count, len(self.names))
-        return len(done)
+            raise
+        if crashed:
+            raise WorkersGaveUp(f"what is left ends every process that computes it: {', '.join(left)}")
+        return done
 
     def gather(self, store: Store) -> xr.Dataset:
         """The study's dataset from all pieces."""
         return self.kind.gather({name: to_dataset(store.read(name)["/"]) for name in self.names}, self.study)
 
 
-def _compute(piece: Piece, work: Work, halted: Callable[[], bool]) -> xr.Dataset:
-    return piece.compute(work)
-
-
-def _keep(store: Store, name: str, found: xr.Dataset) -> None:
-    store.write(name, {"/": from_dataset(found)})
+def _compute(
+    pieces: Pieces, nobody: Counts, halted: Callable[[], bool], name: str, threads: int
+) -> tuple[str, xr.Dataset]:
+    """One piece, as a job."""
+    (piece,) = (piece for piece in pieces.pieces if piece.name == name)
+    return name, piece.compute(Work(threads, AskedElsewhere(halted)))
 
 
 def usual(dims: Sequence[str], **values: Any) -> dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]]:

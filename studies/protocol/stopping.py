@@ -11,7 +11,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from types import FrameType
@@ -40,16 +40,34 @@ class Stop:
         self.event.set()
 
     @property
+    def asked(self) -> bool:
+        """Whether somebody asked."""
+        return self.event.is_set()
+
+    @property
     def exit_code(self) -> int:
         """Exit code of a command that this signal stopped: 130 or 143."""
         return 128 + self._signal
 
     def check(self) -> None:
         """Raise Interrupted if somebody asked."""
-        if self.event.is_set():
+        if self.asked:
             error = Interrupted(f"interrupted; {KEPT}")
             error.exit_code = self.exit_code
             raise error
+
+
+class AskedElsewhere(Stop):
+    """A stop that another thread or process hears of by asking."""
+
+    def __init__(self, halted: Callable[[], bool]) -> None:
+        super().__init__()
+        self._halted = halted
+
+    @property
+    def asked(self) -> bool:
+        """Whether somebody asked there."""
+        return self._halted()
 
 
 @contextmanager

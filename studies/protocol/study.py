@@ -240,11 +240,15 @@ def kind_of(study: Study) -> Kind:
 def run(study: Study, **options: Any) -> xr.Dataset:
     """Run a study in memory: the dataset of its archive. Raises BadInput.
 
-    options: threads, progress and chunk, as of `engine.run`.
+    options: progress and chunk, and where to run, as of `engine.run`.
     """
+    from engine.batch.places import Where, place
+
     started = time.perf_counter()
     parts, store = kind_of(study).parts(study), Memory()
-    parts.compute(store, Work(**options))
+    where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
+    with place(**where) as here:
+        parts.compute(store, Work(place=here, **options))
     found = compared(parts.gather(store), study)
     return found.assign_attrs(run_seconds=round(time.perf_counter() - started, 3))
 

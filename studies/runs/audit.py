@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.accuracy.jobs import Crashed
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.late import xr
@@ -43,10 +43,10 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
     from engine.batch.audit import sampled
     from engine.batch.execution import choose
 
-    choose(plan, work.threads, work.stop.event)
+    choose(plan, work.place, work.stop.event)
     variants = sampled(plan)
     kept = ~lost(_flat(plan.cases, dataset["status"])[variants])
-    found = _on_threads(plan, variants[kept], work)
+    found = _shared_out(plan, variants[kept], work)
     work.check()
     if not found.variants.size:
         return {}
@@ -77,16 +77,21 @@ def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, work: Work) -> dic
     return {GROUP: _group(cases, dataset, found.variants, errors, left_out)}
 
 
-def _on_threads(plan: Plan, variants: Counts, work: Work) -> Audit:
-    """The audit, shared out among threads."""
+def _shared_out(plan: Plan, variants: Counts, work: Work) -> Audit:
+    """The audit; variants that end every process that computes them so closely are left out."""
     from engine.batch.audit import audit
-    from engine.batch.execution import run_jobs
+    from engine.batch.places import Shared
 
-    try:
-        return audit(plan, variants, work.halted, partial(run_jobs, threads=work.threads))
-    except Halted:
-        work.check()
-        raise
+    kept = variants
+    while True:
+        try:
+            found = audit(plan, kept, Shared(work.place, work.halted))
+            return found._replace(left_out=found.left_out + variants.size - kept.size)
+        except Crashed as crashed:
+            kept = np.setdiff1d(kept, crashed.lanes)
+        except Halted:
+            work.check()
+            raise
 
 
 def _flat(cases: Cases, array: xr.DataArray) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from engine.batch.places import place
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
@@ -85,14 +86,18 @@ def run_to_archive(
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)
-        work = Work(options.threads, stop, progress, stage=stage)
-        with told_of_compiling(work.stage):
+        with place(**options.where) as here, told_of_compiling(stage or _unheard):
+            work = Work(None, stop, progress, None, stage, here)
             resumed = parts.compute(store, work)
             work.check()
             root = _as_declared(parts.gather(store), study)
             groups = groups_beside(parts, root, work)
         seconds = _write(run, root, store, groups)
     return Outcome(archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP))
+
+
+def _unheard(words: str) -> None:
+    """Nobody wants to know."""
 
 
 class _Run(NamedTuple):

@@ -10,7 +10,8 @@ import numpy as np
 from engine.accuracy.choice import Choice
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import differences, results_of
-from engine.batch.execution import execute, run_jobs
+from engine.batch.execution import execute
+from engine.batch.places import Shared, Threads
 from engine.batch.plan import Plan, make_plan
 from engine.march.outcome import Flat
 from engine.scene.study import Study
@@ -60,7 +61,7 @@ def chosen_plan(given: Study, threads: int = 2) -> Plan:
     """The plan of a sweep with what is chosen for it."""
     plan = make_plan(given)
     assert not plan.converges
-    plan.choose(lambda jobs: run_jobs(jobs, threads), lambda: False, PILOTS)
+    plan.choose(Shared(Threads(threads)), PILOTS)
     return plan
 
 
@@ -85,7 +86,7 @@ def executed(given: Study, chunk: int | None = None, threads: int = 2) -> Run:
     """Run a sweep."""
     plan = chosen_plan(given, threads)
     collector = Collector(plan.size)
-    execute(plan, collector.add, chunk=chunk, threads=threads)
+    execute(plan, collector.add, Threads(threads), chunk=chunk)
     return Run(plan, collector.arrays)
 
 

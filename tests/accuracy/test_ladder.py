@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.accuracy.ladder import ENOUGH, Climb, ladder_of
-from engine.accuracy.reference import in_turn
+from engine.accuracy.ladder import ENOUGH, Climb, Measured, ladder_of
 from tests.accuracy.passages import only_grid, passages
 from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, riding
 from tests.engine.build import Table, beam, cruise, fixed, force, oscillator
@@ -61,17 +60,15 @@ def test_bodies_that_ride_have_statics_and_the_full_model() -> None:
 
 
 @cache
-def climbed() -> Climb:
-    """Twelve pilots."""
+def climbed() -> Measured:
+    """What twelve pilots found."""
     grid = only_grid(passages(4, 3, solver={"tolerance": 1e-2}))
-    found = Climb(grid, grid.values, ladder_of(grid.asked, grid), lambda: False, in_turn)
-    found.go()
-    return found
+    return Climb(grid, grid.values, ladder_of(grid.asked, grid)).go()
 
 
 def test_held_errors_fall_along_a_column() -> None:
     """Finer rungs are no worse than a little, down to what is called enough."""
-    measured = climbed().measured()
+    measured = climbed()
     for held in measured.held:
         known = np.isfinite(held)
         assert np.all(known[1:] | ~known[:-1])
@@ -81,7 +78,7 @@ def test_held_errors_fall_along_a_column() -> None:
 
 
 def test_every_pilot_has_a_rung_that_holds() -> None:
-    measured = climbed().measured()
+    measured = climbed()
     assert np.all(measured.held.min(axis=(0, 1)) <= 1.0)
     assert np.all(measured.reference[:3] <= 0.5e-2)  # of extremes and root mean squares
     assert measured.work > 0.0 and measured.marched.any()

@@ -17,6 +17,7 @@ import xarray as xr
 import engine.march.march
 from engine.batch.dataset import build
 from engine.batch.execution import execute, run
+from engine.batch.places import Threads
 from engine.batch.plan import Plan, make_plan
 from engine.model.lane_table import LaneTable, to_blocks
 from engine.model.scene_model import SceneModel
@@ -61,7 +62,7 @@ def dataset_of_mixed() -> xr.Dataset:
 def digest(plan: Plan, chunk: int | None, threads: int) -> str:
     """SHA-256 over every number of the results and histories."""
     collector = Collector(plan.size)
-    execute(plan, collector.add, threads=threads, chunk=chunk)
+    execute(plan, collector.add, Threads(threads), chunk=chunk)
     found = hashlib.sha256()
     for name in sorted(collector.arrays):
         found.update(name.encode() + collector.arrays[name].tobytes())
@@ -84,7 +85,7 @@ def test_same_bits_one_by_one() -> None:
     plan, whole = of_mixed()
     picked = np.arange(0, 150, 13)
     found = Collector(plan.size)
-    execute(plan, found.add, chunk=1, threads=2, done=np.setdiff1d(np.arange(150), picked))
+    execute(plan, found.add, Threads(2), chunk=1, done=np.setdiff1d(np.arange(150), picked))
     for name, array in whole.arrays.items():
         assert found.arrays[name][picked].tobytes() == array[picked].tobytes(), name
 
@@ -232,7 +233,7 @@ def test_sink_and_progress_are_called_on_the_calling_thread() -> None:
         assert threading.get_ident() in sink.threads
         progress.append((finished, total))
 
-    execute(plan, sink, chunk=10, threads=2, progress=count)
+    execute(plan, sink, Threads(2), chunk=10, progress=count)
     assert sink.threads == {threading.get_ident()}
     assert sorted(sink.variants) == list(range(150))
     assert progress[-1] == (150, 150)
@@ -266,7 +267,7 @@ def test_what_the_sink_raises_reaches_the_caller() -> None:
             raise Broken
 
     with pytest.raises(Broken):
-        execute(make_plan(mixed()), sink, chunk=5, threads=2)
+        execute(make_plan(mixed()), sink, Threads(2), chunk=5)
     assert len(calls) == 3
 
 
@@ -278,7 +279,7 @@ def test_what_a_chunk_raises_reaches_the_caller(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr("engine.batch.chunk.run_chunk", broken)
     with pytest.raises(Broken):
-        execute(plan, Recorder(), chunk=5, threads=2)
+        execute(plan, Recorder(), Threads(2), chunk=5)
 
 
 def test_a_stop_is_heard_between_chunks() -> None:
@@ -287,7 +288,7 @@ def test_a_stop_is_heard_between_chunks() -> None:
     plan = make_plan(study(beam(modes=3), mass(0.5, cruise(0.0, 1.0, 1.0)), sweep=sweep, solver={"steps": 400}))
     stop, sink = threading.Event(), Recorder()
     with pytest.raises(Interrupted):
-        execute(plan, lambda *found: (sink(*found), stop.set()), stop=stop, chunk=50, threads=2)
+        execute(plan, lambda *found: (sink(*found), stop.set()), Threads(2), stop=stop, chunk=50)
     assert 50 <= len(sink.variants) <= 200
 
 

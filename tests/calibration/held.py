@@ -45,7 +45,7 @@ def rows_of(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
     """The rows of a scene."""
     plan = planned(draw(seed, number, size, tolerance))
     picked = judged(plan, JUDGED, [SEED, number])
-    found = audit(plan, picked, lambda: False)
+    found = audit(plan, picked)
     held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
     observed, told, doubt = (part[held] / tolerance for part in (found.observed, found.told, found.doubt))
     work = {int(v): group.work for group in plan.groups for v in np.intersect1d(group.variants, picked)}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.reference import in_turn
+from engine.accuracy.jobs import InTurn
 from engine.batch.plan import Plan, make_plan
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
@@ -53,7 +53,7 @@ def planned(study: Study) -> Plan:
     """The plan of a study, chosen for."""
     kind = kind_of(study)
     plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
-    plan.choose(in_turn, lambda: False)
+    plan.choose(InTurn())
     return plan
 
 

@@ -109,7 +109,7 @@ def test_draw_writes_one_page_beside_the_study(here: Path, capsys: Captured) -> 
     assert {path.name for path in here.iterdir()} == {"small.toml", "small-drawing"}
 
 
-@pytest.mark.fault(27, 28)
+@pytest.mark.fault(27, 28, 40)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -124,7 +124,10 @@ def test_draw_writes_one_page_beside_the_study(here: Path, capsys: Captured) -> 
         (["run", "small.toml", "-o", "twin.toml", "--overwrite"], "the output is the study file itself"),
         (["run", "small.toml", "-o", "broken.toml", "--overwrite"], "broken.toml: .*never replaced"),
         (["run", "small.toml", "-o", "broken.toml"], "broken.toml: .*never replaced"),
-        (["run", "small.toml", "--scheduler", "tcp://localhost:1"], "not built yet"),
+        (["run", "small.toml", "--scheduler", "localhost:1"], "not the address of a scheduler"),
+        (["run", "small.toml", "--scheduler", "tcp://192.0.2.1:8786"], "on another host is met by TLS alone"),
+        (["run", "small.toml", "--scheduler", "tls://192.0.2.1:8786"], "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"),
+        (["run", "small.toml", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], "are there already"),
         (["check", "broken.toml"], "body.beam.lenght: unknown key.*length"),
         (["run", "broken.toml"], "body.beam.lenght: unknown key"),
         (["init", "asymetry"], 'did you mean "asymmetry"'),

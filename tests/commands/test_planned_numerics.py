@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from engine.batch.execution import run_jobs
+from engine.accuracy.jobs import InTurn
 from engine.batch.plan import Plan, make_plan
 from studies.commands.forecast import forecast
 from studies.commands.planned_numerics import HEADINGS, chosen, rows
@@ -26,7 +26,7 @@ def planned(bed: dict[str, Any], sweep: dict[str, Any], **solver: Any) -> Plan:
 def plan() -> Plan:
     """A plan of many variants with its choice, by a few pilots."""
     found = planned(beam(modes="auto"), {"speed": SPEEDS, "mass": MASSES}, tolerance=1e-2)
-    found.choose(lambda jobs: run_jobs(jobs, 1), lambda: False, 32)
+    found.choose(InTurn(), 32)
     return found
 
 
@@ -47,7 +47,7 @@ def test_every_variant_is_in_one_row_of_its_model_modes_and_scheme(plan: Plan) -
 
 def test_what_the_study_fixes_is_one_row() -> None:
     found = planned(beam(modes=5), {"speed": SPEEDS, "mass": MASSES}, steps=1200, fidelity="mass")
-    found.choose(lambda jobs: run_jobs(jobs, 1), lambda: False, 16)
+    found.choose(InTurn(), 16)
     (row,) = rows(chosen(found))
     assert row[COLUMN["modes"]] == "5" and row[COLUMN["steps"]] == "1,200" and row[COLUMN["share"]] == "100 %"
     assert row[COLUMN["modes x steps"]] == "6,000"

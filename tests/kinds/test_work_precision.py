@@ -12,8 +12,8 @@ import pytest
 import engine
 import studies
 from engine.accuracy.choice import pilots_of
+from engine.accuracy.jobs import InTurn
 from engine.batch.chunk import run_chunk
-from engine.batch.execution import run_jobs
 from engine.batch.plan import make_plan
 from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
@@ -156,7 +156,7 @@ def test_the_automatic_choice_is_that_of_a_sweep_around_the_scene() -> None:
     for path, value in own.items():
         column = plan.cases.column(path) / value
         assert 0.5 <= column.min() < 0.51 and 1.98 < column.max() <= 2.0
-    plan.choose(lambda jobs: run_jobs(jobs, 1), lambda: False)
+    plan.choose(InTurn())
     group = next(group for group in plan.groups if 0 in group.variants)
     flat, _ = run_chunk(plan, group, np.array([0]))
     taken = precision.small().sel(scene="light", asked_tolerance=0.1)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from engine.batch.execution import execute, run
+from engine.batch.places import Threads
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -165,7 +166,7 @@ def test_stress_of_a_strut_counts_the_axial_force() -> None:
 
 def digest(plan: Plan, chunk: int | None, threads: int) -> dict[str, bytes]:
     collector = Collector(plan.size)
-    execute(plan, collector.add, threads=threads, chunk=chunk)
+    execute(plan, collector.add, Threads(threads), chunk=chunk)
     return {name: array.tobytes() for name, array in collector.arrays.items()}
 
 

@@ -1,0 +1,209 @@
+"""Where jobs are done: on threads of this process, or in other processes."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol, TypedDict, TypeVar
+
+import numpy as np
+
+from engine.accuracy.jobs import Crashed, Halted, Job
+from engine.march.stepper import Halted as Gone
+from results_schema.arrays import Counts
+from results_schema.errors import BadInput
+
+T = TypeVar("T")
+
+WAITING = 4  # findings per thread that may wait for the sink
+
+
+class Place(Protocol):
+    """Where jobs are done. beside: jobs that are done side by side in one process. apart: where jobs are done that use
+    so many ``threads`` themselves."""
+
+    @property
+    def beside(self) -> int: ...
+
+    @property
+    def threads(self) -> int: ...
+
+    @property
+    def apart(self) -> Place: ...
+
+    def share_out(
+        self,
+        subject: Any,
+        jobs: Sequence[Job[T]],
+        sink: Callable[[T], object],
+        halted: Halted,
+        *,
+        grace: float = np.inf,
+    ) -> Sequence[Counts]:
+        """Do jobs on a subject, and hand what they find to ``sink`` as it comes, on the calling thread; the lanes that
+        end every process.
+
+        Raises what a job or the sink raised, and Halted, after the jobs in flight have ended or so many seconds of
+        ``grace``; WorkersGaveUp.
+        """
+
+
+class Where(TypedDict, total=False):
+    """Where a study is run. threads: all cores unless given; of each worker one. workers: processes of this machine;
+    none unless given. scheduler: the address of a dask scheduler whose workers are taken."""
+
+    threads: int | None
+    workers: int
+    scheduler: str | None
+
+
+@contextmanager
+def place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> Iterator[Place]:
+    """The place, as of `Where`, while the block lasts. Raises BadInput and WorkersGaveUp."""
+    check_place(threads, workers, scheduler)
+    if scheduler is not None:
+        from engine.batch.workers import of_scheduler
+
+        with of_scheduler(scheduler) as found:
+            yield found
+    elif workers:
+        from engine.batch.workers import on_this_machine
+
+        with on_this_machine(workers, threads or 1) as found:
+            yield found
+    else:
+        yield Threads(threads or cores())
+
+
+def check_place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> None:
+    """Refuse what cannot be. Raises BadInput."""
+    if threads is not None and threads < 1:
+        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))
+    if workers < 0:
+        raise BadInput("no number of processes", where="workers", expected=">= 0", received=str(workers))
+    if scheduler is not None and (workers or threads):
+        what = "workers of a scheduler are there already, with threads of their own"
+        raise BadInput(what, where="scheduler", remedy="leave out the numbers of workers and threads")
+    if scheduler is not None:
+        from engine.batch.addresses import check_address
+
+        check_address(scheduler)
+
+
+def cores() -> int:
+    """Threads where nobody says how many."""
+    return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Shares jobs out to a place, as of `engine.accuracy.jobs.Share`."""
+
+    place: Place
+    halted: Halted = lambda: False
+
+    def __call__(self, subject: Any, jobs: Sequence[Job[T]]) -> list[T]:
+        """What the jobs find, in the order in which they end."""
+        found: list[T] = []
+        crashed = self.place.share_out(subject, jobs, found.append, self.halted)
+        if crashed:
+            raise Crashed(np.concatenate(crashed))
+        return found
+
+
+@dataclass(frozen=True)
+class Threads:
+    """So many threads of this process, beside the calling one."""
+
+    threads: int
+
+    @property
+    def beside(self) -> int:
+        """As many as threads."""
+        return self.threads
+
+    @property
+    def apart(self) -> Threads:
+        """One after the other: a job takes all threads."""
+        return Threads(1)
+
+    def share_out(
+        self,
+        subject: Any,
+        jobs: Sequence[Job[T]],
+        sink: Callable[[T], object],
+        halted: Halted,
+        *,
+        grace: float = np.inf,
+    ) -> Sequence[Counts]:
+        """As of `Place`; what ends a thread ends this process."""
+        halt, results = threading.Event(), queue.Queue[Any](maxsize=WAITING * self.threads)
+        given_up = partial(_any_of, halt.is_set, halted)
+        calls = [partial(_do, partial(job.function, subject, job.lanes, given_up), results, given_up) for job in jobs]
+        beside = threading.Thread(target=run_jobs, args=(calls, self.threads), daemon=True)
+        beside.start()
+        try:
+            for _ in jobs:
+                found = _next(results, halted)
+                if isinstance(found, BaseException):
+                    raise found
+                sink(found)
+        finally:
+            halt.set()
+            end = time.monotonic() + grace
+            while beside.is_alive() and time.monotonic() < end:
+                _drain(results)
+                beside.join(0.01)
+        return ()
+
+
+def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
+    """Jobs on threads; on the caller's own where that is to be the only one."""
+    if threads == 1:
+        for job in jobs:
+            job()
+        return
+    import dask.threaded
+
+    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
+    dask.threaded.get(graph, list(graph), num_workers=threads)
+
+
+def _do(job: Callable[[], object], results: queue.Queue[Any], given_up: Halted) -> None:
+    """One job; what it raises travels to the caller as its result."""
+    if given_up():
+        return
+    try:
+        found: object = job()
+    except BaseException as error:
+        found = error
+    while not given_up():  # wait for room in the queue, unless the caller has gone
+        with suppress(queue.Full):
+            results.put(found, timeout=0.05)
+            return
+
+
+def _next(results: queue.Queue[Any], halted: Halted) -> Any:
+    """What the next job found. Raises Halted."""
+    while True:
+        if halted():
+            raise Gone
+        try:
+            return results.get(timeout=0.05)
+        except queue.Empty:
+            continue
+
+
+def _drain(results: queue.Queue[Any]) -> None:
+    while not results.empty():
+        results.get_nowait()
+
+
+def _any_of(*asked: Halted) -> bool:
+    return any(ask() for ask in asked)
