@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from engine.accuracy.jobs import Job, Share
-from engine.batch.chunk import march_chunk
+from engine.batch import chunk
 from engine.batch.plan import NOBODY, Plan
 from results_schema.arrays import Counts
 from results_schema.errors import WorkersGaveUp
@@ -36,7 +36,7 @@ def crashed_chunks(plan: Plan, crashed: Sequence[Counts], share: Share) -> Itera
 def _alone(plan: Plan, variant: int) -> Job[Chunk]:
     """The chunk of one variant."""
     (group,) = (number for number, group in enumerate(plan.groups) if variant in group.variants)
-    return Job(partial(march_chunk, group=group, beside=len(plan.groups)), np.array([variant], dtype=np.int64))
+    return Job(partial(chunk.march_chunk, group=group, beside=len(plan.groups)), np.array([variant], dtype=np.int64))
 
 
 def _emptied(rows: Rows, variants: Counts) -> Rows:

@@ -25,8 +25,11 @@ WAITING = 4  # findings per thread that may wait for the sink
 
 
 class Place(Protocol):
-    """Where jobs are done. beside: jobs that are done side by side in one process. apart: where jobs are done that use
-    so many ``threads`` themselves."""
+    """Where jobs are done. slots: so many at once. beside: so many of them in one process. apart: where jobs are done
+    that use so many ``threads`` themselves."""
+
+    @property
+    def slots(self) -> int: ...
 
     @property
     def beside(self) -> int: ...
@@ -124,8 +127,13 @@ class Threads:
     threads: int
 
     @property
-    def beside(self) -> int:
+    def slots(self) -> int:
         """As many as threads."""
+        return self.threads
+
+    @property
+    def beside(self) -> int:
+        """All of them."""
         return self.threads
 
     @property

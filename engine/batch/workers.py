@@ -157,14 +157,15 @@ class _Try:
 
 
 class Workers:
-    """Workers of a scheduler, as a place. beside: threads of each. revive: starts those anew that have ended."""
+    """Workers of a scheduler, as a place. slots: threads of all of them. beside: threads of each. revive: starts those
+    anew that have ended."""
 
     threads = 1  # dask gives a worker a job for each of its threads
 
     def __init__(self, client: Client, beside: int, revive: Callable[[], object] = lambda: None) -> None:
         self.beside = beside
         self.client, self._revive = client, revive
-        self._slots, self._looked, self._seen = 0, -np.inf, time.monotonic()
+        self.slots, self._looked, self._seen = 0, -np.inf, time.monotonic()
         self._key = ""
         self._subject: Any = None
         self._check_computers()
@@ -217,7 +218,7 @@ class Workers:
         """What to hand out now: suspects alone, so that a death is theirs."""
         if suspects:
             return suspects.popleft() if not running else None
-        return waiting.popleft() if waiting and running < AHEAD * self._slots else None
+        return waiting.popleft() if waiting and running < AHEAD * self.slots else None
 
     def _submit(self, key: str, one: _Try, ended: queue.SimpleQueue[tuple[str, Any]]) -> Future[Any]:
         work = pickle.dumps((one.job.function, one.job.lanes))
@@ -254,8 +255,8 @@ class Workers:
             return
         self._looked = now
         with suppress(OSError):
-            self._slots = sum(self.client.nthreads().values())
-        if self._slots:
+            self.slots = sum(self.client.nthreads().values())
+        if self.slots:
             self._seen = now
         elif now > self._seen + LOST_SECONDS:
             raise WorkersGaveUp(f"no worker has been there for {LOST_SECONDS:.0f} s", remedy=KEPT)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.jobs import Crashed
+from engine.accuracy.jobs import Crashed, Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.late import xr
@@ -18,6 +20,7 @@ from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
+from studies.protocol.stopping import AskedElsewhere
 from studies.results.formatting import counted, listed, percent, scientific
 from studies.results.results import Results
 
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 
 
 GROUP = "/audit"
+Errors = tuple[Array, Array]  # observed and told (R,)
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
 NONE_AUDITED = (
     "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
@@ -63,18 +67,27 @@ def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, work: Work) -> dic
     cases = expand(parts.study)
     variants = drawn(cases.size, parts.audited)
     kept = ~lost(_flat(cases, dataset["status"])[variants])
+    each, place = dict[int, Errors | None](), work.place.apart
+    own = np.array_split(variants[kept], min(place.slots, max(1, int(kept.sum()))))
+    jobs = [Job(partial(_again, threads=work.threads), part) for part in own if part.size]
     try:
-        found = Audit.of_each(parts.kind.again(parts.study, variants[kept], work)) if kept.any() else None
+        for crashed in place.share_out(parts, jobs, each.update, work.halted):
+            each.update(dict.fromkeys(crashed.tolist()))
     except Halted:
         work.check()
         raise
-    work.check()
-    if found is None or not found.variants.size:
+    found = Audit.of_each(each)
+    if not found.variants.size:
         return {}
     values = VariantValues(parts.study, cases.columns_of(found.variants), found.variants.size)
     errors = _Errors(found.observed.T, found.told.T, np.broadcast_to(values.tighter, found.variants.shape))
     left_out = int(np.count_nonzero(~kept)) + found.left_out
     return {GROUP: _group(cases, dataset, found.variants, errors, left_out)}
+
+
+def _again(parts: Pieces, variants: Counts, asked: Callable[[], bool], threads: int) -> Mapping[int, Errors | None]:
+    """Some variants computed again, as a job."""
+    return parts.kind.again(parts.study, variants, Work(threads, AskedElsewhere(asked)))
 
 
 def _shared_out(plan: Plan, variants: Counts, work: Work) -> Audit:
