@@ -12,9 +12,6 @@ from pathlib import Path
 TESTS = Path(__file__).parent
 PAGE = TESTS.parent / "docs" / "faults.md"
 
-# Those whose tests are to come, with workers on other machines.
-COMING = {33, 34, 35}
-
 FAULTS = {
     "Study files": {
         1: "TOML syntax, a key twice: 2 with the line. A byte-order mark is read over; UTF-16 and Latin-1: 2",
@@ -111,7 +108,7 @@ def _listed(tests: list[tuple[str, str, bool]]) -> str:
     files: dict[str, list[str]] = {}
     for file, name, slow in tests:
         files.setdefault(file, []).append(f"`{name}`{' (slow)' if slow else ''}")
-    return "; ".join(f"{file}: {', '.join(names)}" for file, names in files.items()) or "to come"
+    return "; ".join(f"{file}: {', '.join(names)}" for file, names in files.items())
 
 
 def covered() -> dict[int, list[tuple[str, str, bool]]]:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from engine.accuracy.jobs import Halted
+from engine.accuracy.jobs import Halted, Job
 from engine.batch import chunk as chunk_of_plan
 from engine.batch.chunk import march_chunk
 from engine.batch.execution import execute
+from engine.batch.handshake import check_computer, own_computer
 from engine.batch.places import Place, Threads
 from engine.batch.plan import Plan, make_plan
-from engine.batch.workers import Workers, on_this_machine
+from engine.batch.workers import Workers, of_scheduler, on_this_machine
 from engine.scene.study import Study
 from results_schema.arrays import Counts
+from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Status
 from results_schema.store.rows import Chunk, Collector
 from tests.engine.build import beam, cruise, mass, study
@@ -90,23 +96,99 @@ def nap(subject: None, lanes: Counts, halted: Halted) -> int:
     return int(lanes.sum())
 
 
+NAPS = [Job(nap, np.array([number])) for number in range(40)]
+
+
 @pytest.mark.fault(31)
 def test_what_a_killed_worker_had_is_done_again(workers: Workers) -> None:
-    """Every other second one of them dies."""
-    ended = threading.Event()
+    """Of two, one dies every other second while jobs of 12 s are done; what is found later has the same bits."""
+    ended, killed = threading.Event(), list[int]()
 
     def kill() -> None:
         while not ended.wait(2.0):
-            for one in random.sample(own := pids(workers), min(1, len(own))):
-                os.kill(one, signal.SIGKILL)
+            with suppress(OSError, ProcessLookupError):  # it may be gone already
+                killed.append(pids(workers)[0])
+                os.kill(killed[-1], signal.SIGKILL)
 
-    killer = threading.Thread(target=kill)
+    killer, found = threading.Thread(target=kill), list[int]()
     killer.start()
     try:
-        assert_same_bits(marched(workers, 7))
+        crashed = workers.share_out(None, NAPS, found.append, lambda: False)
     finally:
         ended.set()
         killer.join()
+    assert len(set(killed)) >= 2 and not crashed
+    assert sorted(found) == list(range(40))
+    assert_same_bits(marched(workers, 7))
+
+
+def greedy(most: int, lanes: Counts, halted: Halted) -> int:
+    """A job that finds no memory for more than so many variants."""
+    if lanes.size > most:
+        raise MemoryError
+    return int(lanes.sum())
+
+
+@pytest.mark.fault(33)
+def test_jobs_without_memory_are_cut_smaller_down_to_a_variant(workers: Workers) -> None:
+    found, jobs = list[int](), [Job(greedy, np.arange(12))]
+    assert not workers.share_out(3, jobs, found.append, lambda: False)
+    assert len(found) == 4 and sum(found) == 66
+    with pytest.raises(WorkersGaveUp, match="memory of a worker is too small"):
+        workers.share_out(0, jobs, found.append, lambda: False)
+
+
+@pytest.fixture
+def scheduler() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A scheduler of its own, with one worker: its address and process."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    host, port = address.split(":")
+    first = ["scheduler", "--host", host, "--port", port, "--no-dashboard"]
+    second = ["worker", f"tcp://{address}", "--host", host, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    folder = Path(__file__).parents[2]
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments],
+            env=os.environ | {"PYTHONPATH": str(folder)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        for arguments in (first, second)
+    ]
+    yield f"tcp://{address}", started[0]
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.fault(34)
+def test_a_scheduler_that_is_lost_ends_the_run_with_what_is_finished(
+    scheduler: tuple[str, subprocess.Popen[str]],
+) -> None:
+    address, process = scheduler
+    found = list[int]()
+
+    def lose_after_three(number: int) -> None:
+        found.append(number)
+        if len(found) == 3:
+            process.kill()
+
+    with of_scheduler(address) as here:
+        assert_same_bits(marched(here))
+        with pytest.raises(WorkersGaveUp, match="scheduler is lost"):
+            here.share_out(None, NAPS, lose_after_three, lambda: False)
+    assert 3 <= len(found) < 40
+
+
+@pytest.mark.fault(35)
+@pytest.mark.parametrize("name", ["numpy", "the program", "the arithmetic of a sample"])
+def test_a_worker_that_computes_otherwise_is_refused(name: str) -> None:
+    check_computer(own_computer(), "tcp://127.0.0.1:1")
+    with pytest.raises(BadInput, match=f"{name} of this worker is not as here"):
+        check_computer({**own_computer(), name: "other"}, "tcp://127.0.0.1:1")
 
 
 def poisoned(plan: Plan, variants: Counts, halted: Halted, group: int, beside: int) -> Chunk:
