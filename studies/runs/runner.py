@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, singledispatch
 from pathlib import Path
@@ -19,7 +20,7 @@ from engine.batch.places import place
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
-from results_schema.errors import ArchiveError, BadInput
+from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed
 from results_schema.store import files
 from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
 from results_schema.store.parts import PartStore, bytes_so_far
@@ -155,9 +156,20 @@ def _write(run: _Run, root: xr.Dataset, store: PartStore, groups: Mapping[str, x
 
 def _found_finished(run: _Run) -> Outcome:
     """There was nothing to do."""
+    _remove_leftovers(run)
     found = open_archive(run.archive)
     seconds, audit = time.perf_counter() - run.started, found.groups.get(GROUP)
     return Outcome(run.archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
+
+
+def _remove_leftovers(run: _Run) -> None:
+    """Remove the parts and the lock of a run of this study that died behind its archive; those of others stay, and what
+    cannot be removed harms nobody."""
+    if os.path.isdir(f"{run.archive}.parts") or os.path.isfile(f"{run.archive}.lock"):
+        with suppress(BadInput, ArchiveBusy, OutputFailed):
+            key = run_key(run.study, kind_of(run.study).parts(run.study).names)
+            with PartStore(run.archive, key) as store:
+                store.remove()
 
 
 def _look(run: _Run) -> OutputState:
