@@ -64,6 +64,8 @@ def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, work: Work) -> dic
     from engine.scene.sweep import expand
     from engine.scene.variants import VariantValues
 
+    if not parts.audited:
+        return {}
     cases = expand(parts.study)
     variants = drawn(cases.size, parts.audited)
     kept = ~lost(_flat(cases, dataset["status"])[variants])

@@ -15,7 +15,7 @@ from engine.linear_algebra import one_thread
 AFTER_A_RUN = """
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
-import engine.batch.execution
+import engine.batch.chunk, engine.batch.execution
 from engine.bodies.beam import dimensionless_modes
 from tests.engine.build import beam, cruise, mass, study
 
@@ -23,9 +23,9 @@ def threads():
     return {part["num_threads"] for part in threadpool_info() if part["user_api"] == "blas"}
 
 seen = []
-decompose, march = dimensionless_modes._jacobi_svd, engine.batch.execution._task
+decompose, march = dimensionless_modes._jacobi_svd, engine.batch.chunk.march_chunk
 dimensionless_modes._jacobi_svd = lambda matrix: seen.append(threads()) or decompose(matrix)
-engine.batch.execution._task = lambda *given: seen.append(threads()) or march(*given)
+engine.batch.chunk.march_chunk = lambda *given, **more: seen.append(threads()) or march(*given, **more)
 given = study(beam(modes=3, supports="clamped-clamped"), mass(0.3, cruise(0.0, 1.0, 1.0)), solver={"steps": 40})
 with threadpool_limits(3, user_api="blas"):
     engine.batch.execution.run(given, threads=2)
