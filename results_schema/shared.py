@@ -80,14 +80,13 @@ MARCH = outputs("""
         train often is by then
     {sensor}_rms | | {sensor} | optional | root mean square of {sensor}
         averaged over the recorded time; of sensors under a carriage, over the time that it is on the body
-    {carriage}_contact_force_max | | N | nan contact | largest contact force of {carriage}
-        over 0-98 % of the span; NaN where the carriage is never there; none of a carriage that is a plain force
-    {carriage}_contact_force_min | | N | nan contact | smallest contact force of {carriage}
+    {carriage}_contact_force_max | | N | nan | largest contact force of {carriage}
         over 0-98 % of the span; NaN where the carriage is never there
-    {carriage}_contact_force_min_position | | m | nan contact | position of {carriage} at its smallest contact force
+    {carriage}_contact_force_min | | N | nan | smallest contact force of {carriage}
+        over 0-98 % of the span; NaN where the carriage is never there
+    {carriage}_contact_force_min_position | | m | nan | position of {carriage} at its smallest contact force
         of its reference; NaN where that is off the body, or it never touches it
-    {carriage}_separation_position | | m | optional nan contact |
-        first position of {carriage} with a negative contact force
+    {carriage}_separation_position | | m | optional nan | first position of {carriage} with a negative contact force
         NaN where the contact holds
     {sensor} | position/phase/station | {sensor} | optional history gaps | history of {sensor}
         at the instants of `elapsed`; NaN where a sensor under a carriage is off the body

@@ -29,7 +29,6 @@ class Variable:
         study's sweep that matter (in a group, which has no status); "none".
     nan_allowed: NaN may occur in a variant whose status keeps the values, and numbers in one whose does not.
     gaps_allowed: NaN may occur at some instants of a history whose status keeps the values, but not at all of them.
-    of_contact: read of a contact force; carriages that are plain forces have none of it.
     """
 
     name: str
@@ -43,7 +42,6 @@ class Variable:
     nan_allowed: bool = False
     gaps_allowed: bool = False
     lead: Literal["grid", "history", "some", "none"] = "grid"
-    of_contact: bool = False
 
     def attributes(self) -> dict[str, Any]:
         """CF attributes of an expanded variable; `comment` holds the meaning.
@@ -77,7 +75,6 @@ WORDS: Mapping[str, Mapping[str, Any]] = {
     "history": {"lead": "history"},
     "nan": {"nan_allowed": True},
     "gaps": {"gaps_allowed": True},
-    "contact": {"of_contact": True},
 }
 
 

@@ -7,7 +7,7 @@ for every sensor's, carriage's and envelope's name.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -40,7 +40,6 @@ _RESERVED_WORDS = """
     tolerance_asked worst_result left_out scheme_used
 """
 _NONE: Mapping[str, str] = MappingProxyType({})
-_NO_CARRIAGES: Mapping[str, bool] = MappingProxyType({})
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
 
@@ -66,15 +65,14 @@ def axes() -> dict[str, Variable]:
 def expand(
     kind: str,
     sensors: Mapping[str, str] = _NONE,
-    carriages: Mapping[str, bool] = _NO_CARRIAGES,
+    carriages: Sequence[str] = (),
     envelopes: Mapping[str, str] = _NONE,
 ) -> dict[str, Variable]:
     """The declarations of a kind with the names and units of one study filled in.
 
-    sensors, envelopes: name -> unit. carriages: name -> whether its contact force is a result. Raises BadInput when
-    two outputs get the same name or a name is reserved.
+    sensors, envelopes: name -> unit. Raises BadInput when two outputs get the same name or a name is reserved.
 
-    >>> expand("march", {"midspan": "m"}, {"table": True})["midspan_max"].units
+    >>> expand("march", {"midspan": "m"}, ["table"])["midspan_max"].units
     'm'
     """
     for name in (*sensors, *carriages, *envelopes):
@@ -91,13 +89,12 @@ def expand(
 
 
 def _instances(
-    variable: Variable, sensors: Mapping[str, str], carriages: Mapping[str, bool], envelopes: Mapping[str, str]
+    variable: Variable, sensors: Mapping[str, str], carriages: Sequence[str], envelopes: Mapping[str, str]
 ) -> Iterable[Variable]:
     if "{sensor}" in variable.name:
         return [_filled(variable, "sensor", name, unit) for name, unit in sensors.items()]
     if "{carriage}" in variable.name:
-        own = [name for name, reacts in carriages.items() if reacts or not variable.of_contact]
-        return [_filled(variable, "carriage", name, "") for name in own]
+        return [_filled(variable, "carriage", name, "") for name in carriages]
     if "{envelope}" in variable.name:
         return [_filled(variable, "envelope", name, unit) for name, unit in envelopes.items()]
     if variable.units == "{sensor}":

@@ -81,7 +81,7 @@ class Pair:
         """An extreme of a contact force, over the weight."""
         forces = contacts_that_react(self.model)
         histories = self.apart[len(self.apart) - len(forces) :]
-        apart = histories[[force.carriage == carriage for force in forces]].max(axis=0)
+        apart = histories[[force.carriage == carriage for force in forces]].max(axis=0, initial=0.0)
         return _over(np.maximum(self.gap(name), HISTORY_PART * apart), np.abs(self._weights[carriage]))
 
     def envelope(self, name: str) -> Array:
@@ -124,9 +124,7 @@ def _of_accelerations(asked: Asked) -> Iterator[Entry]:
 
 
 def _of_contact_forces(asked: Asked) -> Iterator[Entry]:
-    for c, (name, carriage) in enumerate(asked.study.carriage.items()):
-        if not carriage.reacts:
-            continue
+    for c, name in enumerate(asked.study.carriage):
         for own in (f"{name}_contact_force_{end}" for end in ENDS):
             yield Result(own, name), partial(Pair.contact_force, name=own, carriage=c)
         own = f"{name}_contact_force_min_position"

@@ -30,7 +30,7 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     study = plan.study
     sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
     envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
-    declared = expand(plan.results, sensors, study.carriage_reacts, envelopes)
+    declared = expand(plan.results, sensors, list(study.carriage), envelopes)
     dataset = xr.Dataset(coords=coordinates(plan.cases))
     dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
     for name, places in envelope_places(plan.base).items():

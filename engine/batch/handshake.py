@@ -24,7 +24,7 @@ def own_computer() -> Computer:
     """What this process computes with, by what it is called."""
     return {
         "Python": platform.python_version(),
-        **{name: _version(name) for name in LIBRARIES},
+        **{name: version_of(name) for name in LIBRARIES},
         "the program": _hash_of_program(),
         "pieces of other packages": ", ".join(_foreign()) or "none",
         "the arithmetic of a sample": _arithmetic(),
@@ -41,7 +41,8 @@ def check_computer(other: Computer, where: str) -> None:
             raise BadInput(what, where=where, expected=mine, received=theirs, remedy=remedy)
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
+    """The version of a package that is installed here."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -15,10 +15,10 @@ from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
-from engine.model.lane_table import in_whole_blocks, weights
+from engine.model.lane_table import in_whole_blocks, weight, weights
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
-from engine.observation.contact_forces import contacts_that_react
+from engine.observation.contact_forces import contacts_that_react, first_place_counted
 from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
 from engine.scene.variants import VariantValues
@@ -109,7 +109,7 @@ def outcome(
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
         **_extremes(tables, marched, counts),
-        **_contact_forces(tables, marched),
+        **_contact_forces(tables, values, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
         **_reduced(asked.reduction, tables, values, own, reduction),
@@ -195,11 +195,12 @@ def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Calla
     return {name: np.stack(readings, axis=1) for name, readings in found.items()}
 
 
-def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
+def _contact_forces(tables: SceneTables, values: VariantValues, marched: Marched) -> Flat:
     """Extremes of every contact force, and where it first was negative."""
     found: Flat = {}
     for c, carriage in enumerate(tables.model.carriages):
         if not tables.model.study.carriage[carriage.name].reacts:
+            found |= _pressing(tables, values, c)
             continue
         statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
         seen = (statistics[:, layout.LARGEST_AT] >= 0.0).any(axis=0)
@@ -213,6 +214,18 @@ def _contact_forces(tables: SceneTables, marched: Marched) -> Flat:
         opened = _opened_at(tables, marched, c)
         found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
     return found
+
+
+def _pressing(tables: SceneTables, values: VariantValues, carriage: int) -> Flat:
+    """The same of a plain force, which presses as it is written from where it first counts."""
+    name, first = tables.model.carriages[carriage].name, first_place_counted(tables.model, tables.timeline, carriage)
+    force = np.where(np.isnan(first), np.nan, weight(tables.model, values, carriage))
+    return {
+        f"{name}_contact_force_max": force,
+        f"{name}_contact_force_min": force.copy(),
+        f"{name}_contact_force_min_position": np.full(values.size, first),
+        f"{name}_separation_position": np.full(values.size, np.nan),
+    }
 
 
 def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:

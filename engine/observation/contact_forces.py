@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
     from engine.model.ties import Attachment
-    from engine.model.timeline import Rider
+    from engine.model.timeline import Rider, Timeline
     from engine.observation.readings import Channel
 
 Flags = NDArray[np.bool_]
@@ -106,9 +106,23 @@ def contact_row(model: SceneModel, carriage: int, contact: int | None = None) ->
 
 
 def contacts_that_react(model: SceneModel) -> tuple[ContactForce, ...]:
-    """The contact forces that are results: not those of plain forces, which press as they are written."""
+    """The contact forces that are marched for: not those of plain forces, which press as they are written."""
     known = model.study.carriage
     return tuple(one for one in contact_forces(model) if known[model.carriages[one.carriage].name].reacts)
+
+
+def first_place_counted(model: SceneModel, timeline: Timeline, carriage: int) -> float:
+    """The first place (m) on a carriage's recorded way at which its contact force counts; NaN where it never does."""
+    tie = model.carriages[carriage]
+    low, high = span_counted(model, tie.rider, tie.body)
+    for segment in timeline.segments:
+        if segment.recorded and segment.active[carriage]:
+            tau: Array = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
+            place = np.clip(tie.rider.path(tau, segment.start, segment.end).S, 0.0, tie.rider.length)
+            counted = np.flatnonzero((place >= low) & (place <= high))
+            if counted.size:
+                return float(place[counted[0]])
+    return np.nan
 
 
 def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:

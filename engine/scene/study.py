@@ -202,15 +202,10 @@ class Study(Scene):
         """Name and unit of every envelope."""
         return {name: sensor_unit(envelope.quantity) for name, envelope in self.envelope.items()}
 
-    @property
-    def carriage_reacts(self) -> dict[str, bool]:
-        """Name of every carriage, and whether its contact force is a result."""
-        return {name: carriage.reacts for name, carriage in self.carriage.items()}
-
     def results(self, kind: str) -> dict[str, Variable]:
         """What a kind of study tells of this scene, by name. Raises BadInput where two would have one name."""
         try:
-            found = expand(kind, self.sensor_units, self.carriage_reacts, self.envelope_units)
+            found = expand(kind, self.sensor_units, tuple(self.carriage), self.envelope_units)
         except BadInput as error:
             raise error.moved(self._source.where(error.where)) from None
         for name in self.sweep.axes:

@@ -206,7 +206,7 @@ def _contact(results: Results, carriage: str) -> list[str]:
         return []
     force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
     known = np.isfinite(force)
-    if not known.any():
+    if not known.any() or not results.study.carriage[carriage].inertial:
         return []
     opened = known & (force < 0.0)
     if not opened.any():

@@ -70,7 +70,8 @@ def _varies(seen: View, values: Any) -> bool:
 
 def _has_contact(seen: View, carriage: str) -> bool:
     """Whether there is a force of a carriage that varies; what is the same everywhere the findings say."""
-    has = f"{carriage}_contact_force_min" in seen.results.dataset
+    inertial = seen.results.study.carriage[carriage].inertial
+    has = inertial and f"{carriage}_contact_force_min" in seen.results.dataset
     return has and _varies(seen, _relative_force(seen, carriage))
 
 

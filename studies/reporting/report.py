@@ -287,7 +287,7 @@ def _results(results: Results) -> list[tuple[str, ...]]:
 
 def _declarations(results: Results) -> list[tuple[str, ...]]:
     """Name, dimensions, unit and meaning of every variable in the archive."""
-    declared = expand(results.study.kind, results.sensors, results.study.carriage_reacts, results.envelopes)
+    declared = expand(results.study.kind, results.sensors, tuple(results.study.carriage), results.envelopes)
     names = [str(name) for name in results.dataset.data_vars]
     return [_declaration(results, declared[name]) for name in names if name in declared]
 

@@ -157,6 +157,9 @@ def asked(study_results: Results) -> list[Range]:
     """The ranges that answer: the results of the kind of study, then extremes and contact forces; without means of
     squares, estimated errors and work."""
     beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
+    for name, carriage in study_results.study.carriage.items():  # a force presses as it is written
+        if not carriage.inertial:
+            beside |= {f"{name}_contact_force_max", f"{name}_contact_force_min"}
     found = [one for one in ranges(study_results) if one.name not in beside]
     return sorted(found, key=lambda one: not one.sensor)
 

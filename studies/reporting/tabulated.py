@@ -55,7 +55,7 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
     """
     import pandas as pd
 
-    dataset = _chosen(results, chosen) if chosen else results.dataset
+    dataset = _chosen(results, chosen) if chosen else _without_constants(results)
     rows = (*results.dims, *(("position",) if "position" in dataset.dims else ()))
     like = xr.zeros_like(dataset["status"], dtype=float)
     if len(rows) > len(results.dims):
@@ -83,6 +83,18 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
             raise BadInput("no such result", where="--results", expected=", ".join(known), received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}
     return dataset.drop_vars([name for name in dataset.variables if name not in kept])
+
+
+def _without_constants(results: Results) -> xr.Dataset:
+    """The dataset without contact forces of carriages that are forces, which press as they are written."""
+    forces = tuple(f"{name}_contact_force_" for name, one in results.study.carriage.items() if not one.inertial)
+    lost = {f"{name}_separation_position" for name, one in results.study.carriage.items() if not one.inertial}
+    dataset = results.dataset.drop_vars(
+        [name for name in results.dataset.data_vars if str(name).startswith(forces) or name in lost]
+    )
+    if "result" not in dataset.dims:
+        return dataset
+    return dataset.sel(result=[name for name in dataset["result"].values if not str(name).startswith(forces)])
 
 
 def _as_typed(axis: Axis, array: xr.DataArray) -> tuple[str, xr.DataArray]:

@@ -147,7 +147,7 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     from results_schema.variables import expand as declared_for
 
     cases, model = expand(study), build(with_open_modes(study.without_sweep(), FIRST_MODES))
-    declared = declared_for(kind, {}, {})
+    declared = declared_for(kind, {}, ())
     labels: dict[str, Sequence[str]] = {"robot": model.robots, "rail": list(model.rails), "component": COMPONENTS}
     dataset = xr.Dataset(coords=coordinates(cases))
     results = results_of(model)
@@ -192,7 +192,7 @@ def _with_histories(
 
     if not kept.size:
         return dataset
-    declared, order = declared_for("portal", {}, {}), np.argsort(kept)
+    declared, order = declared_for("portal", {}, ()), np.argsort(kept)
     everyone = kept.size == cases.size
     lead: Sequence[str] = cases.dims if everyone else ("history",)
     shape = cases.shape if everyone else (kept.size,)

@@ -6,10 +6,10 @@ import os
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from engine.batch.handshake import version_of
 from engine.scene.study import Study
 from results_schema.store.archive import FILES, files_text
 from results_schema.store.reading import SCHEMA_VERSION
@@ -29,11 +29,11 @@ def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
         **({FILES: files_text(hashes)} if (hashes := files_of(study)) else {}),
         "schema_version": SCHEMA_VERSION,
         "results_key": key,
-        "packages": [f"{name} {_version(name)}" for name in ("wanderlast", *PACKAGES)],
+        "packages": [f"{name} {version_of(name)}" for name in ("wanderlast", *PACKAGES)],
         "python": platform.python_version(),
         "machine": machine(),
         "run_seconds": round(seconds, 3),
-        "history": f"{now} wanderlast {_version('wanderlast')}: run of {study.kind}",
+        "history": f"{now} wanderlast {version_of('wanderlast')}: run of {study.kind}",
     }
 
 
@@ -41,13 +41,6 @@ def machine() -> str:
     """The machine in one line: processor, number of cores, system."""
     cores = len(os.sched_getaffinity(0))
     return f"{_processor()}, {cores} core{'s' if cores > 1 else ''}, {platform.system()} {platform.release()}"
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _processor() -> str:

@@ -97,7 +97,7 @@ def test_failed_variants_are_left_out() -> None:
 
 def test_what_is_not_as_declared_is_found() -> None:
     dataset = scenes.run("passage", MASSES, extra=EXTRA)
-    given = expand("passage", {"midspan": "m", "moment": "N m"}, {"table": True}, {"shape": "m", "moments": "N m"})
+    given = expand("passage", {"midspan": "m", "moment": "N m"}, ["table"], {"shape": "m", "moments": "N m"})
     validate(dataset, "passage", given)
     with pytest.raises(ArchiveError, match="moments_envelope_max: expected in every passage"):
         validate(dataset.drop_vars("moments_envelope_max"), "passage", given)

@@ -209,8 +209,6 @@ def compare_contact_forces(given: Study, dataset: Any, twin: Twin, tolerance: fl
     """Extremes of the contact forces over 0-98 % of the span towards held ends, both sides of every event."""
     count = 0
     for r, name in enumerate(twin.riders):
-        if not given.carriage[name].reacts:  # a plain force presses as it is written
-            continue
         forces, history = twin.history.contact_force[:, r], twin.history
         low, high = counted_span(given, name, twin.bed.length)
         counted = (history.position[:, r] >= low) & (history.position[:, r] <= high)

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -183,6 +184,7 @@ def after_pieces(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
         written.append(write(self, name, part))
         if len(written) == number:
             os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.5)  # until the thread has heard it that hears signals
         return written[-1]
 
     monkeypatch.setattr(PartStore, "write", write_and_signal)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import engine
 import studies
+from engine.batch.plan import make_plan
+from engine.observation.contact_forces import contacts_that_react
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
@@ -218,9 +221,15 @@ def test_tables_show_the_axles_with_the_largest_and_the_smallest_contact_force()
     assert {one.name for one in in_tables(results)} & forces == {largest, smallest}
 
 
-def test_forces_have_no_contact_forces() -> None:
-    found = engine.run(train(force(2.0, WAY) | REGULAR))
-    assert not [name for name in [*found.data_vars, *found["result"].values] if "contact_force" in str(name)]
+def test_forces_press_as_they_are_written() -> None:
+    """From the end of the body on that they come from; no march observes it."""
+    whole = train(force(2.0, cruise(-0.3, 1.4, 0.8)) | REGULAR)
+    found, (grid,) = engine.run(whole), make_plan(whole).grids
+    for name in ("tram_1", "tram_2", "tram_3"):
+        assert float(found[f"{name}_contact_force_max"]) == float(found[f"{name}_contact_force_min"]) == 2.0
+        assert float(found[f"{name}_contact_force_min_position"]) == pytest.approx(0.0, abs=1e-12)
+        assert np.isnan(found[f"{name}_separation_position"])
+    assert not contacts_that_react(grid.scene)
 
 
 def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:

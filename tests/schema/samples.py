@@ -15,7 +15,7 @@ from results_schema.store import files
 from results_schema.variables import axes, expand
 
 SENSORS = {"midspan": "m", "support": "N m"}
-CARRIAGES = {"table": True}
+CARRIAGES = ("table",)
 RESULTS = ("midspan_max", "lag of é")
 ATTRIBUTES = {
     "Conventions": "CF-1.11",
