@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,9 +200,38 @@ class Pilots(NamedTuple):
         return np.asarray(np.outer(modes, grid.unit * np.array(ladder.cuts, dtype=np.float64)).reshape(-1))
 
 
-def choose(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Choice:
-    """The choice for all variants of a sweep, whose scenes' variants are ``members``, by some ``drawn`` of them. Raises
-    Halted, and Crashed by flat numbers of pilots.
+class Found(NamedTuple):
+    """What the pilots of a sweep found: their flat numbers in the order of what they found, and the first scene of
+    these, whose ladder is that of all."""
+
+    scene: int
+    pilots: Counts
+    measured: Measured
+
+
+class Kept(Protocol):
+    """What keeps what pilots found from one start of a run to the next."""
+
+    def read(self, drawn: Counts) -> Found | None:
+        """What these pilots found, where that is known."""
+
+    def write(self, found: Found) -> None:
+        """Keep it."""
+
+
+class Nowhere:
+    """Keeps nothing."""
+
+    def read(self, drawn: Counts) -> Found | None:
+        """Nothing is known."""
+
+    def write(self, found: Found) -> None:
+        """Nothing is kept."""
+
+
+def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Found:
+    """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find. Raises Halted, and Crashed
+    by flat numbers of pilots.
 
     The marches of a single scene are shared out, several scenes are as wholes, as jobs that wait for jobs would hold
     threads."""
@@ -214,7 +243,7 @@ def choose(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Shar
         jobs = [Job(partial(Pilots.measured_in_turn, scene=scene), own) for scene, own in of_scenes]
         found = sorted(share(pilots, jobs), key=lambda one: (one[0], one[1][0]))
     order = np.concatenate([own for _, own, _ in found])
-    return _chosen(pilots, of_scenes[0][0], order, _joined([measured for *_, measured in found]), share)
+    return Found(of_scenes[0][0], order, _joined([measured for *_, measured in found]))
 
 
 class _Neighbours(NamedTuple):
@@ -240,9 +269,10 @@ class _Neighbours(NamedTuple):
         return part, neighbours, rung
 
 
-def _chosen(of: Pilots, scene: int, order: Counts, measured: Measured, share: Share) -> Choice:
-    """The choice, once the pilots (by flat numbers in the order of what they found) are measured."""
-    asked, cases, cost = of.asked, of.cases, of.cost(scene)
+def choose(of: Pilots, found: Found, share: Share) -> Choice:
+    """The choice for all variants of a sweep by what its pilots found. Raises Halted."""
+    (scene, order, measured), asked, cases = found, of.asked, of.cases
+    cost = of.cost(scene)
     pilots = coordinates(cases, order)
     weights = _weights(pilots, measured)
     pilots = np.ascontiguousarray((pilots * weights).T)

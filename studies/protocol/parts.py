@@ -20,6 +20,8 @@ from results_schema.late import xr
 from results_schema.store.rows import Chunk, Collector, Rows, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
+from studies.protocol.kept_pilots import NAME as PILOTS
+from studies.protocol.kept_pilots import KeptPilots
 from studies.protocol.stopping import AskedElsewhere, Stop
 from studies.results.results import Results
 
@@ -147,26 +149,28 @@ class Variants:
 
     def compute(self, store: Store, work: Work) -> int:
         """March what the store does not hold yet."""
-        from engine.batch.execution import execute
+        from engine.batch.execution import choose, execute
 
         done = np.unique(np.concatenate([np.empty(0, np.int64), *store.finished().values()]))
         work.progress(int(done.size), self.plan.size)
-        if done.size < self.plan.size:
-            work.stage("measuring what each variant needs, then marching")
-            how: dict[str, Any] = {"chunk": work.chunk, "stop": work.stop.event}
-            try:
+        work.stage("measuring what each variant needs, then marching")
+        try:
+            choose(self.plan, work.place, work.stop.event, KeptPilots(store))  # an audit asks for it, too
+            if done.size < self.plan.size:
                 with Gatherer(lambda chunk: store.write(chunk.name, chunk.tables)) as parts:
+                    how: dict[str, Any] = {"chunk": work.chunk, "stop": work.stop.event}
                     execute(self.plan, parts.add, work.place, progress=work.progress, done=done, **how)
-            except Interrupted:
-                work.check()
-                raise
+        except Interrupted:
+            work.check()
+            raise
         return int(done.size)
 
     def gather(self, store: Store) -> xr.Dataset:
         """The march's dataset with the study's own results."""
         found = Collector(self.plan.size)
         for name in store.finished():
-            found.add(Chunk.of(store.read(name)))
+            if name != PILOTS:
+                found.add(Chunk.of(store.read(name)))
         assert found.finished.all(), "variants are missing"
         dataset = self._summarised(found)
         named = self._named(dataset)
