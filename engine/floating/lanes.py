@@ -14,7 +14,7 @@ from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import Lane
 from engine.kernels.layout import LANES
 from engine.scene.frames import AxisJoint, Free, Spherical
-from engine.scene.time_motions import START
+from engine.scene.motions.of_joints import START
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 

@@ -11,7 +11,7 @@ from engine.floating.elastic import ElasticBody
 from engine.floating.lanes import lanes
 from engine.kernels.floating.layout import REVOLUTE
 from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
-from engine.scene.time_motions import AMPLITUDE, CONSTANT, PHASE, RATE, START
+from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START
 from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:

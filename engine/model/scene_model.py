@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from engine.model.support_reactions import SupportReactions
     from engine.model.ties import Attachment, Inertia
     from engine.scene.carriages import Suspension
-    from engine.scene.motion_base import Motion
+    from engine.scene.motions.base import Motion
     from engine.scene.study import Study
 
 

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.scene.motion_base import Motion, Path
+from engine.scene.motions.base import Motion, Path
 from results_schema.arrays import Array, Counts
 
 Window = Literal["whole", "last-cycle"]
@@ -259,7 +259,7 @@ def build_timeline(
     steps: wanted per unit of scene time. window: what is recorded. free_steps: per first period of free vibration.
     stops: further scene times that must be step boundaries, at which nothing happens.
 
-    >>> from engine.scene.motions import Cruise
+    >>> from engine.scene.motions.along_bodies import Cruise
     >>> bed = Cruise(kind="cruise", start=-1.0, end=3.0, speed=1.0)
     >>> [(s.start, s.steps, s.active) for s in build_timeline((Rider(bed, length=2.0),), 8, "whole").segments]
     [(0.0, 2, (False,)), (0.25, 4, (True,)), (0.75, 2, (False,))]
@@ -323,7 +323,7 @@ def build_grid(
 def refined(timeline: Timeline, by: int) -> Timeline:
     """The same timeline with every step cut into ``by`` equal ones: its station n is the new station n times ``by``.
 
-    >>> from engine.scene.motions import Cruise
+    >>> from engine.scene.motions.along_bodies import Cruise
     >>> whole = build_timeline((Rider(Cruise(kind="cruise", start=0.0, end=1.0, speed=1.0), 1.0),), 5, "whole")
     >>> refined(whole, 2).window
     (0, 10)

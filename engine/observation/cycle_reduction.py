@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.scene.motion_base import Motion
+    from engine.scene.motions.base import Motion
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
     from results_schema.status import Fidelity

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
-from engine.scene.motions import AnyMotion
+from engine.scene.motions.along_bodies import AnyMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, form_of_amount, kinds
 from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault

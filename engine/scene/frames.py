@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from engine.scene.time_motions import AnySliding, AnyTurning, TimeMotion
+from engine.scene.motions.of_joints import AnySliding, AnyTurning, TimeMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import KindOf, Noun, Spec, kinds
 from engine.study_file.units import (

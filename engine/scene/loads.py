@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from engine.scene.frames import GROUND, Place
-from engine.scene.time_motions import AnyCourse
+from engine.scene.motions.of_joints import AnyCourse
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Noun, Spec
 from engine.study_file.units import (

@@ -10,7 +10,7 @@ from typing import Any
 
 from engine.bodies import BODIES
 from engine.scene.carriages import CARRIAGES
-from engine.scene.motions import MOTIONS
+from engine.scene.motions.along_bodies import MOTIONS
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
 from results_schema.errors import BadInput

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from engine.bodies.build import build_body
-from engine.scene.motions import Cruise
+from engine.scene.motions.along_bodies import Cruise
 from engine.scene.study import Study
 from results_schema.arrays import Array
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from engine.bodies import BODIES
 from engine.scene.carriages import CARRIAGES
-from engine.scene.motions import MOTIONS
+from engine.scene.motions.along_bodies import MOTIONS
 from engine.scene.settings import ALL_SCHEMES
 from results_schema.errors import BadInput
 from results_schema.pieces import Pieces

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.scene.motion_base import Motion
-from engine.scene.motions import Cruise, OutAndBack, Sinusoidal, Waypoints
+from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal, Waypoints
+from engine.scene.motions.base import Motion
 from tests.naive import motions as naive
 
 places = st.floats(0.0, 20.0).map(lambda x: round(x, 3))

@@ -16,7 +16,7 @@ from engine.study_file.checks import Check
 from engine.study_file.spec import Spec
 
 if TYPE_CHECKING:
-    from engine.scene.time_motions import Number
+    from engine.scene.motions.of_joints import Number
 
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
@@ -93,8 +93,8 @@ class Motion(Spec):
         """The law for 0 <= tau <= duration."""
 
     def pieces(self, number: Number) -> Array:
-        """(V, pieces, 10) place in m over the time in s, as `engine.scene.time_motions` has its columns, for variants
-        whose numbers are asked by key; the carriage stays where the last one ends."""
+        """(V, pieces, 10) place in m over the time in s, its columns as in `engine.scene.motions.of_joints`, for
+        variants whose numbers are asked by key; the carriage stays where the last one ends."""
         raise NotImplementedError
 
     @property
@@ -118,7 +118,7 @@ class Motion(Spec):
     def path(self, tau: ArrayLike, side: Side = "right") -> Path:
         """The path at any tau; at a break the limit from `side`, at 0 and at the end the limit from inside.
 
-        >>> from engine.scene.motions import Cruise
+        >>> from engine.scene.motions.along_bodies import Cruise
         >>> Cruise(kind="cruise", start=1.0, end=3.0, speed=5.0).path([-1.0, 0.0, 0.5, 1.0, 2.0]).S
         array([ 1.,  1.,  2.,  3., nan])
         """

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from engine.scene.motion_base import Array, Legs, Motion, Path, Reversal, Side
-from engine.scene.time_motions import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
+from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side
+from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault

@@ -1,0 +1,168 @@
+"""What must hold between the tables of a study file: names, and what they refer to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Literal
+
+from engine.scene.carriages import Carriage
+from engine.scene.frames import GROUND
+from engine.scene.robots import check_robots
+from engine.scene.sensors import Sensor, quantities_of_a_body
+from engine.study_file.spec import nearest
+from results_schema.errors import BadInput, shortened
+from results_schema.quantities import QUANTITIES
+from results_schema.variables import RESERVED
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+
+
+def check_names(study: Study) -> None:
+    """Names that can stand in an archive, and results that do not collide. Raises BadInput."""
+    tables: dict[str, Iterable[str]]
+    tables = {
+        "body": study.body,
+        "load": study.load,
+        "spring": study.spring,
+        "arm": study.arm,
+        "robot": study.robot,
+        "train": study.train,
+        "carriage": study.carriage,
+        "sensor": study.sensor,
+        "envelope": study.envelope,
+        "sweep": study.sweep.axes,
+    }
+    for table, names in tables.items():
+        for name in names:
+            where = study.source.where(f"{table}.{name}")
+            if not NAME.fullmatch(name):
+                raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
+            if table not in ("body", "load", "spring", "arm", "robot") and name in RESERVED:
+                raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
+    study.results("march")
+
+
+def check_references(study: Study) -> None:
+    """Every name that is mentioned exists, and sensors suit their bodies. Raises BadInput."""
+    for name, frame in study.frame.items():
+        _must_exist(study, f"frame.{name}", name, "body")
+        if frame.on != GROUND:
+            _must_exist(study, f"frame.{name}.on", frame.on, "body")
+    for name, load in study.load.items():
+        _must_exist(study, f"load.{name}.on", load.on, "body")
+    for name, spring in study.spring.items():
+        for number, end in enumerate(spring.ends):
+            if end.on != GROUND:
+                _must_exist(study, f"spring.{name}.ends.{number}.on", end.on, "body")
+    for key, what, expected in check_robots(study.arm, study.robot, study.body):
+        raise study.source.fault(key, what, expected=expected)
+    for name, carriage in study.carriage.items():
+        _check_carriage(study, name, carriage)
+    for name, sensor in study.sensor.items():
+        _check_sensor(study, name, sensor)
+    for name, envelope in study.envelope.items():
+        _must_exist(study, f"envelope.{name}.body", envelope.body, "body")
+        _check_quantity(study, f"envelope.{name}", envelope.body, envelope.quantity)
+
+
+def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
+    _must_exist(study, f"carriage.{name}.on", carriage.on, "body")
+    for word, contact in carriage.riding_contacts.items():
+        _must_exist(study, f"carriage.{name}.contacts.{word}.on", contact.on or carriage.on, "body")
+    if carriage.riding_body is not None:
+        _check_rider(study, name, carriage.riding_body)
+    if carriage.pushes_along:
+        with _within(study, f"carriage.{name}"):
+            _check_along(study, carriage)
+
+
+def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
+    here = f"sensor.{name}"
+    if sensor.rides is not None:
+        _must_exist(study, f"{here}.{'carriage' if sensor.under is None else 'under'}", sensor.rides, "carriage")
+    if sensor.carriage is not None:
+        _check_of_carriage(study, here, sensor)
+    if sensor.body is not None:
+        _must_exist(study, f"{here}.body", sensor.body, "body")
+    body = study.body_of(name)
+    if sensor.body not in (None, body):
+        received = f'"{sensor.body}"'
+        what = "the carriage rides on another body"
+        raise study.source.fault(f"{here}.body", what, expected=f'"{body}"', received=received)
+    _check_quantity(study, here, body, sensor.quantity)
+    if sensor.spot is not None:
+        with _within(study, here):
+            study.body[body].check_spot(sensor.spot)
+
+
+def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
+    """A body has the quantity that is read of it, and the keys that this needs."""
+    body = study.body[name]
+    if quantity in body.untold:
+        expected = f"one of {', '.join(told for told in quantities_of_a_body() if told not in body.untold)}"
+        raise study.source.fault(f"{here}.quantity", f"{quantity} is not available on body {name}", expected=expected)
+    if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
+        what = f"a {quantity} sensor needs this key"
+        raise study.source.fault(f"body.{name}.{missing}", what, expected="a length (m), > 0")
+
+
+@contextmanager
+def _within(study: Study, here: str) -> Iterator[None]:
+    """Refusals of bodies name a key of the table `here`."""
+    try:
+        yield
+    except BadInput as error:
+        raise error.moved(study.source.where(f"{here}.{error.where}")) from None
+
+
+def _check_along(study: Study, carriage: Carriage) -> None:
+    """The inertia of a carriage can act along its track."""
+    if any(other.riding_body == carriage.on for other in study.carriage.values()):
+        what = "the body below rides too: its own motion holds it along"
+        where = "inertia_along"
+        raise BadInput(what, where=where, expected="a body that does not ride", remedy="inertia_along = false")
+    study.body[carriage.on].check_along()
+
+
+def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
+    """A carriage has what a sensor of its own reads."""
+    carriage = study.carriage[str(sensor.carriage)]
+    if sensor.reads.of_contact:
+        contacts = carriage.riding_contacts
+        if sensor.contact is not None and sensor.contact not in contacts:
+            where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"
+            missing = "none: leave this key out" if not contacts else expected
+            raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
+    elif carriage.suspension is None:
+        remedy = carriage.instead_of_own_motion(str(sensor.carriage))
+        what = "this carriage has no sprung mass"
+        raise study.source.fault(f"{here}.carriage", what, expected="an oscillator", remedy=remedy)
+
+
+def _check_rider(study: Study, name: str, body: str) -> None:
+    """A body that rides is another one, and rides once."""
+    here = f"carriage.{name}.body"
+    _must_exist(study, here, body, "body")
+    riding = [(c.riding_body, c.ridden) for c in study.carriage.values()]
+    below, on = set[str](), dict(riding)
+    reached = set(on[body])
+    while reached - below:
+        below |= reached
+        reached = {name for rider in below for name in on.get(rider, ())}
+    alone = [rider for rider, _ in riding].count(body) == 1
+    if body in below or not alone:
+        what = "a body cannot ride on itself" if alone else "this body rides twice"
+        raise study.source.fault(here, what, received=shortened(body), remedy="another body")
+
+
+def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carriage"]) -> None:
+    names: list[str] = list(getattr(study, table))
+    if name not in names:
+        expected = f"one of {', '.join(names)}" if names else f"a table such as [{table}.name]; there is none"
+        received, remedy = shortened(name), nearest(name, names)
+        raise study.source.fault(key, f"no such {table}", expected=expected, received=received, remedy=remedy)
