@@ -8,7 +8,7 @@ velocity B q' + s' (B' q + e) and acceleration B q'' + 2 s' B' q' + s'^2 B'' q +
 
 import numpy as np
 
-from engine.kernels.floating.vectors import shared_vector
+from engine.kernels.floating.vectors import no_vector, shared_vector
 from engine.kernels.jit import called, kernel
 from engine.kernels.layout import LANES
 from engine.kernels.robots.chain import STILL, driven, follow, weigh
@@ -26,6 +26,7 @@ from engine.kernels.robots.layout import (
     GRIP,
     GRIPPED,
     JOINTS,
+    LOADED,
     MODES,
     MOVED,
     PAYLOAD,
@@ -39,7 +40,6 @@ from engine.kernels.robots.layout import (
     SOLID,
     TOLD,
     TOOL,
-    TOTALS,
     VALUE,
     VECTORS,
     WHOLE,
@@ -49,7 +49,11 @@ from engine.kernels.robots.layout import (
 from engine.kernels.robots.timing import planned
 from engine.kernels.robots.tracks import along_track, push_on, section
 from engine.kernels.robots.vectors import rotation
-from engine.kernels.vector import all_lanes, lanes_at, put_lanes
+from engine.kernels.vector import all_lanes, lanes_at, put_lanes, total
+
+#: Of the largest inertia of a base: what is added to all, as those are singular along joints that are free (1e-16 is
+#: what rounding leaves of them), and of a base without any, kg.
+NOTHING, TINY = 1e-12, 1e-30
 
 
 @kernel
@@ -68,9 +72,10 @@ def room(system):
         np.zeros((MOVED + 6, LANES)),
         np.ones(1),
         np.zeros((R, J, J + 6)),
-        np.zeros((R, 2, 6, n)),
-        np.zeros((6, n)),
-        np.zeros((N, N)),
+        np.zeros((R, 2, n, LANES)),
+        np.zeros(N),
+        np.zeros(6 * R),
+        np.zeros((6 * R, 6 * R)),
         np.zeros((6 + J, 6 + J)),
     )
 
@@ -135,7 +140,7 @@ def ride(system, r, state, work):
 @called
 def evaluate(system, state, work, left):
     """What is left (N) of the equations of motion: inertia less all forces. state (N, 3); after `plan_at`."""
-    modes = work.elastic.shape[0]
+    modes = work.inverse.shape[0]
     for k in range(left.shape[0]):
         left[k] = system.springs[k, 1] * state[k, 1] + system.springs[k, 0] * state[k, 0]
         left[k] += (work.vectors[EXTRA, k] + (k < modes)) * state[k, 2]
@@ -220,18 +225,22 @@ def backward(factors, count, x):
 @called
 def prepare(system, of_rate, of_place, work):
     """The matrix M + of_rate C + of_place K where `evaluate` was last: joints are eliminated robot by robot, which
-    leaves an inertia of its base; with these the matrix of the rails' modes is factorised."""
-    elastic, found, J = work.elastic, work.inertia, system.coordinate.shape[1]
-    N = elastic.shape[0]
-    for k in range(N):
-        for m in range(k, N):
-            elastic[k, m] = 0.0
-        elastic[k, k] = 1.0 + work.vectors[EXTRA, k] + of_rate * system.springs[k, 1] + of_place * system.springs[k, 0]
+    leaves an inertia of its base. To those of the modes, D, all bases add Q^T Q; what is factorised is 1 + Q D^-1 Q^T,
+    six rows a robot, however many modes there are (Woodbury)."""
+    found, J = work.inertia, system.coordinate.shape[1]
+    for k in range(work.inverse.shape[0]):
+        own = 1.0 + work.vectors[EXTRA, k] + of_rate * system.springs[k, 1] + of_place * system.springs[k, 0]
+        work.inverse[k] = 1.0 / own
+    for i in range(work.between.shape[0]):
+        for o in range(i, work.between.shape[0]):
+            work.between[i, o] = 1.0 * (i == o)
     for r in range(work.robots.shape[0]):
         lower, robot, joints = work.lower[r], work.robots[r], system.counts[r, JOINTS]
-        solid, tool = work.six[SOLID:TOTALS].reshape(12), shared_vector(system.robots, r, TOOL)
+        solid, tool = work.six[SOLID:SIXES].reshape(12), shared_vector(system.robots, r, TOOL)
         weigh(system.chain[r], joints, robot, tool, work.links[r], found, solid)
-        count = 0
+        count, largest = 0, TINY
+        for i in range(work.six.shape[1]):
+            largest = max(largest, found[i, i])
         for j in range(joints):
             k = system.coordinate[r, j]
             if k < 0:
@@ -250,99 +259,119 @@ def prepare(system, of_rate, of_place, work):
         for i in range(work.six.shape[1]):
             forward(lower, count, lower[:, J + i])
         for i in range(work.six.shape[1]):
+            found[i, i] += NOTHING * largest
             for o in range(work.six.shape[1]):
                 for c in range(count):
                     found[i, o] -= lower[c, J + i] * lower[c, J + o]
+        factorise(found, 6)
+        for c in range(count):
+            forward(found, 6, lower[c, J:])
         add_base(system, r, found, work)
-    factorise(elastic, N)
+    factorise(work.between, work.between.shape[0])
 
 
 @called
-def add_base(system, r, inertia, work):
-    """What the base of robot r, with an inertia (6, 6), adds to the matrix of the modes (upper half)."""
+def add_base(system, r, factors, work):
+    """Q of the base of robot r, by factors (6, 6) of its inertia, and what it adds to the matrix of bases."""
     for g in range(2):
         body = system.body[r, g]
-        if body >= 0:
-            share, pairs, modes = system.share[r, g], work.pairs[r, g], system.tracks[body, MODES]
-            for o in range(pairs.shape[0]):
-                for k in range(modes):
-                    pairs[o, k] = 0.0
-            for i in range(pairs.shape[0]):
-                for k in range(modes):
-                    here = along_track(system, body, work.grips[r, g], i, k)
-                    for o in range(pairs.shape[0]):
-                        pairs[o, k] += share[o, i] * here
-    for h in range(2):
-        other = system.body[r, h]
-        if other < 0:
+        if body < 0:
             continue
-        second, modes = system.tracks[other, FIRST], system.tracks[other, MODES]
-        for i in range(work.across.shape[0]):
-            across = work.across[i]
-            for k in range(modes):
-                across[k] = 0.0
-            for o in range(work.across.shape[0]):
-                row, part = work.pairs[r, h, o], inertia[i, o]
-                for k in range(modes):
-                    across[k] += part * row[k]
-        for g in range(2):
-            one = system.body[r, g]
-            if one < 0 or one > other:
-                continue
-            for m in range(system.tracks[one, MODES]):
-                row = work.elastic[system.tracks[one, FIRST] + m]
-                for i in range(work.across.shape[0]):
-                    across, part = work.across[i], work.pairs[r, g, i, m]
-                    for k in range(modes):
-                        row[second + k] += part * across[k]
+        for i in range(work.six.shape[1]):
+            for o in range(work.six.shape[1]):
+                part = 0.0
+                for c in range(o, work.six.shape[1]):
+                    part += factors[o, c] * system.share[r, g, c, i]
+                work.motions[i, o] = part
+            for o in range(work.six.shape[1], LANES):
+                work.motions[i, o] = 0.0
+        for k in range(system.tracks[body, MODES]):
+            own = all_lanes(0.0)
+            for i in range(work.six.shape[1]):
+                own = own + along_track(system, body, work.grips[r, g], i, k) * lanes_at(work.motions, (i,))
+            put_lanes(work.bases, (r, g, k), own)
+        for p in range(r + 1):
+            for h in range(2):
+                if system.body[p, h] == body and (p < r or h == g):
+                    add_between(system, (p, h), (r, g), work)
+
+
+@called
+def add_between(system, one, other, work):
+    """Q D^-1 Q^T of two bases on the same body, added to the rows of the first."""
+    (p, h), (r, g) = one, other
+    body = system.body[r, g]
+    first = system.tracks[body, FIRST]
+    for half in (0, 3):
+        sums = no_vector()
+        for k in range(system.tracks[body, MODES]):
+            own = work.inverse[first + k] * lanes_at(work.bases, (r, g, k))
+            a, b, c = work.bases[p, h, k, half], work.bases[p, h, k, half + 1], work.bases[p, h, k, half + 2]
+            sums = sums[0] + a * own, sums[1] + b * own, sums[2] + c * own
+        for i in range(3):
+            put_lanes(work.cubics, (LOADED,), sums[i])
+            for o in range(work.six.shape[1]):
+                work.between[6 * p + half + i, 6 * r + o] += work.cubics[LOADED, o]
 
 
 @called
 def solve(system, work, x):
     """x (N) becomes the solution for a right-hand side x of the matrix of `prepare`."""
-    modes, J, totals = work.elastic.shape[0], system.coordinate.shape[1], work.six[TOTALS]
+    modes, J, bases = work.inverse.shape[0], system.coordinate.shape[1], work.pushed
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
         forward(lower, count, x[first:])
-        for i in range(totals.shape[0]):
-            totals[i] = 0.0
+        for i in range(work.six.shape[1]):
+            bases[6 * r + i] = 0.0
             for c in range(count):
-                totals[i] += lower[c, J + i] * x[first + c]
-        for g in range(2):
-            body = system.body[r, g]
-            if body >= 0:
-                begin = system.tracks[body, FIRST]
-                for i in range(totals.shape[0]):
-                    row, part = work.pairs[r, g, i], totals[i]
-                    for k in range(system.tracks[body, MODES]):
-                        x[begin + k] -= part * row[k]
+                bases[6 * r + i] += lower[c, J + i] * x[first + c]
+        take_off(system, r, work, x)
         first += count
-    forward(work.elastic, modes, x)
-    backward(work.elastic, modes, x)
+    for r in range(work.robots.shape[0]):
+        along_base(system, r, work, x)
+    forward(work.between, bases.shape[0], bases)
+    backward(work.between, bases.shape[0], bases)
+    for r in range(work.robots.shape[0]):
+        take_off(system, r, work, x)
+    for k in range(modes):
+        x[k] *= work.inverse[k]
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
-        along_base(system, r, x, work, totals)
         for c in range(count):
-            for i in range(totals.shape[0]):
-                x[first + c] -= lower[c, J + i] * totals[i]
+            for i in range(work.six.shape[1]):
+                x[first + c] -= lower[c, J + i] * bases[6 * r + i]
         backward(lower, count, x[first:])
         first += count
 
 
 @called
-def along_base(system, r, x, work, totals):
-    """The six motions of the base of robot r by x of the modes."""
-    for i in range(totals.shape[0]):
-        totals[i] = 0.0
+def take_off(system, r, work, x):
+    """What pushes the base of robot r, taken off its rails' modes: x -= Q^T pushed."""
+    for o in range(work.six.shape[1]):
+        work.cubics[LOADED, o] = work.pushed[6 * r + o]
+    push = lanes_at(work.cubics, (LOADED,))
     for g in range(2):
         body = system.body[r, g]
         if body >= 0:
-            begin = system.tracks[body, FIRST]
             for k in range(system.tracks[body, MODES]):
-                for i in range(totals.shape[0]):
-                    totals[i] += work.pairs[r, g, i, k] * x[begin + k]
+                x[system.tracks[body, FIRST] + k] -= total(push * lanes_at(work.bases, (r, g, k)))
+
+
+@called
+def along_base(system, r, work, x):
+    """pushed = Q D^-1 x of the base of robot r."""
+    found = all_lanes(0.0)
+    for g in range(2):
+        body = system.body[r, g]
+        if body >= 0:
+            first = system.tracks[body, FIRST]
+            for k in range(system.tracks[body, MODES]):
+                found = found + work.inverse[first + k] * x[first + k] * lanes_at(work.bases, (r, g, k))
+    put_lanes(work.cubics, (LOADED,), found)
+    for o in range(work.six.shape[1]):
+        work.pushed[6 * r + o] = work.cubics[LOADED, o]
 
 
 @called

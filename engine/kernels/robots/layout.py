@@ -41,10 +41,11 @@ PLANNED_TOOL, ACTUAL_TOOL, AHEAD, WRENCH, PAYLOAD, ROBOT = 0, 3, 6, 12, 18, 19
 # columns of Work.doing
 BEGUN, PHASE = range(2)
 # columns of Work.grips, by rail: wrench on the robot, motion that the modes miss, loads on the ends of an element, the
-# motion by those of the ends (6, 12), the element with the distance from its beginning, what the modes go up there
-GRIP, MISSING, LOADS, BY_ENDS, ELEMENT, INTO, UP_THERE, GRIPPED = 0, 6, 12, 24, 96, 97, 98, 99
-# rows of Work.six: what modes miss at the base, the inertia of a solid (10 in two rows), what a solution has for a base
-MISSED_THERE, SOLID, TOTALS, SIXES = 0, 1, 3, 4
+# motion by those of the ends (6, 12), the element with the distance from its beginning, what the modes go up there,
+# and what they miss of the ends' motion
+GRIP, MISSING, LOADS, BY_ENDS, ELEMENT, INTO, UP_THERE, GIVEN, GRIPPED = 0, 6, 12, 24, 96, 97, 98, 99, 111
+# rows of Work.six: what modes miss at the base, the inertia of a solid (10 in two rows)
+MISSED_THERE, SOLID, SIXES = 0, 1, 3
 # rows of Work.motions: six of the axis of a track, and what becomes of them at the base
 MOVED = 6
 # rows of Work.vectors: of a correction; momenta, and a vector to begin with; inertia by which the scheme has no
@@ -92,9 +93,10 @@ class System(NamedTuple):
 class Work(NamedTuple):
     """What an evaluation leaves behind: links (R, J, COLUMNS), robots (R, ROBOT), doing (R, 2), grips (R, 2, GRIPPED),
     six (SIXES, 6), vectors (VECTORS, N), cubics (CUBICS, LANES), motions (12, LANES): above;  newton (1): by what
-    factor the work of corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; pairs
-    (R, 2, 6, n): motion of bases per mode; across (6, n): the same times an inertia; elastic (N, N); inertia (6 + J,
-    6 + J) of a robot."""
+    factor the work of corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; bases
+    (R, 2, n, LANES): motion of bases per mode, six in units in which their inertia is 1; inverse (n of all): one over
+    what modes have without robots; pushed (6 R) and between (6 R, 6 R): of all bases; inertia (6 + J, 6 + J) of a
+    robot."""
 
     links: FloatArray
     robots: FloatArray
@@ -106,9 +108,10 @@ class Work(NamedTuple):
     motions: FloatArray
     newton: FloatArray
     lower: FloatArray
-    pairs: FloatArray
-    across: FloatArray
-    elastic: FloatArray
+    bases: FloatArray
+    inverse: FloatArray
+    pushed: FloatArray
+    between: FloatArray
     inertia: FloatArray
 
 
@@ -146,6 +149,7 @@ class Record(NamedTuple):
 
 
 # columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point, what
-# the robot does; of Record.grips: of that wrench what each rail carries about its axis, and m by which the rail is down
+# the robot does; of Record.grips: of that wrench what each rail carries about its axis, m by which the rail is down,
+# and the place along it (m)
 SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, SEEN_PHASE, OBSERVED = 0, 3, 6, 12, 13
-SUNK, OF_GRIP = 6, 7
+SUNK, ALONG, OF_GRIP = 6, 7, 8

@@ -9,12 +9,15 @@ from engine.kernels.layout import NOT_CONVERGED, SOUND
 from engine.kernels.robots.dynamics import evaluate, plan_at, prepare, room, solve
 from engine.kernels.robots.layout import (
     ACTUAL_TOOL,
+    ALONG,
     BEFORE,
     BEGUN,
     CHANGE,
     DRIVE,
+    ELEMENT,
     EXTRA,
     GRIP,
+    INTO,
     JOINTS,
     MISSED_THERE,
     MISSING,
@@ -41,7 +44,7 @@ from engine.kernels.robots.layout import (
 from engine.kernels.robots.timing import number_of
 from engine.kernels.robots.tracks import give
 
-RESTING = 1e-10  # of the elastic energy: what a correction may still do at rest
+RESTING = 1e-20  # of the largest elastic energy of a coordinate: what a correction may still do before the march
 MOST_CORRECTIONS, MOST_SETTLING, STARTING = 12, 200, 3
 GROWS = 2.0  # from step to step, by which corrections may fall less than those last seen
 #: Of the limit of a scheme's step: the inertia of robots changes while they move. With 0.6 no march of the portal grew;
@@ -58,7 +61,7 @@ def march(system, stretches, newmark, record):
     state, left = np.zeros((N, 3)), np.zeros(N)
     load_at(system, stretches.start[0], work)
     plan_at(system, stretches.start[0], work)
-    code, station = np.int64(settle(system, state, work, left)), np.int64(0)
+    code, station = np.int64(settle(system, RESTING, state, work, left)), np.int64(0)
     energy = elastic_energy(system, state)
     for p in range(stretches.start.shape[0]):
         start, h = stretches.start[p], stretches.step[p]
@@ -92,7 +95,7 @@ def rest(system, stretches, record):
         for n in range(0, stretches.steps[p] + 1, stretches.every):
             plan_at(system, start + n * h, work)
             hold(work)
-            code = max(code, np.int64(settle(system, state, work, left)))
+            code = max(code, np.int64(settle(system, stretches.close, state, work, left)))
             observe(system, start + n * h, state, work, left, record, station)
             station += 1
     return code
@@ -131,7 +134,7 @@ def load_at(system, t, work):
 
 
 @called
-def settle(system, state, work, left):
+def settle(system, close, state, work, left):
     """Static equilibrium of what is planned, which stands still."""
     for _ in range(MOST_SETTLING):
         evaluate(system, state, work, left)
@@ -141,7 +144,7 @@ def settle(system, state, work, left):
             state[k, 0] -= by
             change = max(change, by**2 * system.springs[k, 0])
             largest = max(largest, state[k, 0] ** 2 * system.springs[k, 0])
-        if change <= RESTING**2 * largest:
+        if change <= close * largest:
             return SOUND
     return NOT_CONVERGED
 
@@ -345,6 +348,7 @@ def sink(system, r, work, seen):
         grip = work.grips[r, g]
         if system.body[r, g] >= 0:
             seen[g, SUNK] = -(grip[MISSING + 2] + grip[UP_THERE])
+            seen[g, ALONG] = system.ends[system.body[r, g], int(grip[ELEMENT])] + grip[INTO]
             for o in range(work.six.shape[1]):
                 seen[g, o] = grip[GRIP + o]
                 for i in range(work.six.shape[1]):

@@ -8,6 +8,7 @@ from engine.kernels.robots.layout import (
     ELEMENT,
     ELEMENTS,
     FIRST,
+    GIVEN,
     GRIP,
     INTO,
     LOADED,
@@ -123,20 +124,23 @@ def give(system, grips):
             for i in range(6):
                 own[MISSING + i] = 0.0
             if system.body[r, g] >= 0:
-                for k in range(12):
-                    moved = given(system, system.body[r, g], 6 * int(own[ELEMENT]) + k, grips)
-                    for i in range(6):
-                        own[MISSING + i] += own[BY_ENDS + 12 * i + k] * moved
+                give_ends(system, system.body[r, g], own, grips)
+                for i in range(6):
+                    for k in range(12):
+                        own[MISSING + i] += own[BY_ENDS + 12 * i + k] * own[GIVEN + k]
 
 
 @called
-def given(system, body, row, grips):
-    """One motion of an end on a body under all loads on that body."""
-    found = 0.0
+def give_ends(system, body, own, grips):
+    """Motions of the ends of an element on a body under all loads on that body."""
+    row = 6 * int(own[ELEMENT])
+    for k in range(12):
+        own[GIVEN + k] = 0.0
     for p in range(grips.shape[0]):
         for o in range(2):
             if system.body[p, o] == body:
                 first = 6 * int(grips[p, o, ELEMENT])
                 for m in range(12):
-                    found += system.missed[body, row, first + m] * grips[p, o, LOADS + m]
-    return found
+                    load = grips[p, o, LOADS + m]
+                    for k in range(12):
+                        own[GIVEN + k] += system.missed[body, first + m, row + k] * load
