@@ -1,21 +1,20 @@
-"""Marches with more and more steps, and modes of rails where these are open, until what they report stays where it
-is."""
+"""Marches with more modes of rails, where these are open, or more steps, whichever leaves the larger error, until what
+they report stays where it is."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.accuracy.reference import left_over
 from engine.kernels.layout import Newmark
 from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
-from engine.robots.results import beyond_rest, differences, outcome
+from engine.robots.results import beyond_rest, differences, outcome, results_of
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -27,12 +26,25 @@ if TYPE_CHECKING:
     from engine.robots.results import Outcome
     from engine.scene.study import Study
 
-#: Steps per first period of the rails on the coarsest level, and modes of each rail where these are open; both double.
-#: Three levels of the portal take 84 steps a period from 12 on, 112 from 16 on, 120 from 8 on (tolerance 1e-2).
-FIRST_STEPS, FIRST_MODES = 12, 6
-LEVELS, MOST_MODES, MOST_STEPS = 7, 64, 2_000_000
-ENOUGH = 0.5  # of the tolerance, as in marches of bodies that stand
+#: Modes of each rail where these are open: first, refined, and in audits. 24 leave 2e-3 to 8e-3 of errors on the portal
+#: with limits of acceleration from 0.3 to 2, 48 leave 6e-4 to 1.2e-3 beside 64, more than which no frame gives.
+MODES = (24, 48, 64)
+#: Steps per first period of the rails, doubled so often at most. 12 leave 1e-3 to 3e-2 there, 24 an eighth of that.
+FIRST_STEPS, REFINED, MOST_STEPS = 12, 6, 2_000_000
+#: Of a change, at least told to be left after it: twice the modes left 0.17 to 0.6 of the largest there (0.96 from 10
+#: on), twice the steps 0.08 to 0.18. Changes of single results are small by chance, so that 0.7 were left; they count
+#: as so much of the largest at least.
+LEFT_BY_MODES, LEFT_BY_STEPS, ALIKE = 1.0, 0.5, 0.5
+MOST_ALIKE = 0.75  # ratio of two changes in a row by which the rest is told
+WORTH = 0.1  # of the tolerance: what no march is taken to be rid of
 LEAST_BETA = 1.0 / 12.0  # of Fox-Goodwin: below, the phase is worse again
+
+
+class Rung(NamedTuple):
+    """How many times modes and steps are refined."""
+
+    modes: int
+    steps: int
 
 
 class Level(NamedTuple):
@@ -55,37 +67,48 @@ class Ladder:
     @classmethod
     def of(cls, study: Study, duration: float | None, after: float) -> Ladder:
         """For a duration, or until all is done and some time ``after`` (s). Raises BadInput."""
-        model, fixed = build(with_open_modes(study, FIRST_MODES)), study.solver.steps
+        model, fixed = build(with_open_modes(study)), study.solver.steps
         until = float(model.done.max()) + after if duration is None else duration
         step = 2.0 * np.pi / model.first_omega / FIRST_STEPS if fixed == "auto" else until / int(fixed)
         return cls(study, model, until, step)
 
     @property
-    def count(self) -> int:
-        """How many levels there are to converge on."""
-        return LEVELS if self.study.solver.steps == "auto" else 2
+    def most(self) -> Rung:
+        """How often modes and steps may be refined."""
+        by_room = int(np.log2(MOST_STEPS * self.step / self.duration).clip(0, REFINED))
+        return Rung(int(bool(open_bodies(self.study))), by_room if self.study.solver.steps == "auto" else 1)
 
-    def level(self, number: int) -> Level | None:
-        """A level from 0; None where it would take too many steps or modes."""
-        model, every = self.coarsest, 2**number
-        is_open = any(body.modes == "auto" for body in self.study.body.values())
-        if self.duration / self.step * every > MOST_STEPS or (is_open and FIRST_MODES * every > MOST_MODES):
-            return None
-        if is_open and number:
-            model = build(with_open_modes(self.study, FIRST_MODES * every))
+    def level(self, rung: Rung) -> Level:
+        """The march of a rung."""
+        model, every = self.coarsest, 2**rung.steps
+        if rung.modes:
+            model = build(with_open_modes(self.study, rung.modes))
         return Level(model, stretches(model, self.duration, self.step / every, every))
+
+    def finer(self, rung: Rung, told: tuple[float, float]) -> Rung | None:
+        """The next rung by the errors told of modes and of steps: the larger one is refined where it can be, else the
+        other, unless that is in vain. Steps go first: where these are too long, changes by modes are five times as
+        large."""
+        tolerance = self.study.solver.tolerance
+        for axis in sorted((1, 0), key=lambda number: -told[number]):
+            if told[axis] <= WORTH * tolerance:
+                return None
+            if rung[axis] < self.most[axis]:
+                return Rung(rung.modes + (axis == 0), rung.steps + (axis == 1))
+            if told[axis] > tolerance:
+                return None
+        return None
 
 
 @dataclass(frozen=True, eq=False)
 class Converged:
-    """What a variant reports: its outcome with the model, the error of every result, steps, the number of its level,
-    status."""
+    """What a variant reports: its outcome with the model, the error of every result, steps, its rung, status."""
 
     model: RobotModel
     outcome: Outcome
     error: Array
     steps: int
-    level: int
+    rung: Rung
     status: Status
 
 
@@ -103,10 +126,15 @@ def scheme_of(study: Study) -> NewmarkScheme:
     )
 
 
-def with_open_modes(study: Study, count: int) -> Study:
-    """The study with so many modes of all bodies whose number is open."""
-    is_open = [name for name, body in study.body.items() if body.modes == "auto"]
-    return study.with_values({f"body.{name}.modes": min(count, MOST_MODES) for name in is_open}) if is_open else study
+def open_bodies(study: Study) -> list[str]:
+    """Bodies whose number of modes is open."""
+    return [name for name, body in study.body.items() if body.modes == "auto"]
+
+
+def with_open_modes(study: Study, refined: int = 0) -> Study:
+    """The study with the modes of a rung for all bodies whose number is open."""
+    own = {f"body.{name}.modes": MODES[refined] for name in open_bodies(study)}
+    return study.with_values(own) if own else study
 
 
 def converge(
@@ -118,35 +146,40 @@ def converge(
 
 
 def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False) -> Converged:
-    """March level by level until what is held stays. Raises Halted."""
-    tolerance = ladder.study.solver.tolerance
-    found: Converged | None = None
-    change = np.zeros(0)
-    for number in range(ladder.count):
-        level = ladder.level(number)
-        if level is None:
+    """March rung by rung until what is held stays. Raises Halted."""
+    rung, tolerance = Rung(0, 0), ladder.study.solver.tolerance
+    level = ladder.level(rung)
+    record, now = marched(level, zero)
+    unknown = np.full(len(results_of(level.model)), np.nan)
+    change, told = [unknown, unknown], [unknown if ladder.most.modes else np.zeros(unknown.size), unknown]
+    while not (told[0] + told[1]).max() <= tolerance:
+        by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in told)
+        finer = ladder.finer(rung, (by_modes if now.status.values_kept else 0.0, by_steps))
+        if finer is None:
             break
         if halted():
             raise Halted
+        axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
         record, now = marched(level, zero)
-        model, steps = level.model, int(level.times.steps.sum())
-        if found is None:
-            change = np.full(len(model.robots) + len(model.rails), np.nan)
-            found, times = Converged(model, now, change, steps, number, Status.UNRESOLVED), level.times
-            continue
-        apart = differences(model, found.outcome, now)
-        error = left_over(apart, change)
-        change, times = apart, level.times
-        known = bool(np.isfinite(error).all())
-        held = known and bool(error.max() <= tolerance)
-        judged = Status.OK if held else Status.TOLERANCE_MISSED if known else Status.UNRESOLVED
-        found = Converged(model, now, error, steps, number, Status(int(gravest(judged, now.status))))
-        if known and error.max() <= ENOUGH * tolerance:
-            break
-    assert found is not None
-    resting, status = rest(found.model, times)
-    whole = Status(int(gravest(found.status, status)))
-    return replace(found, outcome=beyond_rest(found.outcome, record, resting), status=whole)
+        apart = differences(level.model, before, now)
+        told[axis] = left(apart, change[axis], (LEFT_BY_MODES, LEFT_BY_STEPS)[axis])
+        rung, change[axis] = finer, apart
+    error = told[0] + told[1]
+    judged = Status.UNRESOLVED
+    if np.isfinite(error).all():
+        judged = Status.OK if error.max() <= tolerance else Status.TOLERANCE_MISSED
+    resting, status = rest(ladder.coarsest, ladder.level(Rung(0, 0)).times)
+    whole = Status(int(gravest(Status(int(gravest(judged, now.status))), status)))
+    steps = int(level.times.steps.sum())
+    return Converged(level.model, beyond_rest(now, record, resting), error, steps, rung, whole)
+
+
+def left(change: Array, before: Array, least: float) -> Array:
+    """(results,) what is left of results after a change by twice as many modes or steps, and one before (NaN: none)."""
+    change = np.maximum(change, ALIKE * change.max())
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.nan_to_num(change / before).clip(0.0, MOST_ALIKE)
+    return np.where(np.isinf(change), np.nan, change * np.maximum(least, ratio / (1.0 - ratio)))
 
 
 def marched(level: Level, zero: str) -> tuple[Record, Outcome]:
@@ -160,11 +193,11 @@ def observed(
     study: Study, duration: float | None, after: float, zero: str, halted: Callable[[], bool] = lambda: False
 ) -> tuple[Array, Array] | None:
     """What a study without sweep reports, beside one level beyond: how far each result (results,) is off, and the error
-    told of it; None where there is no such level, or no values. Raises Halted."""
+    told of it; None where there are no values. Raises Halted."""
     ladder = Ladder.of(study, duration, after)
     found = climb(ladder, zero, halted)
-    beyond = ladder.level(found.level + 1)
-    if beyond is None or not found.status.values_kept:
+    if not found.status.values_kept:
         return None
+    beyond = ladder.level(Rung(found.rung.modes + ladder.most.modes, found.rung.steps + 1))
     apart = differences(found.model, found.outcome, marched(beyond, zero)[1])
     return (apart, found.error) if np.isfinite(apart).all() else None

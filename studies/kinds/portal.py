@@ -31,7 +31,7 @@ class Portal(PiecedKind):
     settings = Question
     sweeps = True
     moves_robots = True
-    audit_seconds = 2.2  # levels of 12, 24, 48 and 96 steps a period after those of 12, 24 and 48
+    audit_seconds = 1.8  # one march of 48 steps a period and 64 modes after those of 12, 24 and 24
     drawn_by = "studies.pictures.portal"
 
     def check(self, study: Study) -> None:

@@ -70,13 +70,13 @@ def _errors(results: Results) -> Iterator[str]:
 
 def _causes(results: Results) -> Iterator[str]:
     """What moves where the error is longest, and what is left of it when one robot stands still."""
-    from engine.robots.converge import FIRST_MODES, with_open_modes
+    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
     from engine.robots.results import moving_at
 
     dataset = results.dataset
     if results.size == 1:
-        model = build(with_open_modes(results.study.without_sweep(), FIRST_MODES))
+        model = build(with_open_modes(results.study.without_sweep()))
         for name in results.study.robot:
             time = float(dataset["error_largest_time"].sel(robot=name))
             if np.isfinite(time):

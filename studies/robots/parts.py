@@ -139,14 +139,14 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     import xarray as xr
 
     from engine.batch.dataset import coordinates
-    from engine.robots.converge import FIRST_MODES, with_open_modes
+    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
     from engine.robots.results import results_of
     from engine.scene.sweep import expand
     from results_schema.variables import axes
     from results_schema.variables import expand as declared_for
 
-    cases, model = expand(study), build(with_open_modes(study.without_sweep(), FIRST_MODES))
+    cases, model = expand(study), build(with_open_modes(study.without_sweep()))
     declared = declared_for(kind, {}, ())
     labels: dict[str, Sequence[str]] = {"robot": model.robots, "rail": list(model.rails), "component": COMPONENTS}
     dataset = xr.Dataset(coords=coordinates(cases))

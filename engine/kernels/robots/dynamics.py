@@ -82,13 +82,15 @@ def room(system):
 
 @called
 def plan_at(system, t, work):
-    """What every robot is told at a time, the forces of its drives for that on a rigid base, and where that leads."""
+    """What every robot is told at a time, the forces of its drives for that on a rigid base, and where that leads;
+    whether any of that is new."""
+    new = False
     for r in range(work.robots.shape[0]):
         links, count, which = work.links[r], system.counts[r, JOINTS], PLANNED
         phase = planned(system, r, t, work.doing[r, BEGUN], links)
         if phase > 0 and phase == work.doing[r, PHASE]:
             continue  # it stands as before
-        work.doing[r, PHASE] = phase
+        work.doing[r, PHASE], new = phase, True
         push = links[0, PLANNED + PUSH]
         if system.counts[r, WHOLE] == 0:
             which, push = ACTUAL, 0.0
@@ -105,6 +107,7 @@ def plan_at(system, t, work):
             links[j, TOLD] = driven(system.chain[r], j, links, place)
         for k in range(3):
             work.robots[r, PLANNED_TOOL + k] = end[k]
+    return new
 
 
 @called
@@ -317,61 +320,65 @@ def add_between(system, one, other, work):
 @called
 def solve(system, work, x):
     """x (N) becomes the solution for a right-hand side x of the matrix of `prepare`."""
-    modes, J, bases = work.inverse.shape[0], system.coordinate.shape[1], work.pushed
+    modes, J, pushed = work.inverse.shape[0], system.coordinate.shape[1], work.pushed
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
         forward(lower, count, x[first:])
-        for i in range(work.six.shape[1]):
-            bases[6 * r + i] = 0.0
-            for c in range(count):
-                bases[6 * r + i] += lower[c, J + i] * x[first + c]
-        take_off(system, r, work, x)
         first += count
-    for r in range(work.robots.shape[0]):
-        along_base(system, r, work, x)
-    forward(work.between, bases.shape[0], bases)
-    backward(work.between, bases.shape[0], bases)
-    for r in range(work.robots.shape[0]):
-        take_off(system, r, work, x)
     for k in range(modes):
         x[k] *= work.inverse[k]
     first = modes
     for r in range(work.robots.shape[0]):
         count, lower = compliant(system, r), work.lower[r]
-        for c in range(count):
-            for i in range(work.six.shape[1]):
-                x[first + c] -= lower[c, J + i] * bases[6 * r + i]
+        along_base(system, r, x, work)
+        for i in range(work.six.shape[1]):
+            part = 0.0
+            for c in range(count):
+                part += lower[c, J + i] * x[first + c]
+            pushed[6 * r + i] += part
+        first += count
+    forward(work.between, pushed.shape[0], pushed)
+    backward(work.between, pushed.shape[0], pushed)
+    for r in range(work.robots.shape[0]):
+        take_off(system, r, x, work)
+    first = modes
+    for r in range(work.robots.shape[0]):
+        count, lower = compliant(system, r), work.lower[r]
+        along_base(system, r, x, work)
+        for i in range(work.six.shape[1]):
+            for c in range(count):
+                x[first + c] -= lower[c, J + i] * pushed[6 * r + i]
         backward(lower, count, x[first:])
         first += count
 
 
 @called
-def take_off(system, r, work, x):
-    """What pushes the base of robot r, taken off its rails' modes: x -= Q^T pushed."""
+def along_base(system, r, x, work):
+    """Q x, the six motions of the base of robot r by x of the modes, into ``pushed``."""
+    found = all_lanes(0.0)
+    for g in range(2):
+        body = system.body[r, g]
+        if body >= 0:
+            for k in range(system.tracks[body, MODES]):
+                found = found + x[system.tracks[body, FIRST] + k] * lanes_at(work.bases, (r, g, k))
+    put_lanes(work.cubics, (LOADED,), found)
+    for o in range(work.six.shape[1]):
+        work.pushed[6 * r + o] = work.cubics[LOADED, o]
+
+
+@called
+def take_off(system, r, x, work):
+    """x -= D^-1 Q^T of what pushes the base of robot r."""
     for o in range(work.six.shape[1]):
         work.cubics[LOADED, o] = work.pushed[6 * r + o]
     push = lanes_at(work.cubics, (LOADED,))
     for g in range(2):
         body = system.body[r, g]
         if body >= 0:
-            for k in range(system.tracks[body, MODES]):
-                x[system.tracks[body, FIRST] + k] -= total(push * lanes_at(work.bases, (r, g, k)))
-
-
-@called
-def along_base(system, r, work, x):
-    """pushed = Q D^-1 x of the base of robot r."""
-    found = all_lanes(0.0)
-    for g in range(2):
-        body = system.body[r, g]
-        if body >= 0:
             first = system.tracks[body, FIRST]
             for k in range(system.tracks[body, MODES]):
-                found = found + work.inverse[first + k] * x[first + k] * lanes_at(work.bases, (r, g, k))
-    put_lanes(work.cubics, (LOADED,), found)
-    for o in range(work.six.shape[1]):
-        work.pushed[6 * r + o] = work.cubics[LOADED, o]
+                x[first + k] -= work.inverse[first + k] * total(push * lanes_at(work.bases, (r, g, k)))
 
 
 @called

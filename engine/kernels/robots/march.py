@@ -93,10 +93,15 @@ def rest(system, stretches, record):
         start, h = stretches.start[p], stretches.step[p]
         load_at(system, start, work)
         for n in range(0, stretches.steps[p] + 1, stretches.every):
-            plan_at(system, start + n * h, work)
-            hold(work)
-            code = max(code, np.int64(settle(system, stretches.close, state, work, left)))
-            observe(system, start + n * h, state, work, left, record, station)
+            t = start + n * h
+            if plan_at(system, t, work):
+                hold(work)
+                code = max(code, np.int64(settle(system, stretches.close, state, work, left)))
+                observe(system, t, state, work, left, record, station)
+            else:
+                record.coordinates[station, :, :3], record.coordinates[station, :, 3] = state, t
+                record.robots[station], record.drive[station] = record.robots[station - 1], record.drive[station - 1]
+                record.grips[station] = record.grips[station - 1]
             station += 1
     return code
 
