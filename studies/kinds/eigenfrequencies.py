@@ -39,7 +39,6 @@ class Question(Asked):
         return self.modes
 
 
-_COUPLED = "bodies and carriages together, undamped, the carriages at rest"
 RESULTS = outputs("""
     frequency | position mode | Hz | nan | natural frequency of the coupled system
         bodies and carriages together, undamped, the carriages at rest; motions that nothing resists are left out; NaN

@@ -30,7 +30,6 @@ from studies.results.results import Index, Results, both_ends
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
 
-_AT_REST = "at rest under gravity and the carriages' weights and forces"
 RESULTS = outputs("""
     {sensor} | position | {sensor} | nan | static reading of {sensor}
         at rest under gravity and the carriages' weights and forces, own weight of bodies included where it acts; NaN

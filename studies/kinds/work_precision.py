@@ -20,7 +20,7 @@ from studies.precision import checks
 from studies.precision import findings as advice
 from studies.precision.checks import slug_of
 from studies.precision.pareto import fitted_order, formal_order, fronts
-from studies.precision.variables import COORDINATES, RESULTS
+from studies.precision.variables import COMPARED, COORDINATES, MARCHED, QUANTITIES, RESULTS, SCHEMES
 from studies.protocol.parts import Piece, Work, usual
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.findings_common import check_sensors, first_carriage
@@ -29,14 +29,8 @@ from studies.results.results import Results
 if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.pictures.common.figures import Figure
-    from studies.precision.ladders import Ladder
 
 STATIC_QUANTITIES = ("displacement", "bending_moment", "shear_force", "stress")
-SCHEMES = (
-    *("average-acceleration", "linear-acceleration", "fox-goodwin", "central-difference"),
-    *("hht-alpha", "generalized-alpha", "richardson"),
-    *("wilson-theta", "rk4", "lagged-inertia", "lagged-convective", "picard", "picard-relaxed"),
-)
 LADDER = (50, 100, 200, 400, 800, 1600, 3200, 6400, 12800, 25600)
 MODES = (2, 3, 5, 8, 12, 20, 32, 48)
 WANTED = (1e-3, 1e-4, 1e-6)
@@ -143,17 +137,10 @@ def _compute(part: str, study: Study, asked: Question, overrides: Mapping[str, A
     """One piece."""
     from studies.precision import ladders
 
-    ladder = _ladder(asked)
     if part == "solvers":
         return ladders.solvers(study, overrides, work)
     measured = {"steps": ladders.steps, "modes": ladders.modes, "jax": ladders.by_jax}
-    return measured[part](study, overrides, ladder, work)
-
-
-def _ladder(asked: Question) -> Ladder:
-    from studies.precision.ladders import Ladder
-
-    return Ladder(asked.schemes, asked.step_counts, asked.mode_counts, asked.reference_modes)
+    return measured[part](study, overrides, asked, work)
 
 
 def _automatic_pieces(study: Study, asked: Question, scene: str) -> Iterator[Piece]:
@@ -164,7 +151,7 @@ def _automatic_pieces(study: Study, asked: Question, scene: str) -> Iterator[Pie
     if not leaves_modes_open(study.with_values(overrides)):
         return
     for tolerance in asked.tolerances:
-        job = partial(automatic, study, overrides, _ladder(asked), tolerance)
+        job = partial(automatic, study, overrides, asked, tolerance)
         words = f"the automatic choice at {tolerance:g}: {scene}"
         yield Piece(_automatic_name(scene, tolerance), words, job, AUTOMATIC_EXPECTED)
 
@@ -182,8 +169,6 @@ _PARTS: Mapping[str, tuple[str, float]] = {
 
 
 def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
-    from studies.precision.precision import COMPARED, MARCHED, QUANTITIES
-
     def stacked(part: str, name: str) -> Array:
         return np.stack([pieces[f"{part}-{slug_of(scene)}"][name].values for scene in asked.scenes])
 
@@ -193,10 +178,11 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
     total[:, :, :, marched] = stacked("modes", "error")
     seconds = np.full((*total.shape[:2], *error.shape[1:3]), np.nan)
     seconds[:, :, marched] = stacked("modes", "seconds")
-    order = np.empty((*error.shape[:2], len(QUANTITIES)))
+    quantities = list(QUANTITIES)
+    order = np.empty((*error.shape[:2], len(quantities)))
     for place in np.ndindex(order.shape):
         s, i, q = place
-        formal = formal_order(asked.schemes[i], QUANTITIES[q])
+        formal = formal_order(asked.schemes[i], quantities[q])
         order[place] = fitted_order(asked.step_counts, error[s, i, :, q], float(FLOOR * floors[s, q]), formal)
     values = {
         "error": error,
@@ -234,7 +220,7 @@ def _gathered(pieces: Mapping[str, xr.Dataset], asked: Question) -> xr.Dataset:
         for variable in RESULTS
         if variable.name in values
     }
-    return xr.Dataset(shared | own, coords=_coordinates(asked, QUANTITIES), attrs=told)
+    return xr.Dataset(shared | own, coords=_coordinates(asked), attrs=told)
 
 
 def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, Any]:
@@ -249,7 +235,7 @@ def _automatic(pieces: Mapping[str, xr.Dataset], asked: Question) -> dict[str, A
     }
 
 
-def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
+def _coordinates(asked: Question) -> dict[str, Any]:
     from studies.precision.ladders import SOLVERS
 
     named = [f"{method} {tolerance:g}" for method, tolerances in SOLVERS.items() for tolerance in tolerances]
@@ -259,7 +245,7 @@ def _coordinates(asked: Question, quantities: Sequence[str]) -> dict[str, Any]:
         "step_count": np.array(asked.step_counts, dtype=np.int64),
         "mode_count": np.array(asked.mode_counts, dtype=np.int64),
         "correction": np.array([0, 1], dtype=np.int8),
-        "quantity": list(quantities),
+        "quantity": list(QUANTITIES),
         "solver": named,
         "asked_tolerance": np.array(asked.tolerances),
     }

@@ -12,7 +12,7 @@ from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of
+from studies.maps.mapping import Asked, Map, dataset_of, times
 from studies.maps.methods import hht
 from studies.protocol.parts import Work
 from studies.results.formatting import counted, number, percent
@@ -22,12 +22,8 @@ MASSES = (0.25, 0.5, 1.0)  # mass ratios: heavy enough to show it, and light eno
 DAMPED = -0.05
 CURED = 1.05
 STEADY = 1.01  # growth with the most steps up to which nothing grows in truth
-BANDS = (
-    (0.3, 0.9, 61),
-    (0.92, 1.5, 30),
-    (1.6, 2.0, 5),
-    (2.5, 4.0, 3),
-)  # first and last multiple of the rule's steps, and points
+# First and last multiple of the rule's steps, and points.
+BANDS = ((0.3, 0.9, 61), (0.92, 1.5, 30), (1.6, 2.0, 5), (2.5, 4.0, 3))
 
 OUTPUTS = outputs("""
     * | | | optional alone |
@@ -96,7 +92,7 @@ def sentences(dataset: xr.Dataset) -> list[str]:
         _too_few(average.where(few).max("step_multiple"), many),
         _enough(average.where(multiple >= MANY - 1e-9), average.where(multiple >= SAFE - 1e-9)),
         f"HHT-alpha with alpha = {DAMPED:g} {'nearly cures it' if cure < CURED else 'does not cure it all'}: with the "
-        f"same too few steps the largest is {_times(cure, 4)}.",
+        f"same too few steps the largest is {times(cure, 4)}.",
     ]
 
 
@@ -111,30 +107,21 @@ def _too_few(worst: xr.DataArray, many: str) -> str:
     beside = f"where nothing grows with {many}{left}."
     count = int(grown.count())
     if not count:
-        return f"{few} nothing by more than {_times(float(worst.max()))} per passage in {all_of} {beside}"
-    span = " to ".join(dict.fromkeys((number(float(grown.min())), _times(float(grown.max()))))) if count > 1 else ""
+        return f"{few} nothing by more than {times(float(worst.max()))} per passage in {all_of} {beside}"
+    span = " to ".join(dict.fromkeys((number(float(grown.min())), times(float(grown.max()))))) if count > 1 else ""
     which = f"in each of {all_of}" if count == scenes else f"in {count} of {all_of}"
-    return f"{few} some vibration by {span or _times(float(grown.max()))} per passage {which} {beside}"
+    return f"{few} some vibration by {span or times(float(grown.max()))} per passage {which} {beside}"
 
 
 def _enough(above: xr.DataArray, far: xr.DataArray) -> str:
     """above: growth from MANY times the rule's steps on. far: from SAFE times on."""
     beyond = float((above > MANY).sum() / above.count())
-    largest = f"but for {percent(beyond)} of the step counts (largest {_times(float(above.max()))})"
+    largest = f"but for {percent(beyond)} of the step counts (largest {times(float(above.max()))})"
     stays = f"that stays below {MANY:g} {largest if beyond else 'always'}"
     return (
         f"From {MANY:g} times the rule's steps on {stays}, and from {SAFE:g} times on it is at most "
-        f"{_times(float(far.max()))}."
+        f"{times(float(far.max()))}."
     )
-
-
-def _times(growth: float, digits: int = 3) -> str:
-    """A growth in words.
-
-    >>> _times(1.234567), _times(float("inf"))
-    ('1.23 times', 'beyond all numbers')
-    """
-    return f"{number(growth, digits)} times" if np.isfinite(growth) else "beyond all numbers"
 
 
 MAP = Map("alias", "growth per passage over steps, speed, mass and modes", 14.0, OUTPUTS, compute, sentences)

@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
-    from engine.scene.variants import VariantValues
     from studies.protocol.parts import Work
-
 
 CARRIAGE = "load"
 AVERAGE: Mapping[str, Any] = {"scheme": "average-acceleration"}

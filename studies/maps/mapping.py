@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ from results_schema.late import xr
 from results_schema.variables import Variable, axes
 from studies.maps.map_scene import Ground
 from studies.protocol.parts import Work
+from studies.results.formatting import number
 
 Part = Annotated[float, Field(gt=0, le=100)]
 Parts = Annotated[tuple[Part, ...], Strict(False), Field(min_length=1, max_length=40), AfterValidator(distinct)]
@@ -72,6 +74,15 @@ def dataset_of(
     coords = {name: known[name].holding(found, (name,)) for name, found in along.items()}
     data = {name: known[name].holding(_finite(found)) for name, found in values.items()}
     return xr.Dataset(data, coords, dict(zip(("most_modes", "most_steps"), marched, strict=True)))
+
+
+def times(growth: float, digits: int = 3) -> str:
+    """A growth in words.
+
+    >>> times(1.234567), times(float("inf"))
+    ('1.23 times', 'beyond all numbers')
+    """
+    return f"{number(growth, digits)} times" if math.isfinite(growth) else "beyond all numbers"
 
 
 def _finite(values: Any) -> Any:

@@ -11,7 +11,7 @@ from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.variable import outputs
 from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of
+from studies.maps.mapping import Asked, Map, dataset_of, times
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number, percent
 
@@ -130,7 +130,7 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     less = f"and {parts[-1]} with {damping}" if parts[-1] != parts[0] else f"and about as much with {damping}"
     return [
         f"{_main(dataset)}; {free} {less}.",
-        f"In one period the vibration grows up to {_times(largest[0])} without damping and {_times(largest[-1])} with "
+        f"In one period the vibration grows up to {times(largest[0])} without damping and {times(largest[-1])} with "
         f"{damping}.",
     ]
 
@@ -149,10 +149,6 @@ def _main(dataset: xr.Dataset) -> str:
         f"Swinging mass: one that swings over the whole body shakes it ever more, in a main band near the formula for "
         f"one mode at frequencies over omega_1 of {told} (its middle is {listed(away)} off the formula)"
     )
-
-
-def _times(growth: float) -> str:
-    return f"{number(growth)} times" if math.isfinite(growth) else "beyond all numbers"
 
 
 MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, OUTPUTS, compute, sentences)

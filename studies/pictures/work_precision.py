@@ -16,8 +16,9 @@ from results_schema.late import xr
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, shades
 from studies.precision import findings as advice
-from studies.precision.findings import QUANTITY_WORDS, scheme_words, short_time
+from studies.precision.findings import scheme_words, short_time
 from studies.precision.pareto import automatic_choices, choices
+from studies.precision.variables import QUANTITIES
 from studies.results.formatting import number
 
 COLUMNS = 2
@@ -95,9 +96,8 @@ def _steps_title(dataset: xr.Dataset, quantity: str) -> str:
     """The smallest error that steps alone come to."""
     errors = dataset["error"].sel(quantity=quantity).values
     known = errors[np.isfinite(errors) & (errors > 0.0)]
-    words = QUANTITY_WORDS[quantity]
     least = f" to {number(float(known.min()), 2)} at best" if known.size else ""
-    return f"The error of {words} falls with the steps{least}"
+    return f"The error of {QUANTITIES[quantity]} falls with the steps{least}"
 
 
 ORDERS = (

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from results_schema.errors import BadInput
+from studies.precision.variables import MARCHED
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -36,8 +37,6 @@ def check_slugs(study: Study, asked: Question) -> None:
 
 def check_ladder(study: Study, asked: Question) -> None:
     """At least one scheme that a study could take, and a reference of more modes than are compared."""
-    from studies.precision.precision import MARCHED
-
     if not set(asked.schemes) & set(MARCHED):
         where = study.source.where("question.schemes")
         expected = f"at least one scheme of the march: {', '.join(MARCHED)}"

@@ -18,23 +18,9 @@ from studies.precision.pareto import (
     is_out_of_reach,
     step_choices,
 )
+from studies.precision.variables import COMPARED, MARCHED, QUANTITIES
 from studies.results.formatting import counted, listed, number, spanned
 
-_WORDS = {
-    "average-acceleration": "average acceleration",
-    "linear-acceleration": "linear acceleration",
-    "fox-goodwin": "Fox-Goodwin",
-    "central-difference": "central difference",
-    "hht-alpha": "HHT-alpha (\N{MINUS SIGN}0.05)",
-    "generalized-alpha": "generalized-alpha (0.8)",
-    "richardson": "a Richardson pair",
-    "wilson-theta": "Wilson-theta",
-    "rk4": "Runge-Kutta 4",
-    "lagged-inertia": "lagged inertia",
-    "lagged-convective": "lagged convective terms",
-    "picard": "Picard iteration",
-    "picard-relaxed": "relaxed Picard iteration",
-}
 READING = (
     "How to read this: a scheme is the rule that takes one step through time, and modes are the shapes of vibration "
     "that are kept. More steps and more modes err less and cost more. Errors are parts of the largest static value, "
@@ -42,13 +28,12 @@ READING = (
 )
 USEFUL = 0.01  # error of a solver beyond which its time says nothing
 RESOLVED = 0.01  # error from which on a scheme shows its order
-QUANTITY_WORDS = {"history": "whole histories", "extremes": "largest values", "contact_force": "the contact force"}
 _PARTS = {1: "half", 2: "a quarter", 3: "an eighth", 4: "a sixteenth"}
 
 
 def scheme_words(scheme: str) -> str:
     """A scheme as people write it."""
-    return _WORDS.get(scheme, scheme)
+    return (MARCHED | COMPARED).get(scheme, scheme)
 
 
 def short_time(seconds: float) -> str:
@@ -74,7 +59,7 @@ def advice(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[floa
     """What to take for each accuracy in one scene and quantity, steps and modes together."""
     known = _known(dataset, "total_reference_error", scene, quantity)
     said = _advised(choices(dataset, scene, quantity), known, wanted, _with_modes)
-    return f"{_named(scene)}, {QUANTITY_WORDS[quantity]}: {said}."
+    return f"{_named(scene)}, {QUANTITIES[quantity]}: {said}."
 
 
 def steps_alone(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence[float]) -> str:
@@ -83,7 +68,7 @@ def steps_alone(dataset: xr.Dataset, scene: str, quantity: str, wanted: Sequence
     points = step_choices(dataset, scene, quantity)
     modes = counted(int(dataset["modes_used"].sel(scene=scene).values.flat[0]), "mode")
     said = _advised(points, known, wanted, _taken)
-    return f"{_named(scene)}, the error of the steps alone in {QUANTITY_WORDS[quantity]}, {modes}: {said}."
+    return f"{_named(scene)}, the error of the steps alone in {QUANTITIES[quantity]}, {modes}: {said}."
 
 
 def automatic(dataset: xr.Dataset) -> list[str]:
@@ -176,20 +161,21 @@ def lead(dataset: xr.Dataset, tolerance: float) -> str:
     """The cheapest way to an accuracy over all scenes, and in how many there is none."""
     taken, missed, unknown = _judged(dataset, tolerance)
     total = len(taken) + missed + len(unknown)
-    rest = [f"in {missed} of {counted(total, 'scene')} nothing does"] if missed else []
+    parts = [f"in {missed} of {counted(total, 'scene')} nothing does"] if missed else []
     if unknown:
-        rest.append(f"in {len(unknown)} of {counted(total, 'scene')} it cannot be judged, as {_good_to(unknown)}")
+        parts.append(f"in {len(unknown)} of {counted(total, 'scene')} it cannot be judged, as {_good_to(unknown)}")
+    rest = " and ".join(parts)
     if not taken and not unknown:
         return f"No choice brings whole histories within {_plain(tolerance)} of the static value in any scene."
     if not taken:
-        return f"No choice surely brings whole histories within {_plain(tolerance)} of the static value: {_also(rest)}."
+        return f"No choice surely brings whole histories within {_plain(tolerance)} of the static value: {rest}."
     counts = Counter(scheme_words(choice.scheme) for choice in taken)
     names = listed([f"{name} in {counted(count, 'scene')}" for name, count in counts.most_common()])
     span = spanned([choice.seconds for choice in taken], short_time)
     steps, modes = (spanned([getattr(choice, key) for choice in taken], number) for key in ("steps", "modes"))
     return (
         f"Whole histories within {_plain(tolerance)} of the static value cost {span} per variant: {steps} steps and "
-        f"{modes} {'mode' if modes == '1' else 'modes'}, cheapest by {names}.{f' But {_also(rest)}.' if rest else ''}"
+        f"{modes} {'mode' if modes == '1' else 'modes'}, cheapest by {names}.{f' But {rest}.' if rest else ''}"
     )
 
 
@@ -212,10 +198,6 @@ def _judged(dataset: xr.Dataset, tolerance: float) -> tuple[list[Choice], int, l
 def _known(dataset: xr.Dataset, name: str, scene: str, quantity: str) -> float:
     """Error of a reference of one scene and quantity."""
     return float(dataset[name].sel(scene=scene, quantity=quantity))
-
-
-def _also(parts: Sequence[str]) -> str:
-    return " and ".join(parts)
 
 
 def _orders(dataset: xr.Dataset) -> str:

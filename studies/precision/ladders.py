@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -17,30 +17,25 @@ from engine.methods.ode import ModalEquations
 from engine.scene.axes import sobol_points
 from engine.scene.study import Study
 from studies.precision import jax_march, precision
+from studies.precision.variables import MARCHED, QUANTITIES
 from studies.protocol.parts import Work
+
+if TYPE_CHECKING:
+    from studies.kinds.work_precision import Question
 
 SOLVERS = {"DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10), "Radau": (1e-2, 1e-4, 1e-6, 1e-8)}
 REFERENCE_TOLERANCES = (1e-12, 1e-10)
 AROUND, FACTOR = 2048, 2.0  # variants of the sweep around a scene: many more than pilots; from 1/2 to 2 of its values
 
 
-class Ladder(NamedTuple):
-    """What is compared."""
-
-    schemes: tuple[str, ...]
-    step_counts: tuple[int, ...]
-    mode_counts: tuple[int, ...]
-    reference_modes: int
-
-
-def steps(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+def steps(study: Study, overrides: Mapping[str, Any], asked: Question, work: Work) -> xr.Dataset:
     """Every scheme over the ladder of steps, at the study's own number of modes."""
     model = precision.scene_model(study, overrides)
     solutions = [ModalEquations(model).solve("DOP853", tol, work.halted) for tol in REFERENCE_TOLERANCES]
     reference, other = (precision.modal_reference(model, states) for states in solutions)
     shape = (len(asked.schemes), len(asked.step_counts))
-    errors, seconds = np.full((*shape, len(precision.QUANTITIES)), np.nan), np.full(shape, np.nan)
-    marched = {s: precision.with_scheme(model, s) if s in precision.MARCHED else model for s in asked.schemes}
+    errors, seconds = np.full((*shape, len(QUANTITIES)), np.nan), np.full(shape, np.nan)
+    marched = {s: precision.with_scheme(model, s) if s in MARCHED else model for s in asked.schemes}
     for n, count in enumerate(asked.step_counts):
         shared: dict[Any, Any] = {}
         for i, scheme in enumerate(asked.schemes):
@@ -76,7 +71,7 @@ def solvers(study: Study, overrides: Mapping[str, Any], work: Work) -> xr.Datase
     return xr.Dataset({"error": (("solver", "quantity"), np.array(errors)), "seconds": ("solver", seconds)})
 
 
-def by_jax(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+def by_jax(study: Study, overrides: Mapping[str, Any], asked: Question, work: Work) -> xr.Dataset:
     """Average acceleration by jax.vmap over the steps that fit one table: error of histories, seconds per variant."""
     model = precision.with_scheme(precision.scene_model(study, overrides), "average-acceleration")
     reference = precision.modal_reference(
@@ -95,12 +90,12 @@ def by_jax(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work
     return xr.Dataset({"error": ("step_count", errors), "seconds": ("step_count", seconds)})
 
 
-def modes(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work) -> xr.Dataset:
+def modes(study: Study, overrides: Mapping[str, Any], asked: Question, work: Work) -> xr.Dataset:
     """The schemes of the march over steps and modes, with and without static correction, against what is converged."""
-    schemes = [scheme for scheme in asked.schemes if scheme in precision.MARCHED]
+    schemes = [scheme for scheme in asked.schemes if scheme in MARCHED]
     reference, apart = precision.converged(study, overrides, asked.reference_modes, asked.step_counts[-1], work)
     shape = (len(asked.mode_counts), 2, len(schemes), len(asked.step_counts))
-    errors = np.full((*shape, len(precision.QUANTITIES)), np.nan)
+    errors = np.full((*shape, len(QUANTITIES)), np.nan)
     seconds = np.full((shape[0], *shape[2:]), np.nan)
     for m, number in enumerate(asked.mode_counts):
         bare = precision.scene_model(study, overrides, number)
@@ -125,13 +120,13 @@ def modes(study: Study, overrides: Mapping[str, Any], asked: Ladder, work: Work)
     )
 
 
-def automatic(study: Study, overrides: Mapping[str, Any], asked: Ladder, tolerance: float, work: Work) -> xr.Dataset:
+def automatic(study: Study, overrides: Mapping[str, Any], asked: Question, tolerance: float, work: Work) -> xr.Dataset:
     """What the program chooses for a scene by itself in a sweep around it: error of histories against what is
     converged, seconds per variant."""
     tables = chosen_tables(around(study.with_values(overrides), tolerance), work)
     scheme = tables.model.scheme.name
     reference, _ = precision.converged(study, overrides, asked.reference_modes, asked.step_counts[-1], work)
-    error = reference.errors(precision.run_scheme(tables, scheme, work))[precision.QUANTITIES.index("history")]
+    error = reference.errors(precision.run_scheme(tables, scheme, work))[list(QUANTITIES).index("history")]
     seconds = precision.seconds_per_variant(tables, scheme, work)
     return xr.Dataset(
         {"error": error, "seconds_per_variant": seconds, "modes": tables.model.body_modes, "steps": tables.steps}

@@ -31,21 +31,11 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.late import interpolate
 from results_schema.status import Status
+from studies.precision.variables import QUANTITIES
 from studies.protocol.parts import Work
 
-QUANTITIES = ("history", "extremes", "contact_force")
 RICHARDSON = "richardson"
 _OWN: Mapping[str, Mapping[str, Any]] = {"hht-alpha": {"alpha": -0.05}, "generalized-alpha": {"rho_inf": 0.8}}
-MARCHED = (
-    "average-acceleration",
-    "linear-acceleration",
-    "fox-goodwin",
-    "central-difference",
-    "hht-alpha",
-    "generalized-alpha",
-    RICHARDSON,
-)
-COMPARED = ("wilson-theta", "rk4", "lagged-inertia", "lagged-convective", "picard", "picard-relaxed")
 
 BATCH_WORK = 4e6  # modes x steps x variants of a timing: some milliseconds
 STEP_MODES = 6  # what a step costs besides its modes, in modes
@@ -148,12 +138,18 @@ def run_scheme(tables: SceneTables, scheme: str, work: Work) -> Run:
 def _pair(tables: SceneTables, values: VariantValues, work: Work) -> Run:
     """A Richardson pair: its extremes as the march makes them, its histories from both marches at the coarse stations,
     (4 fine - coarse)/3."""
-    coarse = tables.coarser
-    counts, sampled = counts_shown(coarse.timeline, "whole", "auto"), len(tables.signals)
-    fine = march(tables, values, 2 * counts, 1, work.halted, sampled).history[:, :, 0]
-    rough = march(coarse, values, counts, 1, work.halted, sampled).history[:, :, 0]
+    counts = counts_shown(tables.coarser.timeline, "whole", "auto")
+    readings = _extrapolated(tables, values, counts, work)
     found, _ = march_pair(tables, values, counts[:0], 1, work.halted)
-    return _run(coarse, counts, found, (4.0 * fine - rough) / 3.0)
+    return _run(tables.coarser, counts, found, readings)
+
+
+def _extrapolated(tables: SceneTables, values: VariantValues, counts: Counts, work: Work) -> Array:
+    """(S, signals) histories of the march and of one with half its steps at the stations of the latter."""
+    sampled = len(tables.signals)
+    fine = march(tables, values, 2 * counts, 1, work.halted, sampled).history[:, :, 0]
+    rough = march(tables.coarser, values, counts, 1, work.halted, sampled).history[:, :, 0]
+    return (4.0 * fine - rough) / 3.0
 
 
 def _run(tables: SceneTables, counts: Counts, found: Marched, readings: Array) -> Run:
@@ -199,11 +195,8 @@ def marched_reference(model: SceneModel, steps: int, work: Work) -> Reference:
     swiftest = with_scheme(model, "fox-goodwin")
     near = model.omega.max() * ModalEquations(model).time_scale / (steps // 2) > SAFE * swiftest.scheme.stability_limit
     tables = tables_of(with_scheme(model, "average-acceleration") if near else swiftest, steps)
-    values, sampled = VariantValues(model.study, {}, LANES), len(tables.signals)
     counts = np.arange(tables.coarser.timeline.window[1] + 1)
-    fine = march(tables, values, 2 * counts, 1, work.halted, sampled).history[:, :, 0]
-    rough = march(tables.coarser, values, counts, 1, work.halted, sampled).history[:, :, 0]
-    readings = (4.0 * fine - rough) / 3.0
+    readings = _extrapolated(tables, VariantValues(model.study, {}, LANES), counts, work)
     _, along = tables.coarser.timeline.moments(counts)
     known = [np.isfinite(column) for column in readings.T]
     curves = [

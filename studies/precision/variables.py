@@ -1,20 +1,29 @@
-"""What an archive of a work-precision study holds, declared."""
+"""What a work-precision study compares, and what its archive holds, declared."""
 
 from __future__ import annotations
 
 from results_schema.variable import outputs
-from results_schema.variables import Variable
 
-_POINT = ("scene", "mode_count", "correction", "scheme", "step_count", "quantity")
-_WHERE = "history and extremes over the scene's largest static value, contact_force over the weight"
-_AUTOMATIC = ("scene", "asked_tolerance")
-_CHOSEN = "what is chosen for the scene in a sweep of its mass, speed and damping from half to twice its own"
-_NO_CHOICE = "0 where there is no automatic choice"
-
-
-def _measured(name: str, dims: tuple[str, ...], long_name: str, meaning: str, units: str = "") -> Variable:
-    return Variable(name, dims, "float64", units, long_name, meaning, nan_allowed=True, lead="none")
-
+#: Schemes in words: those of the march, and those that are offered for comparison alone.
+MARCHED = {
+    "average-acceleration": "average acceleration",
+    "linear-acceleration": "linear acceleration",
+    "fox-goodwin": "Fox-Goodwin",
+    "central-difference": "central difference",
+    "hht-alpha": "HHT-alpha (\N{MINUS SIGN}0.05)",
+    "generalized-alpha": "generalized-alpha (0.8)",
+    "richardson": "a Richardson pair",
+}
+COMPARED = {
+    "wilson-theta": "Wilson-theta",
+    "rk4": "Runge-Kutta 4",
+    "lagged-inertia": "lagged inertia",
+    "lagged-convective": "lagged convective terms",
+    "picard": "Picard iteration",
+    "picard-relaxed": "relaxed Picard iteration",
+}
+SCHEMES = (*MARCHED, *COMPARED)
+QUANTITIES = {"history": "whole histories", "extremes": "largest values", "contact_force": "the contact force"}
 
 RESULTS = outputs("""
     error | quantity | | nan | error of the time steps

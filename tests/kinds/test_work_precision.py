@@ -19,6 +19,7 @@ from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from studies.kinds.work_precision import Question
 from studies.pictures.common import figures
 from studies.precision import findings as advice
 from studies.precision import ladders
@@ -81,7 +82,7 @@ def test_errors_are_those_of_the_naive_twin() -> None:
     """Average acceleration with 80 steps, deflection without static correction and contact force."""
     study = engine.load(precision.TEXT.replace(precision.TEXT[precision.TEXT.index("[sensor.moment]") :], ""))
     study = study.with_values({"solver.static_correction": False})
-    ladder = ladders.Ladder(("average-acceleration",), (80,), (2,), 6)
+    ladder = Question(schemes=("average-acceleration",), step_counts=(80,), mode_counts=(2,), reference_modes=6)
     found = ladders.steps(study, {}, ladder, Work(1))["error"].values[0, 0]
     (marched, force), (exact, true_force) = (histories(*LIGHT, 80, exact=flag) for flag in (False, True))
     static = 50.0 * GRAVITY * 10.0**3 / (48 * 210e9 * 8e-6)  # of the whole beam: the scale of every number of modes
@@ -173,7 +174,7 @@ def test_there_is_no_automatic_choice_where_the_modes_are_given() -> None:
 @pytest.mark.extras
 def test_jax_marches_the_same() -> None:
     study = engine.load(precision.TEXT)
-    ladder = ladders.Ladder(("average-acceleration",), (80,), (2,), 6)
+    ladder = Question(schemes=("average-acceleration",), step_counts=(80,), mode_counts=(2,), reference_modes=6)
     by_jax, own = ladders.by_jax(study, {}, ladder, Work(1)), ladders.steps(study, {}, ladder, Work(1))
     assert float(by_jax["error"][0]) == pytest.approx(float(own["error"][0, 0, 0]), rel=1e-6)
 
