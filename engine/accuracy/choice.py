@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class NeighbourErrors:
         error = worst_but_one(self.error[marches], axis=1)  # of (V, k, R)
         return np.where(np.isfinite(error), error, np.nan).T
 
-    def worst(self, rung: Numbers, neighbours: Numbers, tighter: Array) -> Array:
+    def worst(self, rung: Numbers, neighbours: NDArray[np.integer[Any]], tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
         follows, own = self.held[:, rung[:, None], neighbours]
@@ -148,7 +148,7 @@ class Choice:
     results: tuple[Result, ...]
     pilots: Counts
     measured: Measured
-    neighbours: NDArray[np.int32]
+    neighbours: NDArray[np.unsignedinteger[Any]]
     rung: NDArray[np.int32]
     neighbour_errors: NeighbourErrors
 
@@ -261,12 +261,13 @@ class _Neighbours(NamedTuple):
     def of(self, part: Counts, halted: Halted) -> tuple[Counts, Numbers, Numbers]:
         """The neighbours and the rungs of a row of variants, with their flat numbers."""
         neighbours = np.empty((part.size, min(NEIGHBOURS, self.order.size)), dtype=np.int32)
-        rung, tighter = np.empty(part.size, dtype=np.int32), cases_tolerance(self.asked.study, self.cases)[part]
+        own = VariantValues.of(self.asked.study, self.cases, part)
+        rung, tighter = np.empty(part.size, dtype=np.int32), own.tighter
         nearest(coordinates(self.cases, part) * self.weights, self.pilots, neighbours)
         inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
         neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
         cheapest(self.wanted, self.ranked, self.worth, neighbours, tighter, rung)
-        return part, neighbours, rung
+        return part, neighbours.astype(_number_type(self.order.size)), rung
 
 
 def choose(of: Pilots, found: Found, share: Share) -> Choice:
@@ -281,12 +282,17 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
     errors = neighbour_errors_of(asked, measured, nearest_others(pilots, NEIGHBOURS), of.span)
     rung = np.empty(cases.size, dtype=np.int32)
-    neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=np.int32)
+    neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=_number_type(order.size))
     rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
     subject = _Neighbours(asked, cases, order, weights, pilots, errors.wanted, ranked, worth)
     for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
         neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
     return Choice(of.ladder(scene), results_of(asked), order, measured, neighbours, rung, errors)
+
+
+def _number_type(pilots: int) -> np.dtype[Any]:
+    """The smallest type that numbers of so many pilots have: every variant keeps those of its neighbours."""
+    return np.min_scalar_type(pilots - 1)
 
 
 def usual_pilots(size: int) -> int:
@@ -327,10 +333,10 @@ def coordinates(cases: Cases, variants: Counts) -> Array:
     positions = cases.positions(variants)
     columns = []
     for axis in axes_of_scene(cases):
-        values = np.asarray(axis.values, dtype=np.float64)
-        if values.min() < values.max():
-            roots = np.cbrt(values)
-            columns.append(((roots - roots.min()) / np.ptp(roots))[positions[axis.dim]])
+        low, high = axis.root_ends
+        if low < high:
+            roots = np.cbrt(np.asarray(axis.values[positions[axis.dim]], dtype=np.float64))
+            columns.append((roots - low) / (high - low))
     return np.stack(columns, axis=1) if columns else np.zeros((variants.size, 1))
 
 

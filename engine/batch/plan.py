@@ -122,17 +122,14 @@ class Plan:
     def _marching(self) -> Iterator[Group]:
         """Variants of one scene by their rung, of like pace side by side: they rise and fall together."""
         for grid, members in zip(self.grids, self.members, strict=True):
-            rungs = np.zeros(members.size, dtype=np.int64)
-            if self.choice is not None:
-                rungs = self.choice.rung[members].astype(np.int64)
+            rungs = np.zeros(members.size, dtype=np.int32) if self.choice is None else self.choice.rung[members]
             for own in split(np.arange(members.size), rungs):
-                yield from self._on_rung(grid, members[own], int(rungs[own[0]]))
+                yield from self._on_rung(grid, members[own], grid.values.part(own), int(rungs[own[0]]))
 
-    def _on_rung(self, grid: SceneGrid, variants: Counts, rung: int) -> Iterator[Group]:
+    def _on_rung(self, grid: SceneGrid, variants: Counts, values: VariantValues, rung: int) -> Iterator[Group]:
         """Variants on a rung, those that must take more steps apart."""
         ladder = ladder_of(self.asked, grid)
         column, cut = divmod(rung, len(ladder.cuts))
-        values = VariantValues.of(grid.scene.study, self.cases, variants)
         numerics = ladder.columns[column]
         by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
         pace = values.scene_time_scale

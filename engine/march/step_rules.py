@@ -125,7 +125,8 @@ def _check_limit(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
 
 
 def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
-    least = LEAST_MARGIN * alias_steps(model, time_scale)
+    slowest = _slowest(time_scale, steps)
+    least, steps = LEAST_MARGIN * alias_steps(model, time_scale[slowest]), steps[slowest]
     worst = int(np.argmax(least / steps))
     if least[worst] > steps[worst]:
         raise model.study.source.fault(
@@ -136,6 +137,12 @@ def _check_alias(model: SceneModel, time_scale: Array, steps: Array | Counts) ->
             remedy=f'{_enough(model, time_scale)}, steps = "auto", fewer modes, or scheme = "hht-alpha" with '
             "alpha = -0.05, which damps it",
         )
+
+
+def _slowest(time_scale: Array, steps: Array | Counts) -> Counts:
+    """The slowest variant of each number of steps, which needs most of them by any rule."""
+    order = np.lexsort((time_scale, steps))
+    return order[np.flatnonzero(np.append(np.diff(steps[order]) != 0, True))]
 
 
 def _enough(model: SceneModel, time_scale: Array) -> str:

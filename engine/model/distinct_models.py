@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,10 @@ def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneMo
         codes = np.zeros(variants.size, dtype=np.int64)
         if np.any(columns != columns[:, :1]):
             codes = np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1)
-        for part in split(np.arange(variants.size), codes):
-            yield build_model(own, *_timing_of(values, int(part[0])), cases.paths), variants[part]
+        parts = [(part, _timing_of(values, int(part[0]))) for part in split(np.arange(variants.size), codes)]
+        del values, timing, columns  # while the scenes are looked at: those of ten million variants are large
+        for part, when in parts:
+            yield build_model(own, *when, cases.paths), variants[part]
 
 
 def base_scene(study: Study) -> SceneModel:
@@ -53,7 +56,7 @@ def structure(cases: Cases, variants: Counts) -> Counts:
     return code
 
 
-def split(items: Counts, codes: NDArray[np.int64]) -> Iterator[Counts]:
+def split(items: Counts, codes: NDArray[np.signedinteger[Any]]) -> Iterator[Counts]:
     """Items by equal codes, both in ascending order."""
     if items.size and np.all(codes == codes[0]):
         yield items

@@ -17,6 +17,7 @@ from results_schema.errors import BadInput, shortened
 
 CHECKED_ONE_BY_ONE = 1000  # longer lists of plain numbers are checked at their ends: every field's limits are intervals
 SOBOL_SEED = 0
+DRAWN_AT_ONCE = 2**20
 
 Number = int | float
 Values = NDArray[Any]
@@ -76,11 +77,16 @@ def sampled(study: Study, name: str, axis: SweepAxis, parts: NDArray[np.float64]
 
 
 def sobol_points(size: int, dimensions: int) -> NDArray[np.float64]:
-    """The first points (size, dimensions) of the scrambled Sobol sequence of seed 0, each in [0, 1)."""
+    """The first points (size, dimensions) of the scrambled Sobol sequence of seed 0, each in [0, 1); coordinate after
+    coordinate lies together."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(SOBOL_SEED))
-    return np.asarray(sequence.random_base2(max(size - 1, 0).bit_length())[:size], dtype=np.float64)
+    # By whole powers of two, without which the sequence is out of balance, but never all of a large one at once.
+    found, count = np.empty((dimensions, size)), min(DRAWN_AT_ONCE, 2 ** max(size - 1, 0).bit_length())
+    for first in range(0, size, count):
+        found[:, first : first + count] = sequence.random(count)[: size - first].T
+    return found.T
 
 
 def read(study: Study, name: str, axis: SweepAxis, amount: Any, entry: str) -> Number:

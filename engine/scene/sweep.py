@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 from typing import Any, NoReturn
 
@@ -43,6 +44,12 @@ class Axis:
     def paths(self) -> tuple[str, ...]:
         """Dotted keys of the numbers that it sets."""
         return tuple(self.targets)
+
+    @cached_property
+    def root_ends(self) -> tuple[float, float]:
+        """The cube roots of its smallest and its largest value."""
+        roots = np.cbrt(np.asarray(self.values, dtype=np.float64))
+        return float(roots.min()), float(roots.max())
 
     def columns(self, entries: Any) -> dict[str, Any]:
         """What it sets at some entries of its values, by dotted key."""

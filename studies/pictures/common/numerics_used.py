@@ -127,7 +127,8 @@ def _draw_lines(seen: View, varied: list[str], drawing: Drawing) -> None:
             values = np.where(np.isfinite(values), np.searchsorted(used, np.nan_to_num(values)), np.nan)
             axes.set_yticks(range(len(used)), [NAMES[model].replace(" without", "\nwithout") for model in used])
             axes.set_ylim(-0.5, len(used) - 0.5)
-        axes.plot(seen.along(seen.x), values, color=look.BLUE, marker="o", markersize=3.0, **style)
+        at = seen.points if seen.is_sampled else slice(None)
+        axes.plot(seen.along(seen.x)[at], values[at], color=look.BLUE, marker="o", markersize=3.0, **style)
         axes.set_ylabel("" if name == MODEL else NOUNS[name])
         if name != MODEL and not (values == 0.0).any():
             logarithmic(axes.yaxis)

@@ -23,6 +23,7 @@ MOST_CURVES = 6
 DASHED = (0, (3, 2))
 UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
+MOST_POINTS = 20_000  # of a sample that are drawn: more cover each other, and a million took four minutes
 SPEEDS = (".motion.speed", ".motion.frequency")
 MASSES = (".mass", ".force")
 DAMPING = (".damping_ratio",)
@@ -54,6 +55,19 @@ class View:
     def is_sampled(self) -> bool:
         """Whether the axes lie along the one dimension of a sampled or zipped sweep, so that there are points only."""
         return self.x is not None and self.x.dim == VARIANT
+
+    @property
+    def points(self) -> Counts:
+        """Places (n,) along a sample that are drawn: evenly spread over its numbers where they are many."""
+        assert self.x is not None
+        return np.array(spread(len(self.x.values), MOST_POINTS), dtype=np.int64)
+
+    @property
+    def thinned(self) -> str:
+        """How many points of a sample are drawn; "" where all are."""
+        if not self.is_sampled or self.points.size == self.results.size:
+            return ""
+        return f"Drawn: {self.points.size:,} of {self.results.size:,} variants, evenly spread over their numbers."
 
     def cut(self, values: Any) -> xr.DataArray:
         """Values over (some of) the sweep with the held dimensions taken out."""
@@ -111,8 +125,8 @@ class View:
         return f"Of {status.size} variants shown: {statuses(lost)}." if lost else ""
 
     def caption(self, *sentences: str) -> str:
-        """Sentences, then what is held and what is missing."""
-        return " ".join(text for text in (*sentences, self.words, self.missing) if text)
+        """Sentences, then what is held, thinned and missing."""
+        return " ".join(text for text in (*sentences, self.words, self.thinned, self.missing) if text)
 
 
 def view(
@@ -226,12 +240,12 @@ def per_shown(seen: View, axis: Axis | None, ratio: Any) -> float | None:
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:
-    size = 14.0 if len(curve.x) < 500 else 4.0
-    style: dict[str, Any] = {"s": size, "linewidths": 0.0, "rasterized": len(curve.x) > VECTOR_CELLS}
+    at, size = seen.points, 14.0 if len(curve.x) < 500 else 4.0
+    style: dict[str, Any] = {"s": size, "linewidths": 0.0, "rasterized": at.size > VECTOR_CELLS}
     if seen.y is None:
-        axes.scatter(curve.x, curve.y, color=look.BLUE, **style)
+        axes.scatter(curve.x[at], curve.y[at], color=look.BLUE, **style)
         return
-    points = axes.scatter(curve.x, curve.y, c=seen.y.shown, cmap=look.SEQUENTIAL, **style)
+    points = axes.scatter(curve.x[at], curve.y[at], c=seen.y.shown[at], cmap=look.SEQUENTIAL, **style)
     axes.figure.colorbar(points, ax=axes, label=seen.y.title, pad=0.02).outline.set_visible(False)
 
 
@@ -243,8 +257,10 @@ def draw_map(axes: Axes, seen: View, values: Any, **style: Any) -> Any:
     axes.grid(visible=False)
     mesh: QuadMesh | PathCollection
     if seen.is_sampled:
-        shown = np.isfinite(grid)
-        mesh = axes.scatter(x[shown], y[shown], c=grid[shown], s=14.0, linewidths=0.0, **style)
+        shown = seen.points[np.isfinite(grid[seen.points])]
+        size, rasterized = 14.0 if shown.size <= VECTOR_CELLS else 4.0, shown.size > VECTOR_CELLS
+        style |= {"s": size, "linewidths": 0.0, "rasterized": rasterized}
+        mesh = axes.scatter(x[shown], y[shown], c=grid[shown], **style)
     else:
         rasterized = grid.size > VECTOR_CELLS
         edges = _edges(x), _edges(y)
