@@ -24,6 +24,11 @@ declare(
         sensor | | | axis str | sensor
         sensor_unit | sensor | | optional alone str | unit of the sensor
         result | | | axis str | reported number
+        result_unit | result | | optional alone str | unit of the reported number
+        swept | | | axis str | swept number
+        swept_unit | swept | | optional alone str | unit of the swept number
+        status_name | | | axis str | status
+        percent | | percent | axis | part of the variants that have no larger value
         peak | | | axis int64 | number of the peak in the cycle
         mode | | | axis int64 | number of the mode, from 1
         sample | | | axis int64 | flat number of the variant that was run again
@@ -100,6 +105,28 @@ MARCH = outputs("""
         coordinate of the envelope
 """)
 declare("march", *MARCH)
+
+declare(
+    "cells",
+    *outputs("""
+        status_count | status_name | | int64 | number of variants by status
+            of the cell, whose own status, model, modes and steps are the most serious and the largest of its variants
+        smallest | result | - | nan | smallest value of every reported number
+            over the variants of the cell that have one, in its unit; NaN where none has
+        smallest_variant | result | | int64 | variant with the smallest value
+            its flat number in the sweep's grid, last axis fastest; -1 where there is none
+        smallest_at | result swept | - | nan | swept numbers of the variant with the smallest value
+            in their units
+        largest | result | - | nan | largest value of every reported number
+            over the variants of the cell that have one, in its unit; NaN where none has
+        largest_variant | result | | int64 | variant with the largest value
+            its flat number in the sweep's grid, last axis fastest; -1 where there is none
+        largest_at | result swept | - | nan | swept numbers of the variant with the largest value
+            in their units
+        percentile | result percent | - | optional nan | percentiles of every reported number
+            over the variants of the cell that have one, in its unit, exact, linear between neighbours
+    """),
+)
 
 declare(
     "/model",

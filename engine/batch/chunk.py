@@ -27,7 +27,7 @@ def march_chunk(plan: Plan, variants: Counts, halted: Halted, group: int, beside
     of another group. Raises Halted."""
     plan.forget_before(group - beside)
     arrays, selected = run_chunk(plan, plan.groups[group], variants, halted)
-    return Chunk(Rows(variants, arrays), selected)
+    return plan.reduce(plan, Chunk(Rows(variants, arrays), selected))
 
 
 def run_chunk(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.store.rows import Rows
-from results_schema.variables import Variable, axes, declarations, expand, sensor_unit
+from results_schema.variables import Variable, axes, declarations, expand
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -27,11 +28,22 @@ SHAPE_STATIONS = 201  # of the mode shapes in the archive
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     """The dataset of a study's results; variables that are not declared for `plan.results` are left out, except those
     that the study's own summary is made of (`<sensor>_static`)."""
+    dataset = results_over(plan, plan.cases, arrays)
+    if selected is not None:
+        dataset = _with_histories(plan, dataset, selected, _declared(plan))
+    return _with_ratios(plan, dataset)
+
+
+def _declared(plan: Plan) -> dict[str, Variable]:
+    """The declared results of a plan by name."""
     study = plan.study
-    sensors = {name: sensor_unit(sensor.quantity) for name, sensor in study.sensor.items()}
-    envelopes = {name: sensor_unit(envelope.quantity) for name, envelope in study.envelope.items()}
-    declared = expand(plan.results, sensors, list(study.carriage), envelopes)
-    dataset = xr.Dataset(coords=coordinates(plan.cases))
+    return expand(plan.results, study.sensor_units, list(study.carriage), study.envelope_units)
+
+
+def results_over(plan: Plan, cases: Cases, arrays: Arrays) -> xr.Dataset:
+    """The results of some cases of a study, without histories and ratios."""
+    study, declared = plan.study, _declared(plan)
+    dataset = xr.Dataset(coords=coordinates(cases))
     dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
     for name, places in envelope_places(plan.base).items():
         dim = f"{name}_place"
@@ -45,14 +57,11 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     extra["estimated_error"] = ("result",)
     extra |= {f"{name}_envelope_{end}": (f"{name}_place",) for name in study.envelope for end in ("max", "min")}
     for name, array in arrays.items():
-        dims = (*plan.cases.dims, *extra.get(name, ()))
-        shape = (*plan.cases.shape, *array.shape[1:])
+        dims = (*cases.dims, *extra.get(name, ()))
+        shape = (*cases.shape, *array.shape[1:])
         variable = declared.get(name)
-        attributes = variable.attributes() if variable is not None else _own_attributes(name, sensors)
+        attributes = variable.attributes() if variable is not None else _own_attributes(name, study.sensor_units)
         dataset[name] = (dims, array.reshape(shape), attributes)
-    if selected is not None:
-        dataset = _with_histories(plan, dataset, selected, declared)
-    dataset = _with_ratios(plan, dataset)
     dataset.attrs |= {"study_kind": study.kind, "title": study.title}
     return dataset
 
@@ -84,7 +93,7 @@ def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
     return found
 
 
-def _own_attributes(name: str, sensors: dict[str, str]) -> dict[str, str]:
+def _own_attributes(name: str, sensors: Mapping[str, str]) -> dict[str, str]:
     sensor = name.removesuffix("_static")
     if sensor in sensors:
         return {"units": sensors[sensor], "long_name": f"largest absolute static value of {sensor}"}

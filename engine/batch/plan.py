@@ -35,6 +35,7 @@ from engine.scene.variants import VariantValues, cases_tolerance
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
+from results_schema.store.rows import Chunk
 from results_schema.variables import declarations, registered
 
 CheckSteps = Callable[[SceneModel, VariantValues, Counts], None]
@@ -46,6 +47,7 @@ MOST_LANES = 65536  # of one chunk
 MOST_MEMORY = 16 * 2**30
 CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
 EVERY_MARCH = "march"  # the kind of results that every march has
+PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
@@ -55,10 +57,16 @@ NOBODY: Counts = np.zeros(0, dtype=np.int64)
 NOWHERE = Nowhere()
 
 
+def _whole(plan: Plan, chunk: Chunk) -> Chunk:
+    """All of a chunk."""
+    return chunk
+
+
 @dataclass(eq=False)
 class Plan:
     """All work of a study. base: the scene without sweep. results: the kind whose declared results are kept. grids,
-    members: its scenes, and the variants of each. choice: of what a large sweep is computed with, once it is made."""
+    members: its scenes, and the variants of each. choice: of what a large sweep is computed with, once it is made.
+    reduce: what is kept of a chunk, where it is marched."""
 
     study: Study
     cases: Cases
@@ -69,6 +77,7 @@ class Plan:
     base: SceneModel
     results: str
     choice: Choice | None = None
+    reduce: Callable[[Plan, Chunk], Chunk] = _whole
     _groups: tuple[Group, ...] = field(default=())
     _forgotten: int = 0
 
@@ -167,7 +176,7 @@ class Plan:
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
         kept = int(self.shown.size)
-        if self.study.output.histories == "auto":
+        if self.study.output.histories == "auto" and self.study.output.keeps_variants:
             kept = min(kept + NAMED, self.size)
         shown = kept * self.stations_shown * (len(self.study.sensor) + 2)
         return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
@@ -175,7 +184,7 @@ class Plan:
     @property
     def memory_bytes(self) -> int:
         """Expected peak: results, a chunk per thread, and the program itself."""
-        return needed_memory(self.disk_bytes)
+        return needed_memory(self.study, self.size, self.disk_bytes)
 
     def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[int, Counts]]:
         """The tasks that are left, each with the number of its group; ``chunk`` fixes the variants of each."""
@@ -299,28 +308,29 @@ def numbers_per_variant(asked: Asked) -> int:
     return found
 
 
-def needed_memory(result_bytes: int) -> int:
-    """Expected peak in bytes: results while they are gathered, a chunk per thread, and the program itself."""
-    return 300 * 2**20 + 3 * result_bytes + 6 * CHUNK_BYTES
+def needed_memory(study: Study, size: int, result_bytes: int) -> int:
+    """Expected peak in bytes: the plan, results while they are gathered, a chunk per thread, and the program itself."""
+    gathered = 3 * result_bytes if study.output.keeps_variants else 0
+    return 300 * 2**20 + PLANNED_BYTES * size + gathered + 6 * CHUNK_BYTES
 
 
 def check_memory(study: Study, size: int, result_bytes: int) -> None:
     """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
-    needed = needed_memory(result_bytes)
+    needed = needed_memory(study, size, result_bytes)
     if needed > MOST_MEMORY:
         raise study.source.fault(
             "sweep",
             "the study does not fit into memory",
             expected=f"at most {MOST_MEMORY / 2**30:.0f} GiB",
             received=f"{needed / 2**30:.1f} GiB for {size} variants",
-            remedy="fewer variants or sensors, or fewer histories",
+            remedy='fewer variants or sensors, fewer histories, or output.keep = "extremes"',
         )
 
 
 def shown(study: Study, size: int) -> Counts:
     """Variants whose histories are kept: all, none, or some spread over the sweep."""
     wanted = study.output.histories
-    if wanted == "none":
+    if wanted == "none" or not study.output.keeps_variants:
         return np.zeros(0, dtype=np.int64)
     if wanted != "auto" or size <= SHOWN:
         return np.arange(size, dtype=np.int64)

@@ -92,15 +92,33 @@ Percentile = Annotated[float, Field(ge=0, le=100)]
 class Output(Spec):
     """What the archive keeps of the histories, and what is told of the results.
 
-    percentiles: of every result over the sweep, in per cent. unreduced: number of variants, spread over the sweep, that
-    are computed again by the unreduced finite-element model.
+    percentiles: of every result over the sweep, in per cent. keep: all variants, or of every cell the extremes of every
+    result with the variants that have them, or these and the percentiles. cells: the axes that stay where variants are
+    reduced; all of the grid beside a sample if not given, else none. unreduced: number of variants, spread over the
+    sweep, that are computed again by the unreduced finite-element model.
     """
 
     histories: Annotated[
         Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
     ] = "auto"
     percentiles: Annotated[tuple[Percentile, ...], Strict(False), Field(max_length=20)] = ()
+    keep: Literal["all", "extremes", "percentiles"] = "all"
+    cells: Annotated[tuple[str, ...], Strict(False)] | None = None
     unreduced: int = Field(default=0, ge=0, le=1000)
+
+    @property
+    def keeps_variants(self) -> bool:
+        """Whether the archive has every variant, and not what cells of them have in common."""
+        return self.keep == "all"
+
+    @model_validator(mode="after")
+    def _fitting_keys(self) -> Output:
+        if self.keeps_variants and self.cells is not None:
+            raise fault("cells: for archives that reduce variants", expected='keep = "extremes" or "percentiles"')
+        if (self.keep == "percentiles") != bool(self.percentiles) and not self.keeps_variants:
+            wanted = {"percentiles": "percentiles = [5, 50, 95], say", "extremes": "no percentiles"}[self.keep]
+            raise fault(f'keep = "{self.keep}" and percentiles do not fit', expected=wanted)
+        return self
 
 
 def read_amount(value: Any) -> float | int | str:

@@ -31,6 +31,7 @@ from results_schema.status import Status, label
 from results_schema.variables import Variable, expand, sensor_unit
 
 SCHEMA_VERSION = 1
+CELLS = "cells"  # the kind of results of studies that reduce their variants
 STANDARD_GRAVITY = 9.80665
 KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
 EXPECTABLE = tuple(label(status) for status in Status if status != Status.OK)
@@ -199,6 +200,11 @@ class Study(Scene):
     def envelope_units(self) -> dict[str, str]:
         """Name and unit of every envelope."""
         return {name: sensor_unit(envelope.quantity) for name, envelope in self.envelope.items()}
+
+    @property
+    def results_kind(self) -> str:
+        """The kind whose declared results its dataset has: its own, or that of cells."""
+        return self.kind if self.output.keeps_variants else CELLS
 
     def results(self, kind: str) -> dict[str, Variable]:
         """What a kind of study tells of this scene, by name. Raises BadInput where two would have one name."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
 from typing import Any, NoReturn
@@ -108,6 +108,24 @@ class Cases:
             path: value.item() for axis in self.axes for path, value in axis.columns(positions[axis.dim][0]).items()
         }
 
+    def part(self, variants: Indices) -> Cases:
+        """Some of the variants (n,), as rows of a sample."""
+        positions = self.positions(variants)
+        axes = (replace(axis, dim=VARIANT, values=axis.values[positions[axis.dim]]) for axis in self.axes)
+        return Cases((VARIANT,), (variants.size,), tuple(axes))
+
+    def along(self, dims: Sequence[str]) -> Cases:
+        """The grid of some of the dimensions alone."""
+        sizes = {dim: size for dim, size in zip(self.dims, self.shape, strict=True) if dim in dims}
+        return Cases(tuple(sizes), tuple(sizes.values()), tuple(axis for axis in self.axes if axis.dim in sizes))
+
+    def numbers_in(self, cells: Cases, variants: Indices) -> Indices:
+        """(n,) the flat numbers of the cells, points of some of the dimensions, to which variants belong."""
+        positions = self.positions(variants)
+        if not cells.dims:
+            return np.zeros(variants.size, dtype=np.int64)
+        return np.asarray(np.ravel_multi_index([positions[dim] for dim in cells.dims], cells.shape))
+
     def study_of(self, study: Study, index: int) -> Study:
         """One variant as a study of its own, without a sweep."""
         return study.without_sweep().with_values(self.values_of(index))
@@ -136,6 +154,27 @@ def expand(study: Study) -> Cases:
         if unmet := broken(study, cases, check):
             _refuse(study, check, *unmet)
     return cases
+
+
+def cells_of(study: Study, cases: Cases) -> Cases:
+    """The cells of a study that reduces its variants. Raises BadInput."""
+    asked = study.output.cells
+    if not cases.dims:
+        what = "there is one variant alone: nothing to reduce"
+        raise study.source.fault("output.keep", what, expected='"all"', received=study.output.keep)
+    if asked is None:
+        return cases.along([dim for dim in cases.dims if dim != VARIANT] if VARIANT in cases.dims else [])
+    grid = [dim for dim in cases.dims if dim != VARIANT]
+    for name in asked:
+        if name not in grid:
+            expected = (
+                f"axes of the grid: {', '.join(grid)}" if grid else "none: no axis of this sweep is one of a grid"
+            )
+            raise study.source.fault("output.cells", "no such axis of a grid", expected=expected, received=name)
+    if set(asked) == set(cases.dims):
+        what = "every variant would be a cell of its own"
+        raise study.source.fault("output.cells", what, expected="fewer axes", remedy='keep = "all"')
+    return cases.along(asked)
 
 
 def _sampled(study: Study) -> Iterator[tuple[str, Values]]:

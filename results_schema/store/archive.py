@@ -187,6 +187,10 @@ def _summary(group: str, name: str, variable: Any) -> VariableSummary:
 
 
 def _status_counts(dataset: Any) -> dict[str, int]:
+    by_status = dataset.variables.get("status_count")
+    if by_status is not None:
+        counts = np.asarray(by_status[...]).reshape(-1, len(Status)).sum(axis=0)
+        return {label(status): int(count) for status, count in zip(Status, counts, strict=True) if count}
     values, counts = np.unique(np.asarray(dataset.variables["status"][...]), return_counts=True)
     known = {int(status): label(status) for status in Status}
     return {known.get(int(value), str(value)): int(count) for value, count in zip(values, counts, strict=True)}

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import fcntl
 import os
+import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import IO, Self
 
 import numpy as np
 
@@ -174,6 +175,13 @@ class PartStore:
             raise ArchiveError(what, where=str(path), remedy="run again: it is computed again") from error
         own = {key: value for key, value in tables["/"].attributes.items() if key not in (_KEY, CONTENTS, DIGEST)}
         return {**tables, "/": replace(tables["/"], attributes=own)}
+
+    def scratch(self) -> IO[bytes]:
+        """A file without a name, gone when it is closed, on the disk of the parts. Raises OutputFailed."""
+        try:
+            return tempfile.TemporaryFile(dir=self._folder, suffix=files.TEMPORARY)
+        except OSError as error:
+            raise output_failed(self._folder, error) from error
 
     def remove(self) -> None:
         """Remove all of it: the archive is written."""

@@ -210,6 +210,8 @@ def show_archive(summary: Summary) -> None:
     grid = next((v.dims for v in root if v.name == "status"), ())
     shape = " x ".join(f"{name} {summary.dimensions[name]:,}" for name in grid)
     own = [v.name for v in root if v.dims[: len(grid)] == grid and v.name not in grid and v.units]
+    if "status_name" in summary.dimensions:
+        own = [v.name for v in root if v.dims[: len(grid) + 1] == (*grid, "result") and v.dtype != "text"]
     results = [name for name in own if not name.endswith("_position")]
     histories = [v.name for v in root if "history" in v.dims]
     groups = sorted({v.group for v in summary.variables} - {"/"})
@@ -252,7 +254,7 @@ def show_outcome(outcome: Outcome) -> None:
     _heading(outcome.results.attrs["title"])
     paragraphs(*answer_of(results))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
-        _ranges(summary.in_tables(results), results.study.output.percentiles)
+        _ranges(summary.in_tables(results), results.percentiles)
     accuracy = told_accuracy(outcome.audit, results)
     statuses = _about_statuses(summary.counts(outcome.results), summary.noun(outcome.results), results.study.expected)
     paragraphs(*statuses, *([f"Accuracy: {accuracy}"] if accuracy else []))
@@ -355,7 +357,7 @@ def _about_statuses(counts: Mapping[str, int], noun: str, expected: Sequence[str
 def _about_work(outcome: Outcome) -> str:
     from studies.reporting import summary
 
-    variants = counted(int(outcome.results["status"].size), summary.noun(outcome.results))
+    variants = counted(sum(summary.counts(outcome.results).values()), summary.noun(outcome.results))
     if outcome.was_finished:
         return f"{outcome.archive} held the finished results of this study: nothing to do"
     resumed = f"{outcome.resumed:,} of them" if is_marched(outcome.results) else counted(outcome.resumed, "piece")

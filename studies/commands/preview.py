@@ -16,7 +16,7 @@ from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
 from engine.scene.study import Study
-from engine.scene.sweep import Axis, Cases, expand
+from engine.scene.sweep import Axis, Cases, cells_of, expand
 from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
@@ -24,8 +24,7 @@ from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import Forecast, forecast
 from studies.protocol.parts import Pieces, Variants
 from studies.results.findings_common import speeds_in_step, told_trains
-from studies.results.formatting import counted, duration, number, percent, quantity, spanned, unit_text
-from studies.results.results import typed_unit
+from studies.results.formatting import counted, duration, number, percent, quantity, spanned, typed_unit, unit_text
 
 FREQUENCIES_SHOWN = 6
 
@@ -136,6 +135,9 @@ def _study(plan: Plan) -> Table:
     shape = " x ".join(f"{length} {dim}" for dim, length in zip(plan.cases.dims, plan.cases.shape, strict=True))
     variants = f"{plan.size:,} = {shape}" if len(plan.cases.dims) > 1 else f"{plan.size:,}"
     rows = [("kind", study.kind), ("variants", variants), ("start", _START[study.start])]
+    if not study.output.keeps_variants:
+        cells = cells_of(study, plan.cases)
+        rows.insert(2, ("kept", f"{study.output.keep} of {counted(cells.size, 'cell')}"))
     rows += told_trains(study)
     return Table(study.title or study.source.name, ("", ""), rows)
 

@@ -4,11 +4,12 @@ so a killed run goes on from there, and put together at the end.
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -86,6 +87,9 @@ class Store(Protocol):
     def read(self, name: str) -> Mapping[str, Table]:
         """One part."""
 
+    def scratch(self) -> IO[bytes]:
+        """A file without a name, gone when it is closed, for what is too large for memory."""
+
 
 class Memory:
     """Parts of a run that writes no archive."""
@@ -104,6 +108,10 @@ class Memory:
     def read(self, name: str) -> Mapping[str, Table]:
         """One part, which is handed over."""
         return self._parts.pop(name)
+
+    def scratch(self) -> IO[bytes]:
+        """A file without a name."""
+        return tempfile.TemporaryFile()
 
 
 class Parts(Protocol):
@@ -157,13 +165,22 @@ class Variants:
         try:
             choose(self.plan, work.place, work.stop.event, KeptPilots(store))  # an audit asks for it, too
             if done.size < self.plan.size:
-                with Gatherer(lambda chunk: store.write(chunk.name, chunk.tables)) as parts:
+                with Gatherer(partial(self._keep, store)) as parts:
                     how: dict[str, Any] = {"chunk": work.chunk, "stop": work.stop.event}
                     execute(self.plan, parts.add, work.place, progress=work.progress, done=done, **how)
         except Interrupted:
             work.check()
             raise
         return int(done.size)
+
+    def _keep(self, store: Store, chunk: Chunk) -> None:
+        """Write chunks, joined, as one part: what is kept of one chunk may be more than what is kept of several."""
+        kept = self.plan.reduce(self.plan, chunk)
+        store.write(kept.name, kept.tables)
+
+    def to_audit(self, root: xr.Dataset) -> xr.Dataset:
+        """The study's dataset as audits ask for it: with the status of every variant."""
+        return root
 
     def gather(self, store: Store) -> xr.Dataset:
         """The march's dataset with the study's own results."""
@@ -199,11 +216,16 @@ class Variants:
         from engine.batch.dataset import build
 
         study = self.plan.study
-        dataset = self.kind.summarise(build(self.plan, found.arrays, found.selected), study)
-        declared = study.results(study.kind)
-        # The engine offers static values to every summary; they are results only where the kind says so.
-        offered = [name for sensor in study.sensor if (name := f"{sensor}_static") not in declared]
-        return dataset.drop_vars(offered, errors="ignore")
+        return summarised(self.kind, build(self.plan, found.arrays, found.selected), study)
+
+
+def summarised(kind: Kind, dataset: xr.Dataset, study: Study) -> xr.Dataset:
+    """The march's dataset of some variants with the results of their kind of study."""
+    dataset = kind.summarise(dataset, study)
+    declared = study.results(kind.name)
+    # The engine offers static values to every summary; they are results only where the kind says so.
+    offered = [name for sensor in study.sensor if (name := f"{sensor}_static") not in declared]
+    return dataset.drop_vars(offered, errors="ignore")
 
 
 class Gatherer:

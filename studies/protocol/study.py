@@ -75,6 +75,10 @@ class Kind:
 
     def parts(self, study: Study) -> Parts:
         """The work. Raises BadInput where it cannot be done."""
+        if not study.output.keeps_variants:
+            from studies.protocol.cells import ReducedVariants
+
+            return ReducedVariants(self, study)
         return Variants(self, study)
 
     def reduction(self, study: Study) -> Reduction | None:
@@ -120,6 +124,9 @@ class PiecedKind(Kind, ABC):
                 received=f"the axes {', '.join(study.sweep.axes)}",
                 remedy="what it varies stands in the table [question]",
             )
+        if not study.output.keeps_variants:
+            what = f"studies of the kind {self.name} are not marched by variants that could be reduced"
+            raise study.source.fault("output.keep", what, expected='"all"', received=study.output.keep)
         if study.envelope:
             what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
             raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))
@@ -263,7 +270,7 @@ def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:
         dataset = dataset.assign_coords(sensor_unit=units)
     missing = {key: value for key, value in study_attributes(study).items() if key not in dataset.attrs}
     dataset = dataset.assign_attrs(missing)
-    validate(dataset, study.kind, study.results(study.kind))
+    validate(dataset, study.kind, study.results(study.results_kind))
     return dataset
 
 

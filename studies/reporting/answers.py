@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from results_schema.late import xr
+from studies.findings.cells import findings_of_cells
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
 from studies.results.findings_common import told_envelopes, told_statuses
@@ -29,7 +30,7 @@ def figures(dataset: xr.Dataset) -> list[Figure]:
 
 def answer_of(results: Results) -> list[str]:
     """The answer in two to five sentences: what the kind of study says first."""
-    told = kind_named(results.study.kind).findings(results)
+    told = _findings(results)
     return [text for text in told if text not in told_statuses(results)][:MOST_SAID]
 
 
@@ -40,14 +41,23 @@ def findings_of(results: Results) -> list[str]:
 
 def found_of(results: Results) -> list[str]:
     """What the kind of study finds, then what the envelopes say."""
-    return [*kind_named(results.study.kind).findings(results), *told_envelopes(results)]
+    return [*_findings(results), *told_envelopes(results)]
+
+
+def _findings(results: Results) -> list[str]:
+    """What the kind of study finds, or what is known of cells of variants."""
+    if not results.study.output.keeps_variants:
+        return findings_of_cells(results)
+    return kind_named(results.study.kind).findings(results)
 
 
 def figures_of(results: Results) -> list[Figure]:
     """The figures of the question, the most important first, then those on methods."""
-    from studies.pictures.common import envelopes, estimates
+    from studies.pictures.common import cells, envelopes, estimates
     from studies.pictures.common import numerics_used as choice
 
+    if not results.study.output.keeps_variants:
+        return cells.pictures(results)
     found = [*kind_named(results.study.kind).figures(results), *envelopes.pictures(results)]
     found.sort(key=lambda figure: figure.on_method)
     return [*found, *choice.pictures(results), *estimates.pictures(results)]

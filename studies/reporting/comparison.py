@@ -59,6 +59,10 @@ class Comparison:
 
 def compare(first: Results, second: Results) -> Comparison:
     """Compare two archives where their sweeps agree. Raises BadInput where these have other axes."""
+    for one in (first, second):
+        if not one.study.output.keeps_variants:
+            what = "an archive that keeps cells alone has no variants to compare"
+            raise BadInput(what, where=one.study.title or one.study.kind, expected='output.keep = "all"')
     if first.dims != second.dims:
         what = "the archives have different axes, so there is nothing to compare"
         raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")

@@ -142,7 +142,7 @@ def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_questi
         scene=_scene(results),
         sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
         results=_results(results),
-        percentiles=[f"{value:g} %" for value in results.study.output.percentiles],
+        percentiles=[f"{value:g} %" for value in results.percentiles],
         declarations=_declarations(results),
         provenance=_provenance(source),
         study_text=results.study.source.text,
@@ -197,7 +197,7 @@ def check_folder(folder: Path, page: str) -> None:
 def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
     fine = results.status_counts.get(Status.OK, 0)
-    counts = [Row(f"{noun}s", f"{results.size:,}"), Row("status ok", f"{fine:,}")]
+    counts = [Row(f"{noun}s", f"{results.variants:,}"), Row("status ok", f"{fine:,}")]
     return [Row("kind of study", results.study.kind), *(counts if _statuses(results, noun) else ())]
 
 
@@ -287,7 +287,7 @@ def _results(results: Results) -> list[tuple[str, ...]]:
 
 def _declarations(results: Results) -> list[tuple[str, ...]]:
     """Name, dimensions, unit and meaning of every variable in the archive."""
-    declared = expand(results.study.kind, results.sensors, tuple(results.study.carriage), results.envelopes)
+    declared = expand(results.study.results_kind, results.sensors, tuple(results.study.carriage), results.envelopes)
     names = [str(name) for name in results.dataset.data_vars]
     return [_declaration(results, declared[name]) for name in names if name in declared]
 

@@ -13,8 +13,9 @@ from results_schema.late import xr
 from results_schema.status import Status, label
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
+from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
 from studies.results.formatting import quantity
-from studies.results.results import Results
+from studies.results.results import VARIANT, Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from studies.runs.runner import Outcome
 
 SOME_NOT_OK = 3
-_BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,7 @@ def noun(results: xr.Dataset) -> str:
 
 def counts(results: xr.Dataset) -> dict[str, int]:
     """Number of variants by status, those that occur."""
-    values, found = np.unique(results["status"].values, return_counts=True)
-    return {label(Status(int(value))): int(count) for value, count in zip(values, found, strict=True)}
+    return {label(status): count for status, count in counts_of(results).items()}
 
 
 def exit_code(outcome: Outcome) -> int:
@@ -101,7 +100,11 @@ def ranges(study_results: Results) -> Iterator[Range]:
     """The range of every result that is one number per variant, or one per variant and sensor or place; of studies
     in pieces of every result, but where they take a sweep without what belongs to no variant."""
     results = study_results.dataset
-    grid = results["status"].dims
+    if not study_results.study.output.keeps_variants:
+        for one in cell_ranges(study_results):
+            low, high = _of_cells(study_results, one.smallest), _of_cells(study_results, one.largest)
+            yield Range(one.name, one.sensor, one.units, low, high, one.percentiles)
+        return
     if not is_marched(results):
         declared = {} if is_measured(results) else study_results.study.results(study_results.study.kind)
         beside = {name for name, variable in declared.items() if variable.lead != "grid"}
@@ -109,15 +112,14 @@ def ranges(study_results: Results) -> Iterator[Range]:
             if array.dtype.kind == "f" and name not in beside:
                 yield from _range(study_results, str(name), "", array)
         return
-    for name, array in results.data_vars.items():
-        if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
-            continue
-        of_places = len(array.dims) == len(grid) + 1 and str(array.dims[-1]).endswith("_place")
-        if array.dims == grid or of_places:
-            yield from _range(study_results, str(name), "", array)
-        elif array.dims == (*grid, "sensor"):
-            for place, sensor in enumerate(results["sensor"].values):
-                yield from _range(study_results, str(name), str(sensor), array.isel(sensor=place))
+    for name, sensor, array in single_numbers(results):
+        yield from _range(study_results, name, sensor, array)
+
+
+def _of_cells(results: Results, end: End) -> Extreme:
+    """An extreme that an archive of cells has."""
+    words = words_of(results, end.at) | {VARIANT: str(end.variant)}
+    return Extreme(end.value, {**end.at, VARIANT: end.variant}, words)
 
 
 def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
@@ -127,7 +129,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
         "archive": str(outcome.archive),
         "kind": results.attrs["study_kind"],
         "title": results.attrs["title"],
-        "variants": int(results["status"].size),
+        "variants": told.variants,
         "status": counts(results),
         "was_finished": outcome.was_finished,
         "resumed": outcome.resumed,
@@ -142,7 +144,7 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
                 "units": found.units,
                 "smallest": _end_as_json(found.smallest),
                 "largest": _end_as_json(found.largest),
-                "percentiles": dict(zip(map(str, told.study.output.percentiles), found.percentiles, strict=True)),
+                "percentiles": dict(zip(map(str, told.percentiles), found.percentiles, strict=True)),
             }
             for found in ranges(told)
         ],

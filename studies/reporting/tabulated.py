@@ -1,4 +1,5 @@
-"""An archive as a table: one row per variant (and position), for programs that read CSV or Parquet."""
+"""An archive as a table: one row per variant (and position), or per cell and result, for programs that read CSV or
+Parquet."""
 
 from __future__ import annotations
 
@@ -56,10 +57,11 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
     import pandas as pd
 
     dataset = _chosen(results, chosen) if chosen else _without_constants(results)
-    rows = (*results.dims, *(("position",) if "position" in dataset.dims else ()))
+    along = "position" if results.study.output.keeps_variants else "result"
+    rows = (*results.dims, *((along,) if along in dataset.dims else ()))
     like = xr.zeros_like(dataset["status"], dtype=float)
     if len(rows) > len(results.dims):
-        like = like.expand_dims(position=dataset["position"]).transpose(*rows)
+        like = like.expand_dims({along: dataset[along]}).transpose(*rows)
     columns, left_out, swept = {}, [], {axis.name: axis for axis in results.axes}
     for name, array in [*((n, dataset[n]) for n in (*dataset.coords, "status")), *dataset.data_vars.items()]:
         own = tuple(dim for dim in array.dims if dim not in rows)
@@ -92,7 +94,7 @@ def _without_constants(results: Results) -> xr.Dataset:
     dataset = results.dataset.drop_vars(
         [name for name in results.dataset.data_vars if str(name).startswith(forces) or name in lost]
     )
-    if "result" not in dataset.dims:
+    if "result" not in dataset.dims or not results.study.output.keeps_variants:
         return dataset
     return dataset.sel(result=[name for name in dataset["result"].values if not str(name).startswith(forces)])
 

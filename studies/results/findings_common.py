@@ -118,4 +118,4 @@ def told_statuses(results: Results) -> list[str]:
     others = sum(count for status, count in results.status_counts.items() if status != Status.OK)
     if not others:
         return []
-    return [f"Of {counted(results.size, 'variant')}, {others:,} carry a status: {statuses(results.status_counts)}."]
+    return [f"Of {counted(results.variants, 'variant')}, {others:,} carry a status: {statuses(results.status_counts)}."]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -156,3 +159,14 @@ def listed(parts: Sequence[str]) -> str:
     'a, b and c'
     """
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
+
+
+def typed_unit(study: Study, axis: str) -> Scale | None:
+    """The unit in which a study file has the values of a swept number; None where they are plain numbers."""
+    written, unit = study.data["sweep"][axis], study.unit(study.sweep.axes[axis].of[0])
+    values = written.get("values", (written.get("from"), written.get("to")))
+    text = next((value for value in values if isinstance(value, str)), None)
+    if text is None or unit is None:
+        return None
+    name, size = unit.written(text)
+    return Scale(1.0 / size, name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +13,8 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
-from studies.results.formatting import Scale, axis_title, number, quantity, spanned
+from studies.results.cells import counts_of
+from studies.results.formatting import Scale, axis_title, number, quantity, spanned, typed_unit
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
@@ -140,14 +140,21 @@ class Results:
 
     @property
     def size(self) -> int:
-        """Number of variants."""
+        """Number of variants, or of cells of them."""
         return int(self.dataset["status"].size)
+
+    @property
+    def variants(self) -> int:
+        """Number of variants."""
+        return sum(self.status_counts.values())
 
     @cached_property
     def axes(self) -> tuple[Axis, ...]:
-        """The swept numbers in the order of the file."""
+        """The swept numbers along which there are results, in the order of the file."""
         found = []
         for name, axis in self.study.sweep.axes.items():
+            if name not in self.dataset:
+                continue
             coordinate = self.dataset[name]
             values = np.asarray(coordinate.values, dtype=np.float64)
             units = str(coordinate.attrs.get("units", "1"))
@@ -171,6 +178,12 @@ class Results:
     def sensors(self) -> dict[str, str]:
         """Name and unit of every sensor."""
         return self.study.sensor_units
+
+    @property
+    def percentiles(self) -> tuple[float, ...]:
+        """Those that are told of every result: over all variants, or over those of the one cell."""
+        output = self.study.output
+        return output.percentiles if output.keeps_variants or self.size == 1 else ()
 
     def noun(self, sensor: str) -> str:
         """What a sensor measures, as a word."""
@@ -237,8 +250,7 @@ class Results:
     @cached_property
     def status_counts(self) -> dict[Status, int]:
         """Number of variants per status, those that occur."""
-        counts = Counter(self.dataset["status"].values.ravel().tolist())
-        return {Status(value): counts[value] for value in sorted(counts)}
+        return counts_of(self.dataset)
 
     def parameter(self, path: str) -> xr.DataArray | float:
         """A number of the scene by its dotted key: over the sweep where an axis sets it, else as in the file."""
@@ -341,17 +353,6 @@ class Results:
             return np.asarray(stored.sel(history=flat).values, dtype=np.float64)
         places = {dim: i for dim, i in zip(self.dims, index, strict=True) if dim in stored.dims}
         return np.asarray(stored.isel(places).values, dtype=np.float64)
-
-
-def typed_unit(study: Study, axis: str) -> Scale | None:
-    """The unit in which a study file has the values of a swept number; None where they are plain numbers."""
-    written, unit = study.data["sweep"][axis], study.unit(study.sweep.axes[axis].of[0])
-    values = written.get("values", (written.get("from"), written.get("to")))
-    text = next((value for value in values if isinstance(value, str)), None)
-    if text is None or unit is None:
-        return None
-    name, size = unit.written(text)
-    return Scale(1.0 / size, name)
 
 
 def statuses(counts: Mapping[Status, int]) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +18,11 @@ from results_schema.variables import declarations
 from studies.findings.numerics_used import is_marched
 from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
+from studies.results.cells import counts_of
 from studies.results.results import Results
+
+if TYPE_CHECKING:
+    from engine.scene.sweep import Axis
 
 MODELS = "/model/"
 SAME = 1e-9  # relative difference of an axis's values from those of the study: other machines round otherwise
@@ -90,9 +95,9 @@ def _findings(archive: Archive, study: Study) -> Iterator[str]:
     yield from _asked_findings(root, study, kind)
     yield from _axis_findings(root, study)
     yield from _label_findings(root, study)
-    yield from root_findings(root, study.kind, study.results(study.kind))
+    yield from root_findings(root, study.kind, study.results(study.results_kind))
     for path, group in archive.groups.items():
-        yield from (f"{path}: {text}" for text in group_findings(group, path, int(root["status"].size)))
+        yield from (f"{path}: {text}" for text in group_findings(group, path, sum(counts_of(root).values())))
     yield from _model_findings(root, study, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
 
 
@@ -117,9 +122,16 @@ def _model_findings(root: xr.Dataset, study: Study, groups: Mapping[str, xr.Data
 
 def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
     """The axes of the sweep against the coordinates."""
-    from engine.scene.sweep import VARIANT, expand
+    from engine.scene.sweep import VARIANT, cells_of, expand
 
     if not study.sweep.axes:
+        return
+    if not study.output.keeps_variants:
+        cells = cells_of(study, expand(study))
+        if dict(root["status"].sizes) != dict(zip(cells.dims, cells.shape, strict=True)):
+            yield f"status: expected the cells {dict(zip(cells.dims, cells.shape, strict=True))} of the study"
+            return
+        yield from _differing(root, cells.axes)
         return
     joint = {name: study.sweep.zip or axis.sobol is not None for name, axis in study.sweep.axes.items()}
     sizes = {VARIANT if joint[name] else name: axis.size for name, axis in study.sweep.axes.items()}
@@ -127,7 +139,12 @@ def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
     if list(root["status"].sizes.items()) != list(sizes.items()):
         yield f"status: expected the axes {sizes} of the study, received {dict(root['status'].sizes)}"
         return
-    for axis in expand(study).axes:
+    yield from _differing(root, expand(study).axes)
+
+
+def _differing(root: xr.Dataset, axes: Sequence[Axis]) -> Iterator[str]:
+    """The values of axes against the coordinates."""
+    for axis in axes:
         found = root.coords.get(axis.name)
         if found is None or found.dims != (axis.dim,) or found.dtype.kind not in "if":
             yield f"{axis.name}: expected the numbers of this axis along {axis.dim}"

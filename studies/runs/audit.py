@@ -21,6 +21,7 @@ from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
 from studies.protocol.stopping import AskedElsewhere
+from studies.results.cells import words_of
 from studies.results.formatting import counted, listed, percent, scientific
 from studies.results.results import Results
 
@@ -231,22 +232,34 @@ def _not_held(results: Results) -> str:
 
 def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     """In one sentence what was asked, estimated and observed of all that is held."""
+    if not results.study.output.keeps_variants and group is not None:
+        tolerances = known(group["tolerance"])
+        return f"{_span(tolerances)} was asked; {_compared(group)}" if tolerances.size else ""
     if not is_marched(results.dataset) or "tolerance" not in results.dataset:
         return ""
     fine = results.dataset["status"].values == int(Status.OK)
     estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
     if not estimates.size or not tolerances.size:
         return ""
-    span = " to ".join(scientific(float(end)) for end in sorted({tolerances.min(), tolerances.max()}))
-    said = f"estimated errors at most {scientific(float(estimates.max()))} where {span} was asked"
-    if group is None or not (verdict := Verdict.of(group)).count:
-        return f"{said}; no variant was audited."
+    said = f"estimated errors at most {scientific(float(estimates.max()))} where {_span(tolerances)} was asked"
+    return f"{said}; {'no variant was audited.' if group is None else _compared(group)}"
+
+
+def _span(tolerances: Array) -> str:
+    return " to ".join(scientific(float(end)) for end in sorted({tolerances.min(), tolerances.max()}))
+
+
+def _compared(group: xr.Dataset) -> str:
+    """In words what the group says of variants that the archive calls ok."""
+    verdict = Verdict.of(group)
+    if not verdict.count:
+        return "no variant was audited."
     audit = f"{counted(verdict.count, 'variant')} computed again with more of everything"
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
-        return f"{said}; but of {audit}, {beyond} did not hold it."
+        return f"but of {audit}, {beyond} did not hold it."
     differ = "differ" if verdict.count > 1 else "differs"
-    return f"{said}; {audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
+    return f"{audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
@@ -275,7 +288,11 @@ def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
     if not np.isfinite(verdict.worst) or verdict.worst < 0.0:
         return f"{said}no number to compare"
     asked, observed, name = _worst(group, verdict)
-    at = results.at(results.index_of(int(group["sample"].values[verdict.place])))
+    values = _at(group, verdict)
+    words = words_of(
+        results, {name: value for name, value in values.items() if results.study.sweep.axes[name].size > 1}
+    )
+    at = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in words.items())
     return f"asked {scientific(asked)}, {said}at most {scientific(observed)}, worst{f' at {at}' if at else ''} ({name})"
 
 
@@ -286,10 +303,18 @@ def _worst(group: xr.Dataset, verdict: Verdict) -> tuple[float, float, str]:
     return asked, verdict.worst * asked, str(group["result"].values[verdict.result])
 
 
+def _at(group: xr.Dataset, verdict: Verdict) -> dict[str, float]:
+    """The swept numbers of the worst variant, by the names of their axes."""
+    return {
+        str(name): float(array.values[verdict.place])
+        for name, array in group.coords.items()
+        if array.dims == ("sample",) and name != "sample"
+    }
+
+
 def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
     """What `run --json` says of it."""
     verdict = Verdict.of(group)
-    place = dict(zip(results.dims, results.index_of(int(group["sample"].values[verdict.place])), strict=True))
     asked, observed, name = _worst(group, verdict)
     return {
         "variants": verdict.count,
@@ -299,6 +324,6 @@ def as_json(group: xr.Dataset, results: Results) -> dict[str, Any]:
         "tolerance": asked,
         "largest_observed_error": observed,
         "worst_result": name,
-        "at": {axis.name: float(axis.values[place[axis.dim]]) for axis in results.axes},
+        "at": _at(group, verdict),
         "held": verdict.held,
     }

@@ -29,7 +29,8 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
     key = run_key(results.study, kind_of(results.study).parts(results.study).names)
     root = dataset.assign_attrs(attributes(results.study, key, float(dataset.attrs["run_seconds"])))
     models = model_groups(base_scene(results.study))
-    return Archive(Path(path), root, with_first_frequency(models, results) if results.study.carriage else models)
+    marched = bool(results.study.carriage) and results.study.output.keeps_variants
+    return Archive(Path(path), root, with_first_frequency(models, results) if marched else models)
 
 
 def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Path:

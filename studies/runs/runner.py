@@ -28,6 +28,7 @@ from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop
 from studies.protocol.study import compared, kind_of
+from studies.results.cells import counts_of
 from studies.results.results import Results
 from studies.runs.archived import with_first_frequency
 from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces
@@ -124,8 +125,10 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
 
     plan = parts.plan
     work.stage(AUDITING)
-    audit = audit_group(plan, root, work)
-    models = with_first_frequency(model_groups(plan.base), Results(root, plan.study))
+    audit = audit_group(plan, parts.to_audit(root), work)
+    models = model_groups(plan.base)
+    if plan.study.output.keeps_variants:
+        models = with_first_frequency(models, Results(root, plan.study))
     return models | unreduced_group(plan, root, work.check) | audit
 
 
@@ -159,7 +162,7 @@ def _found_finished(run: _Run) -> Outcome:
     _remove_leftovers(run)
     found = open_archive(run.archive)
     seconds, audit = time.perf_counter() - run.started, found.groups.get(GROUP)
-    return Outcome(run.archive, found.root, int(found.root["status"].size), True, seconds, audit=audit)
+    return Outcome(run.archive, found.root, sum(counts_of(found.root).values()), True, seconds, audit=audit)
 
 
 def _remove_leftovers(run: _Run) -> None:

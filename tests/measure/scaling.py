@@ -1,0 +1,224 @@
+"""What studies cost against their size: `python -m tests.measure.scaling`, which prints the tables of docs/scaling.md.
+
+Passages of random speed, mass and damping with fixed modes and steps and without an audit, each run by the command in a
+process of its own. CPU times depend little on what else runs on the machine; wall times do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import chdir
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from results_schema.store.parts import bytes_so_far
+from tests.studies.small import ROOT
+
+TEXT = """\
+schema_version = 1
+kind = "passage"
+
+[body.beam]
+kind = "beam"
+length = 20.0
+area = 0.05
+second_moment = 1e-3
+youngs_modulus = "210 GPa"
+density = 7850.0
+supports = "pinned-pinned"
+damping_ratio = 0.02
+modes = {modes}
+
+[carriage.load]
+on = "beam"
+kind = "mass"
+mass = 1000.0
+motion = {{ kind = "cruise", start = 0.0, end = 20.0, speed = 20.0 }}
+
+[sensor.midspan]
+body = "beam"
+at = 10.0
+
+[sweep]
+speed = {{ of = "carriage.load.motion.speed", sobol = {variants}, from = 5, to = 60 }}
+mass = {{ of = "carriage.load.mass", sobol = {variants}, from = 100, to = 2000 }}
+damping = {{ of = "body.beam.damping_ratio", sobol = {variants}, from = 0.005, to = 0.05 }}
+
+[solver]
+steps = {steps}
+audit = 0
+
+[output]
+keep = "{keep}"
+"""
+MODES, STEPS = 10, 500  # of all studies but those in which they vary
+WORKERS, VARIANTS = 100, 10**9  # of the plan on paper
+TASK_SECONDS = 0.4  # of a chunk of variants, at most
+PROGRAM = 300 * 2**20  # bytes of a process that has planned a small study
+
+
+class Size(NamedTuple):
+    """A study's size."""
+
+    variants: int
+    modes: int = MODES
+    steps: int = STEPS
+    keep: str = "extremes"
+
+
+class Cost(NamedTuple):
+    """What a command took: wall and CPU seconds (of all its processes), peak bytes of its largest process, bytes of the
+    archive, and the most bytes that its parts took."""
+
+    wall: float
+    cpu: float
+    peak: int
+    archive: int
+    parts: int
+
+
+def cost(size: Size, *options: str) -> Cost:
+    """Run a study of a size in this folder and remove its archive."""
+    Path("study.toml").write_text(TEXT.format(**size._asdict()), encoding="utf-8")
+    environment, started = os.environ | {"PYTHONPATH": str(ROOT)}, time.monotonic()
+    command = [sys.executable, "-m", "studies", "run", "study.toml", "-o", "study.nc", *options]
+    quiet = subprocess.DEVNULL
+    running, parts = subprocess.Popen(command, env=environment, stdout=quiet, stderr=quiet), [0]
+    ended = threading.Event()
+    watch = threading.Thread(target=_watch, args=(ended, parts))
+    watch.start()
+    _, status, used = os.wait4(running.pid, 0)
+    wall = time.monotonic() - started
+    ended.set()
+    watch.join()
+    if os.waitstatus_to_exitcode(status) not in (0, 3):
+        raise SystemExit(f"{' '.join(command)} of {size} ended with {os.waitstatus_to_exitcode(status)}")
+    found = Cost(
+        wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024, Path("study.nc").stat().st_size, max(parts)
+    )
+    Path("study.nc").unlink()
+    return found
+
+
+def _watch(ended: threading.Event, parts: list[int]) -> None:
+    while not ended.wait(1.0):
+        parts.append(bytes_so_far("study.nc"))
+
+
+def sizes(variants: Sequence[int], middle: int) -> Iterator[Size]:
+    """The studies that are measured: all numbers of variants, and a middle one with other modes and steps."""
+    yield from (Size(count) for count in variants)
+    yield from (Size(middle, modes, steps) for modes, steps in ((5, 500), (10, 1000), (10, 2000), (20, 2000)))
+
+
+def fitted(found: Sequence[tuple[Size, Cost]]) -> np.ndarray:
+    """a, b, c of CPU seconds = a + b variants + c variants x modes x steps, by least squares of relative errors."""
+    rows = np.array([[1.0, s.variants, float(s.variants) * s.modes * s.steps] for s, _ in found])
+    seconds = np.array([cost.cpu for _, cost in found])
+    scaled = rows / seconds[:, None]
+    weights = np.abs(scaled).max(axis=0)
+    return np.linalg.lstsq(scaled / weights, np.ones(seconds.size), rcond=None)[0] / weights
+
+
+def efficiency(seconds: float, law: np.ndarray) -> str:
+    """Two workers of one thread each against one, by a study that takes one so many seconds at least."""
+    a, b, c = law
+    variants = int(max(seconds - a, 1.0) / (b + c * MODES * STEPS))
+    one, two = (cost(Size(variants), "--workers", str(count)) for count in (1, 2))
+    return (
+        f"{variants:,} variants: 1 worker {one.wall:.0f} s (CPU {one.cpu:.0f} s), 2 workers {two.wall:.0f} s (CPU "
+        f"{two.cpu:.0f} s): efficiency {one.wall / (2 * two.wall):.2f}"
+    )
+
+
+def scheduler_pace(workers: int, seconds: float, tasks: int) -> tuple[float, float]:
+    """Tasks per second that a dask scheduler of this machine hands out to so many workers (threads of this process),
+    which sleep so long in each; and the part of the ideal pace."""
+    import logging
+
+    from distributed import Client, LocalCluster, as_completed
+
+    options = {"processes": False, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+    with LocalCluster(n_workers=workers, **options) as cluster, Client(cluster) as client:
+        client.gather(client.map(time.sleep, [0.0] * workers, pure=False))
+        started, left = time.monotonic(), tasks
+        ahead = min(2 * workers, tasks)
+        going = as_completed([client.submit(time.sleep, seconds, pure=False) for _ in range(ahead)])
+        left -= ahead
+        for _ in going:
+            if left:
+                going.add(client.submit(time.sleep, seconds, pure=False))
+                left -= 1
+        pace = tasks / (time.monotonic() - started)
+    return pace, pace * seconds / workers
+
+
+def plan(law: np.ndarray, whole: Cost, of: Size, pace: float) -> Iterator[str]:
+    """The plan on paper for very many variants on very many workers."""
+    _, b, c = law
+    each = b + c * MODES * STEPS
+    chunk = TASK_SECONDS / (c * MODES * STEPS)
+    tasks = VARIANTS / chunk
+    hours = VARIANTS * each / WORKERS / 3600.0
+    yield f"- CPU: {VARIANTS * each / 3600:,.0f} h on one core, {hours:.1f} h on {WORKERS} workers of one thread"
+    yield (
+        f"- tasks: {chunk:,.0f} variants in {TASK_SECONDS} s each, {tasks:,.0f} of them, {WORKERS / TASK_SECONDS:.0f} "
+        f"a second; the scheduler was measured to hand out {pace:.0f} a second: no task must be shorter than "
+        f"{WORKERS / pace:.2f} s, {chunk * WORKERS / pace / TASK_SECONDS:,.0f} variants"
+    )
+    yield f"- parts, reduced on the workers: {whole.parts / of.variants * VARIANTS / 2**30:,.0f} GiB in all"
+    peak = (whole.peak - PROGRAM) / of.variants * VARIANTS
+    yield f"- memory of the process that plans and gathers, as one study: {peak / 2**30:,.0f} GiB"
+
+
+def main(arguments: Sequence[str]) -> None:
+    """The tables."""
+    parser = argparse.ArgumentParser(prog="python -m tests.measure.scaling", description=__doc__)
+    parser.add_argument("--variants", type=int, nargs="+", default=[10**k for k in range(3, 8)])
+    parser.add_argument("--middle", type=int, default=300_000, help="variants of studies with other modes and steps")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the study by which workers are compared")
+    parser.add_argument("--tasks", type=int, default=5000, help="of the scheduler's load")
+    chosen = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        print("| variants | modes | steps | keep | wall (s) | CPU (s) | peak (MB) | parts (MB) | archive (MB) |")
+        print("|---|---|---|---|---|---|---|---|---|", flush=True)
+        found = []
+        for size in sizes(chosen.variants, chosen.middle):
+            found.append((size, cost(size)))
+            _show(*found[-1])
+        _show(Size(chosen.middle, keep="all"), cost(Size(chosen.middle, keep="all")))
+        law = fitted(found)
+        print(f"\nCPU seconds = {law[0]:.2g} + {law[1]:.3g} variants + {law[2]:.3g} variants x modes x steps")
+        for size, one in found:
+            told = law @ [1.0, size.variants, float(size.variants) * size.modes * size.steps]
+            print(f"  {size.variants:>12,} x {size.modes} x {size.steps}: {one.cpu:.1f} s, fitted {told:.1f} s")
+        print(efficiency(chosen.seconds, law), flush=True)
+    paces = [scheduler_pace(WORKERS, seconds, chosen.tasks) for seconds in (0.0, TASK_SECONDS, 5 * TASK_SECONDS)]
+    for seconds, (pace, part) in zip((0.0, TASK_SECONDS, 5 * TASK_SECONDS), paces, strict=True):
+        ideal = f", {100 * part:.0f} % of what {WORKERS} idle workers could take" if seconds else ""
+        print(
+            f"scheduler, {WORKERS} workers in threads, tasks of {seconds:.1f} s: {pace:.0f} tasks/s{ideal}", flush=True
+        )
+    largest = max(found, key=lambda pair: pair[0].variants)
+    print("\n".join(plan(law, largest[1], largest[0], paces[0][0])))
+
+
+def _show(size: Size, one: Cost) -> None:
+    print(
+        f"| {size.variants:,} | {size.modes} | {size.steps} | {size.keep} | {one.wall:.1f} | {one.cpu:.1f} | "
+        f"{one.peak / 1e6:.0f} | {one.parts / 1e6:.1f} | {one.archive / 1e6:.2f} |",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

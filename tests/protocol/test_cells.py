@@ -1,0 +1,197 @@
+"""Archives of cells against numpy on the archive of all variants of the same study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import engine
+import studies
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from results_schema.status import Status
+from results_schema.statuses import lost
+from results_schema.store.archive import open_archive
+from studies.commands.cli import main as command
+from tests.studies.every_way import assert_same_archives
+from tests.studies.small import SEPARATED
+
+PERCENT = (5.0, 50.0, 99.0)
+# Random masses and dampings at each of three speeds: some lift off.
+TEXT = (
+    SEPARATED.split("[sweep]")[0]
+    + """
+[sensor.quarter]
+body = "beam"
+at = 0.25
+quantity = "bending_moment"
+
+[sweep]
+speed = { of = "carriage.trolley.motion.speed", values = [1.0, 4.0, 9.0] }
+mass = { of = "carriage.trolley.mass", sobol = 300, from = 0.1, to = 10.0 }
+damping = { of = "body.beam.damping_ratio", sobol = 300, from = 0.0, to = 0.05 }
+
+[solver]
+steps = 200
+audit = 4
+"""
+)
+KEPT = {
+    "all": "",
+    "extremes": '\n[output]\nkeep = "extremes"\n',
+    "percentiles": f'\n[output]\nkeep = "percentiles"\npercentiles = {list(PERCENT)}\n',
+    "one cell": f'\n[output]\nkeep = "percentiles"\ncells = []\npercentiles = {list(PERCENT)}\n',
+}
+
+
+def study(kept: str, text: str = TEXT) -> Study:
+    return engine.load(text + KEPT[kept])
+
+
+@pytest.fixture(scope="module")
+def whole() -> xr.Dataset:
+    return studies.run(study("all"))
+
+
+def columns(whole: xr.Dataset, name: str, one_cell: bool) -> np.ndarray:
+    """(cells, variants of each) a result of all variants by its full name, in the order of their numbers."""
+    result, _, sensor = name.partition(" ")
+    array = whole[result].sel(sensor=sensor) if sensor else whole[result]
+    values = array.transpose("speed", "variant").values
+    return values.reshape(1, -1) if one_cell else values
+
+
+@pytest.mark.parametrize("kept", ["extremes", "percentiles", "one cell"])
+def test_cells_have_what_numpy_finds_in_all_variants(whole: xr.Dataset, kept: str) -> None:
+    found, one = studies.run(study(kept)), kept == "one cell"
+    assert found["status"].dims == (() if one else ("speed",))
+    names = found["result"].values.tolist()
+    assert {"midspan_max", "quarter_min", "trolley_contact_force_min", "dynamic_amplification quarter"} <= set(names)
+    cells = 1 if one else 3
+    numbers = np.arange(900).reshape(cells, -1)
+    swept = {"speed": np.repeat(whole["speed"].values, 300).reshape(cells, -1)}
+    swept |= {name: np.tile(whole[name].values, 3).reshape(cells, -1) for name in ("mass", "damping")}
+    for place, name in enumerate(names):
+        values = columns(whole, name, one)
+        for end, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
+            at = pick(values, axis=1)
+            rows = np.arange(cells), at
+            own = found.isel(result=place)
+            np.testing.assert_array_equal(own[end].values.ravel(), values[rows])
+            np.testing.assert_array_equal(own[f"{end}_variant"].values.ravel(), numbers[rows])
+            for axis, column in swept.items():
+                np.testing.assert_array_equal(own[f"{end}_at"].sel(swept=axis).values.ravel(), column[rows])
+        if "percentile" in found:
+            wanted = np.nanpercentile(values, PERCENT, axis=1).T
+            np.testing.assert_array_equal(own["percentile"].values.reshape(cells, -1), wanted)
+
+
+@pytest.mark.parametrize("kept", ["extremes", "one cell"])
+def test_every_variant_is_counted(whole: xr.Dataset, kept: str) -> None:
+    found = studies.run(study(kept))
+    statuses = whole["status"].transpose("speed", "variant").values.reshape(found["status"].size, -1)
+    wanted = [[np.count_nonzero(row == status) for status in Status] for row in statuses]
+    assert (statuses == Status.SEPARATED).any()
+    np.testing.assert_array_equal(found["status_count"].values.reshape(-1, len(Status)), wanted)
+
+
+def test_variants_that_fail_are_counted_and_have_no_extreme(monkeypatch: pytest.MonkeyPatch) -> None:
+    from engine.batch import chunk
+
+    marched = chunk.run_chunk
+
+    def failing(plan: Any, group: Any, variants: np.ndarray, *rest: Any) -> Any:
+        """As if variants of a number that seven divides had diverged."""
+        flat, selected = marched(plan, group, variants, *rest)
+        bad = variants % 7 == 0
+        flat["status"] = np.where(bad, np.int8(Status.DIVERGED), flat["status"])
+        for array in flat.values():
+            if array.dtype.kind == "f":
+                array[bad] = np.nan
+        return flat, selected
+
+    monkeypatch.setattr(chunk, "run_chunk", failing)
+    text = f'{TEXT}\n[output]\nhistories = "none"\n'
+    whole, found = studies.run(engine.load(text)), studies.run(study("percentiles"))
+    gone = lost(whole["status"].values)
+    assert gone.sum() == np.count_nonzero(np.arange(900) % 7 == 0)
+    counts = found["status_count"].sel(status_name="diverged").values
+    np.testing.assert_array_equal(counts, np.count_nonzero(gone, axis=whole["status"].dims.index("variant")))
+    assert (found["status"].values == Status.DIVERGED).all()
+    assert (found["largest_variant"].values % 7 != 0).all()
+    values = whole["midspan_max"].transpose("speed", "variant").values
+    own = found.sel(result="midspan_max")
+    np.testing.assert_array_equal(own["largest"], np.nanmax(values, axis=1))
+    np.testing.assert_array_equal(own["percentile"], np.nanpercentile(values, PERCENT, axis=1).T)
+
+
+@pytest.mark.parametrize("kept", ["extremes", "percentiles"])
+def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from studies.protocol import parts
+
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(TEXT + KEPT[kept], encoding="utf-8")
+    assert command(["run", "study.toml", "-o", "whole.nc"]) == 3
+    written = []
+
+    def stopped(self: Any, store: Any, chunk: Any) -> None:
+        keep(self, store, chunk)
+        written.append(chunk)
+        raise KeyboardInterrupt
+
+    keep = parts.Variants._keep
+    with monkeypatch.context() as patched:
+        patched.setattr(parts, "BYTES_PER_PART", 1)
+        patched.setattr(parts.Variants, "_keep", stopped)
+        assert command(["run", "study.toml", "-o", "again.nc"]) == 130
+    assert written and not Path("again.nc").exists()
+    assert command(["run", "study.toml", "-o", "again.nc"]) == 3
+    assert_same_archives(open_archive("again.nc"), open_archive("whole.nc"))
+
+
+def test_every_command_reads_archives_of_cells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(TEXT + KEPT["percentiles"], encoding="utf-8")
+    assert command(["check", "study.toml"]) == 0
+    assert "percentiles of 3 cells" in capsys.readouterr().out
+    assert command(["run", "study.toml", "-v", "-o", "a.nc"]) == 3
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Of 900 variants the archive keeps" in said and "of each of 3 cells (speed)" in said
+    assert command(["run", "study.toml", "--json", "-o", "a.nc"]) == 3
+    assert '"variants": 900' in capsys.readouterr().out
+    assert command(["info", "a.nc"]) == 0
+    assert "900" in capsys.readouterr().out
+    assert command(["report", "a.nc"]) == 0
+    assert "900 variants range over" in Path("a-report/report.html").read_text(encoding="utf-8")
+    assert command(["export", "a.nc", "a.csv"]) == 0
+    rows = Path("a.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + 3 * open_archive("a.nc").root.sizes["result"] and "smallest_at mass" in rows[0]
+    capsys.readouterr()
+    assert command(["compare", "a.nc", "a.nc"]) == 2
+    assert "no variants to compare" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (TEXT + '\n[output]\nkeep = "extremes"\nhistories = "all"\n', "output.histories"),
+        (TEXT + '\n[output]\nkeep = "extremes"\nunreduced = 1\n', "output.unreduced"),
+        (TEXT + '\n[output]\nkeep = "extremes"\npercentiles = [50]\n', "output"),
+        (TEXT + '\n[output]\nkeep = "percentiles"\n', "output"),
+        (TEXT + '\n[output]\ncells = ["speed"]\n', "output"),
+        (TEXT + '\n[output]\nkeep = "extremes"\ncells = ["mass"]\n', "output.cells"),
+        (TEXT.split("[sweep]")[0] + '\n[output]\nkeep = "extremes"\n', "output.keep"),
+        (TEXT + '\n[output]\nkeep = "extremes"\n[envelope.all]\nbody = "beam"\n', "envelope"),
+        (TEXT.replace('"passage"', '"influence"') + '\n[output]\nkeep = "extremes"\n', "output.keep"),
+    ],
+)
+def test_what_cells_cannot_hold_is_refused(text: str, where: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        studies.run(engine.load(text))
+    assert caught.value.where == where or caught.value.where.endswith(f": {where}")
