@@ -11,8 +11,10 @@ import numpy as np
 from engine.bodies.frame.assembly import Assembly, Content, assemble
 from engine.bodies.frame.body import frame_modes
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.track import TrackPoints, track_of
+from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.flexibility import Flexibility, factorised, solving
+from engine.kernels.robots.stress import Bending
+from engine.robots.stress import bending_of
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -28,7 +30,8 @@ class Rail:
 
     start (3,): m, where it begins; ends (E + 1,): m, the ends of its elements along it; omega (n,); shapes
     (E, 4, 6, n): cubics (spline, C2) of the motion of its axis per mode, constant first; moved (E + 1, 6, n): that
-    motion at the ends; missed (6 (E + 1), 6 (E + 1)): motion of the ends per unit load that the modes miss.
+    motion at the ends; missed (6 (E + 1), 6 (E + 1)): motion of the ends per unit load that the modes miss;
+    bending: its stresses by these.
     """
 
     start: Array
@@ -37,6 +40,7 @@ class Rail:
     shapes: Array
     moved: Array
     missed: Array
+    bending: Bending
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +49,7 @@ class _Whole:
 
     assembly: Assembly
     flexibility: Flexibility
-    places: Array
+    track: TrackBeams
     points: TrackPoints
     soft: Array
 
@@ -81,7 +85,7 @@ def _whole(content: Content) -> _Whole:
     track, points = track_of(content.frame, assembly.mesh)
     loads = points.loads(np.eye(6), np.arange(len(track.places)), 6 * len(assembly.mesh.points))
     found = points.of(assembly.whole(flexibility.solve(loads[assembly.free])))
-    return _Whole(assembly, flexibility, track.places, points, found.reshape(loads.shape[1], -1))
+    return _Whole(assembly, flexibility, track, points, found.reshape(loads.shape[1], -1))
 
 
 @lru_cache(maxsize=16)
@@ -93,9 +97,10 @@ def _rail(content: Content) -> Rail:
         whole = _whole(Content.of(content.frame, without=("modes", "leave_out", "rigid_body_modes")))
         omega, shapes = frame_modes(content.frame, whole.assembly, whole.flexibility)
         moved = whole.points.of(whole.assembly.whole(shapes))
-        spline = CubicSpline(whole.places, moved, axis=0).c[::-1]
+        spline = CubicSpline(whole.track.places, moved, axis=0).c[::-1]
         flat = moved.reshape(-1, omega.size)
         missed = whole.soft - (flat / omega**2) @ flat.T
         demand_finite(omega, moved, missed)
     start = whole.assembly.mesh.points[whole.points.points[0]] + whole.points.arms[0]
-    return Rail(start, whole.places, omega, np.moveaxis(spline, 0, 1), moved, missed)
+    bending = bending_of(whole.track, flat, missed)
+    return Rail(start, whole.track.places, omega, np.moveaxis(spline, 0, 1), moved, missed, bending)

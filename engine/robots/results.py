@@ -22,6 +22,7 @@ from engine.kernels.robots.layout import (
     UP,
     WORKS,
 )
+from engine.robots.stress import is_told, largest_stress
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
@@ -37,13 +38,15 @@ KEPT = 800  # stations of a history
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What a variant reports by one march: numbers by name, over robots (R,), components (R, 3) or rails (B,); at all
-    S stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2)."""
+    S stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2), and the
+    largest stress of every rail (S, B)."""
 
     numbers: dict[str, Array]
     times: Array
     planned: Array
     error: Array
     sunk: Array
+    stress: Array
     coordinates: Array
     status: Status
 
@@ -58,18 +61,20 @@ def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Out
         error = error - at_start
     phase, size = seen[:, :, SEEN_PHASE], np.linalg.norm(error, axis=2)
     times, sunk = record.coordinates[:, 0, 3], record.grips[:, :, :, SUNK]
+    stress = largest_stress(model, record)
     numbers = {
         "cycle_time": model.done.max(),
         "error_at_start": at_start,
         "error_largest": np.abs(error).max(axis=0),
         "error_largest_time": times[np.argmax(size, axis=0)],
         "deflection_largest": np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))]),
+        "stress_largest": stress.max(axis=0),
         "rail_force_largest": record.grips[:, :, :, VERTICAL].max(axis=(0, 2)),
     }
     numbers |= {f"error_{name}": largest(np.where(phase == doing, size, np.nan)) for name, doing in DOING.items()}
     if not status.values_kept:
         numbers = {name: np.full_like(array, np.nan) for name, array in numbers.items()}
-    return Outcome(numbers, times, planned, error, sunk, record.coordinates[:, : model.modes, 0], status)
+    return Outcome(numbers, times, planned, error, sunk, stress, record.coordinates[:, : model.modes, 0], status)
 
 
 def beyond_rest(found: Outcome, record: Record, resting: Record) -> Outcome:
@@ -89,12 +94,13 @@ def largest(sizes: Array) -> Array:
 
 def results_of(model: RobotModel) -> list[str]:
     """What an error is told of, in the order of `differences`."""
-    return [*(f"error of {name}" for name in model.robots), *(f"deflection of {name}" for name in model.rails)]
+    found = [*(f"error of {name}" for name in model.robots), *(f"deflection of {name}" for name in model.rails)]
+    return found + [f"stress of {name}" for name, rail in model.rails.items() if is_told(rail.bending)]
 
 
 def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
-    """(results,) how far two marches are apart at any station, over the largest length of each robot's error or the
-    largest deflection; NaN where ``other`` has none, infinite where ``one`` has none."""
+    """(results,) how far two marches are apart at any station, over the largest length of each robot's error, the
+    largest deflection or the largest stress; NaN where ``other`` has none, infinite where ``one`` has none."""
     count = len(results_of(model))
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(count, np.inf if other.status.values_kept else np.nan)
@@ -102,7 +108,10 @@ def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     size = np.linalg.norm(other.error, axis=2).max(axis=0)
     sunk, bodies = np.abs(one.sunk - other.sunk), model.system.body
     gaps = [sunk[:, bodies == b].max() for b in range(len(model.rails))]
-    apart, size = np.append(apart, gaps), np.append(size, other.numbers["deflection_largest"])
+    told = np.array([is_told(rail.bending) for rail in model.rails.values()])
+    strained = np.abs(one.stress - other.stress).max(axis=0)[told]
+    apart = np.concatenate([apart, gaps, strained])
+    size = np.concatenate([size, other.numbers["deflection_largest"], other.numbers["stress_largest"][told]])
     found: Array = np.divide(apart, size, out=np.where(apart > 0.0, np.inf, 0.0), where=size > 0.0)
     return found
 

@@ -95,7 +95,13 @@ def _deflections(results: Results) -> Iterator[str]:
         values = results.dataset["deflection_largest"].sel(rail=name)
         index = extreme(values)
         if index is not None:
-            yield f"{name} goes down by up to {quantity(float(values.values[index]), 'm')}{in_words(results, index)}."
+            said = f"{name} goes down by up to {quantity(float(values.values[index]), 'm')}{in_words(results, index)}"
+            stress = results.dataset["stress_largest"].sel(rail=name)
+            most = extreme(stress)
+            if most is not None:
+                strained = quantity(float(stress.values[most]), "Pa")
+                said += f"; its largest bending stress is {strained}{in_words(results, most)}"
+            yield f"{said}."
 
 
 def _front(results: Results) -> Iterator[str]:

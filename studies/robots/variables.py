@@ -31,6 +31,8 @@ RESULTS = outputs("""
     error_at_start | robot component | m | | error of the tool centre point at time 0, on unloaded rails
         from which errors count, unless the question says otherwise
     deflection_largest | rail | m | | largest deflection of a rail under a robot, down > 0
+    stress_largest | rail | Pa | nan | largest bending stress of a rail, in its extreme fibres
+        NaN where a section has no fibre distances
     rail_force_largest | robot | N | | largest vertical force of a robot on one of its rails
     * | | | optional history |
     tool_centre_point | station robot component | m | | planned place of the tool centre point
