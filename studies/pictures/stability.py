@@ -26,6 +26,7 @@ from studies.pictures.common.figures import (
 from studies.results.formatting import counted, number, percent
 
 NOTABLE = 1.1  # overshoot from which on a scheme gets a colour
+GROWS = 1.001  # per period: less is rounding
 
 
 class Drawn(NamedTuple):
@@ -35,6 +36,15 @@ class Drawn(NamedTuple):
     caption: str
     height: float
     fill: Callable[[Any, Drawing], None]
+
+
+def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:
+    """One figure per map, in the order of the names."""
+    found = []
+    for name in names:
+        drawn = DRAWN[name]
+        found.append(draw(name, drawn.title(dataset), drawn.caption, drawn.height, partial(drawn.fill, dataset)))
+    return found
 
 
 def _separation(dataset: xr.Dataset, drawing: Drawing) -> None:
@@ -127,43 +137,6 @@ def _rigid_title(dataset: xr.Dataset) -> str:
     if not np.isfinite(ringing).all():
         return "A mass that is tied by its place makes some schemes blow up"
     return f"A mass that is tied by its place rings by up to {number(float(ringing.max()), 2)} times its weight"
-
-
-SEPARATION = Drawn(
-    _separation_title,
-    "Smallest contact force on the first 98 % of the way over the weight; below zero the track would have to pull. "
-    "From there on (thin) the equations are no longer true and the program marks the variant as separated.",
-    3.0,
-    _separation,
-)
-OVERSHOOT = Drawn(
-    lambda dataset: "Stable schemes may still overshoot",
-    "An oscillator without damping is deflected and let go. With steps much longer than its period (ω h large) the "
-    "first 20 steps of some stable schemes throw it far beyond 1. Left: displacement. Right: velocity over ω times the "
-    "first deflection.",
-    3.2,
-    _overshoot,
-)
-RIGID_TIE = Drawn(
-    _rigid_title,
-    f"The contact force of one passage of {STEPS} steps: the mass as inertia, as the program marches it, and tied by "
-    "its place, by average acceleration and by the scheme that follows best. Right: how strongly the force jumps up "
-    "and down from step to step.",
-    3.4,
-    _rigid,
-)
-
-
-GROWS = 1.001  # per period: less is rounding
-
-
-def pictures(dataset: xr.Dataset, names: Sequence[str]) -> list[Figure]:
-    """One figure per map, in the order of the names."""
-    found = []
-    for name in names:
-        drawn = DRAWN[name]
-        found.append(draw(name, drawn.title(dataset), drawn.caption, drawn.height, partial(drawn.fill, dataset)))
-    return found
 
 
 def _schemes(dataset: xr.Dataset, drawing: Drawing) -> None:
@@ -345,7 +318,27 @@ DRAWN: Mapping[str, Drawn] = {
         3.2,
         _frozen,
     ),
-    "separation": SEPARATION,
-    "overshoot": OVERSHOOT,
-    "rigid-tie": RIGID_TIE,
+    "separation": Drawn(
+        _separation_title,
+        "Smallest contact force on the first 98 % of the way over the weight; below zero the track would have to pull. "
+        "From there on (thin) the equations are no longer true and the program marks the variant as separated.",
+        3.0,
+        _separation,
+    ),
+    "overshoot": Drawn(
+        lambda dataset: "Stable schemes may still overshoot",
+        "An oscillator without damping is deflected and let go. With steps much longer than its period (ω h large) the "
+        "first 20 steps of some stable schemes throw it far beyond 1. Left: displacement. Right: velocity over ω times "
+        "the first deflection.",
+        3.2,
+        _overshoot,
+    ),
+    "rigid-tie": Drawn(
+        _rigid_title,
+        f"The contact force of one passage of {STEPS} steps: the mass as inertia, as the program marches it, and tied "
+        "by its place, by average acceleration and by the scheme that follows best. Right: how strongly the force "
+        "jumps up and down from step to step.",
+        3.4,
+        _rigid,
+    ),
 }

@@ -25,13 +25,7 @@ COLUMNS = 2
 WANTED = 1e-3  # the error that the first figure's title speaks of
 LARGEST_SHOWN = 1.0
 TIME = "time per variant"
-DIAMOND: dict[str, Any] = {
-    "color": look.VERMILION,
-    "marker": "D",
-    "markersize": 5.0,
-    "markeredgecolor": "white",
-    "linewidth": 0.0,
-}
+DIAMOND: Any = {"color": look.VERMILION, "marker": "D", "markersize": 5.0, "markeredgecolor": "white", "linewidth": 0.0}
 DASHES = ((4, 2), (1, 1.5), (6, 1.5, 1, 1.5), (2, 2), (8, 2), (3, 1, 1, 1))
 
 
@@ -166,10 +160,8 @@ def _orders(dataset: xr.Dataset, drawing: Drawing) -> None:
 def _styles(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Look of every scheme: colours for those of the march, dashed greys for the others."""
     found: dict[str, dict[str, Any]] = {}
-    only = {str(s): bool(c) for s, c in zip(dataset["scheme"].values, dataset["comparison_only"].values, strict=True)}
-    colours = iter((*look.DISTINCT, look.INK))
-    dashes = iter(DASHES)
-    for scheme, compared in only.items():
+    colours, dashes = iter((*look.DISTINCT, look.INK)), iter(DASHES)
+    for scheme, compared in zip(map(str, dataset["scheme"].values), dataset["comparison_only"].values, strict=True):
         if compared:
             found[scheme] = {"color": look.MUTED, "dashes": next(dashes, (4, 2)), "linewidth": 1.0}
         else:
@@ -233,25 +225,18 @@ def _draw_trade(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
             axes.scatter(x, y, s=7.0, facecolors=face, edgecolors=[colour], linewidths=0.5)
         name = f"{count} mode{'s' if count > 1 else ''}"
         handles[name] = Line2D([], [], color=colour, marker="o", markersize=3.5, linewidth=0.0)
-    hollow: dict[str, Any] = {
-        "color": look.MUTED,
-        "marker": "o",
-        "markersize": 3.5,
-        "linewidth": 0.0,
-        "markerfacecolor": "none",
-    }
-    handles["hollow: without\nstatic correction"] = Line2D([], [], **hollow)
+    hollow = {"marker": "o", "markersize": 3.5, "markerfacecolor": "none"}
+    handles["hollow: without\nstatic correction"] = Line2D([], [], color=look.MUTED, linewidth=0.0, **hollow)
     best = np.minimum.accumulate([point.error for point in points]) if points else np.zeros(0)
     times = [point.seconds for point in points]
     (handles["best there is"],) = axes.plot(
         times, best, color=look.INK, linewidth=1.2, drawstyle="steps-post", zorder=4
     )
     handles |= _draw_automatic(axes, own.expand_dims(scene=[scene]))
-    axes.axhspan(
-        1e-16, float(own["total_reference_error"].sel(quantity="history")), color=look.HAIR, alpha=0.5, zorder=0
-    )
+    known = float(own["total_reference_error"].sel(quantity="history"))
+    axes.axhspan(1e-16, known, color=look.HAIR, alpha=0.5, zorder=0)
     if len(best):
-        axes.set_ylim(0.5 * min(best.min(), float(own["total_reference_error"].sel(quantity="history"))), None)
+        axes.set_ylim(0.5 * min(best.min(), known), None)
     axes.set(xscale="log", yscale="log", xlabel=TIME)
     return handles
 
