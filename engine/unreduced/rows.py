@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from engine.model.timeline import Rider
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
 from engine.unreduced.track import WIDTH, Rows, no_rows
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
-
-Flags = NDArray[np.bool_]
 
 
 class Along(NamedTuple):
@@ -27,16 +25,16 @@ class Along(NamedTuple):
     s: Array
     ds: Array
     dds: Array
-    on: Flags
+    on: Mask
 
     @classmethod
-    def at_rest(cls, places: Array, on: Flags, riders: Sequence[Rider]) -> Along:
+    def at_rest(cls, places: Array, on: Mask, riders: Sequence[Rider]) -> Along:
         """Riders that stand still at places (S, R) of their tracks where they are on them."""
         still = np.zeros_like(places)
         lengths = [rider.length for rider in riders]
         return cls(np.where(on, np.clip(places, 0.0, lengths), 0.0), still, still, on)
 
-    def some(self, which: NDArray[np.bool_] | slice) -> Along:
+    def some(self, which: Mask | slice) -> Along:
         """Some of the stations."""
         return Along(self.s[which], self.ds[which], self.dds[which], self.on[which])
 
@@ -135,7 +133,7 @@ class Readings:
     """J sensors at S stations: index (S, J, 12), on displacements, velocities and accelerations (S, J, 12), on the
     ties' forces (S, J, T), and what is added (S, J)."""
 
-    index: NDArray[np.int64]
+    index: Counts
     on_u: Array
     on_v: Array
     on_a: Array

@@ -20,7 +20,7 @@ from engine.scene.carriages import Carriage, Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
 from results_schema.arrays import Array
-from results_schema.late import sparse
+from results_schema.late import linalg, sparse
 
 Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass along its track
 
@@ -97,24 +97,14 @@ class Unreduced:
     @cached_property
     def modal_loads(self) -> Array:
         """(n, k) M phi of the damped modes, times the root of 2 zeta omega."""
-        found = [np.zeros((self.size, 0))]
-        for name, body in self.bodies.items():
-            wide = np.zeros((self.size, body.damping.rates.size))
-            wide[self.part(name)] = body.damping.loads * np.sqrt(body.damping.rates)
-            found.append(wide)
-        return np.concatenate(found, axis=1)
+        loads = [body.damping.loads * np.sqrt(body.damping.rates) for body in self.bodies.values()]
+        return np.asarray(linalg.block_diag(*loads, np.zeros((len(self.sprung), 0))))
 
     @cached_property
     def rigid(self) -> Array:
         """(n, r) rigid-body motions of unit mass of what is free to move."""
-        found = [np.zeros((self.size, 0))]
-        for name, body in self.bodies.items():
-            wide = np.zeros((self.size, body.rigid.shape[1]))
-            wide[self.part(name)] = body.rigid
-            found.append(wide)
-        for place, mass in zip(self.sprung.values(), self._sprung_masses, strict=True):
-            found.append(np.eye(self.size)[:, [place]] / np.sqrt(mass))
-        return np.concatenate(found, axis=1)
+        motions = [body.rigid for body in self.bodies.values()]
+        return np.asarray(linalg.block_diag(*motions, np.diag(1.0 / np.sqrt(self._sprung_masses))))
 
     @property
     def _sprung_masses(self) -> Array:

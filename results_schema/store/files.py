@@ -22,7 +22,7 @@ NETCDF_LOCK = threading.RLock()
 
 TEMPORARY = ".wanderlast-tmp"
 SIDECAR = ".sha256"
-_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class Faults:
@@ -202,7 +202,7 @@ def is_hdf5(path: Path) -> bool:
         if not path.is_file():
             return False
         with path.open("rb") as stream:
-            return stream.read(len(_HDF5_SIGNATURE)) == _HDF5_SIGNATURE
+            return stream.read(len(SIGNATURE)) == SIGNATURE
     except OSError:
         return False
 

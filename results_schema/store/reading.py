@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +17,6 @@ from results_schema.store.tables import CONTENTS, DIGEST, Column, Table, checksu
 
 SCHEMA_VERSION = 2  # archives of version 1 are of before `estimated_error`
 
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # zlib cannot shrink anything by more than 1032; a file that claims more was never written in full.
 _LARGEST_COMPRESSION = 1100
 _TEXT_BYTES = 16
@@ -91,10 +91,10 @@ def _check_signature(path: Path) -> None:
         raise BadInput("not a file", where=str(path), expected="an archive (.nc)")
     try:
         with path.open("rb") as stream:
-            start = stream.read(len(_SIGNATURE))
+            start = stream.read(len(files.SIGNATURE))
     except OSError as error:
         raise BadInput(f"cannot be read ({error.strerror})", where=str(path)) from error
-    if start != _SIGNATURE:
+    if start != files.SIGNATURE:
         raise ArchiveError("not a netCDF-4 file", where=str(path), expected="an archive of wanderlast")
 
 
@@ -123,9 +123,7 @@ def check_sizes(path: Path, dataset: Any) -> None:
         if place.vltypes or place.cmptypes or place.enumtypes:
             raise ArchiveError("holds types that archives do not have", where=str(path), received=f"group {group}")
         for name, variable in place.variables.items():
-            count = 1
-            for size in variable.shape:
-                count *= int(size)
+            count = math.prod(variable.shape)
             if count == 0:
                 raise ArchiveError("a variable has no rows", where=str(path), received=name)
             claimed += count * (_TEXT_BYTES if variable.dtype is str else variable.dtype.itemsize)

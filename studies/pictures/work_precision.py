@@ -225,7 +225,7 @@ def _draw_trade(axes: Axes, own: xr.Dataset, scene: str) -> dict[str, Any]:
             axes.scatter(x, y, s=7.0, facecolors=face, edgecolors=[colour], linewidths=0.5)
         name = f"{count} mode{'s' if count > 1 else ''}"
         handles[name] = Line2D([], [], color=colour, marker="o", markersize=3.5, linewidth=0.0)
-    hollow = {"marker": "o", "markersize": 3.5, "markerfacecolor": "none"}
+    hollow: Any = {"marker": "o", "markersize": 3.5, "markerfacecolor": "none"}
     handles["hollow: without\nstatic correction"] = Line2D([], [], color=look.MUTED, linewidth=0.0, **hollow)
     best = np.minimum.accumulate([point.error for point in points]) if points else np.zeros(0)
     times = [point.seconds for point in points]

@@ -18,7 +18,7 @@ from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, member_ends, uni
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import Array, ModalBody
-from engine.bodies.modal.outline import Outline
+from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.spec import LIST, WORD, Spec, by_form, distinct, one_of
 from engine.study_file.units import (
@@ -68,8 +68,7 @@ _DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
 _Directions = Annotated[
     tuple[_DirectionWord, ...], Strict(False), Field(min_length=1, max_length=6), AfterValidator(distinct)
 ]
-_HOLDS = {"clamped": DIRECTIONS, "pinned": DIRECTIONS[:3]}
-_HoldWord = Annotated[str, AfterValidator(one_of(*_HOLDS, meant={"fixed": "clamped", "hinged": "pinned"}))]
+_HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant={"fixed": "clamped", "hinged": "pinned"}))]
 Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
 
 
@@ -256,7 +255,7 @@ class Frame(Body):
     def holds(self, node: str) -> Sequence[str]:
         """The directions in which a node is held."""
         support = self.supports.get(node, ())
-        return _HOLDS[support] if isinstance(support, str) else support
+        return HELD_AT[support] if isinstance(support, str) else support
 
     @property
     def still(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
 from engine.bodies.modal.modal_body import Array, ModalBody
-from engine.bodies.modal.outline import Outline
+from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
 from results_schema.errors import BadInput, shortened
@@ -29,7 +29,6 @@ from results_schema.quantities import OF_SECTION
 MAX_POINTS = 50
 MAX_TRACK = 1000
 ALONG = 1e-3  # sine of the angle between track and load below which the load acts along the track
-_HOLDS = {"clamped": DIRECTIONS, "pinned": DIRECTIONS[:3]}
 _GROUP = re.compile(r"\d{1,18}(-\d{1,18})?(,\d{1,18}(-\d{1,18})?)*")
 
 FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
@@ -234,7 +233,7 @@ class Imported(Body):
     def holds(self, text: str) -> tuple[str, ...]:
         """The directions that an entry of the supports holds."""
         support = self.supports[text]
-        return _HOLDS[support] if isinstance(support, str) else support
+        return HELD_AT[support] if isinstance(support, str) else support
 
     def build(self) -> ModalBody:
         return self.read_at(())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.bodies.files.model import FileModel
+from engine.bodies.files.model import DIRECTIONS, FileModel
 from engine.bodies.frame.assembly import cross_matrix
 from engine.bodies.modal.flexibility import Flexibility, factorised, symmetric_lu
 from engine.bodies.modal.modal_body import Array
@@ -105,12 +105,11 @@ def _in_si(file: FileModel, length: float, force: float) -> tuple[Any, Any, Any]
 
 
 def _held(body: Imported, file: FileModel) -> Any:
-    words = {word: index for index, word in enumerate(("x", "y", "z", "rx", "ry", "rz"))}
     found = np.zeros(file.size, dtype=np.bool_)
     for group in body.supports:
         nodes = np.zeros(len(file.nodes) + 1, dtype=np.bool_)  # the last one: no node
         nodes[body.group(group)] = True
-        ways = [words[word] for word in body.holds(group)]
+        ways = [DIRECTIONS.index(word) for word in body.holds(group)]
         found |= nodes[file.owner] & np.isin(file.direction, ways)
     return found
 
