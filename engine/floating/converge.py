@@ -18,7 +18,6 @@ from engine.kernels.floating.layout import Weights
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.statuses import gravest, lost
 
@@ -101,12 +100,9 @@ def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:
     scheme = study.solver.integration
     if isinstance(scheme, NewmarkScheme | AlphaScheme) and scheme.stride == 1:
         return scheme
-    raise BadInput(
-        "this scheme does not march frames that move",
-        where=study.source.where("solver.scheme"),
-        expected="auto, average-acceleration, fox-goodwin, newmark, hht-alpha or generalized-alpha",
-        received=study.solver.scheme,
-    )
+    what = "this scheme does not march frames that move"
+    expected = "auto, average-acceleration, fox-goodwin, newmark, hht-alpha or generalized-alpha"
+    raise study.source.fault("solver.scheme", what, expected=expected, received=study.solver.scheme)
 
 
 def weights(scheme: NewmarkScheme | AlphaScheme) -> Weights:

@@ -18,7 +18,6 @@ from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT, OF_WHOLE
 from engine.scene.frames import GROUND, AxisJoint, Frame, Free, Joint, Prismatic, Spherical
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
@@ -136,7 +135,7 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
         if carriage.suspension is not None:
             springs[name], size = size, size + 1
     if size == 0:
-        raise BadInput("nothing here can move by itself", where=study.source.where("frame"), expected="a joint, a mode")
+        raise study.source.fault("frame", "nothing here can move by itself", expected="a joint, a mode")
     loads, links = tuple(loads_of(study, bodies)), tuple(springs_of(study, bodies))
     motions += dict.fromkeys(load.course for load in loads if load.course)
     found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)
@@ -151,12 +150,9 @@ def _in_order(study: Study) -> Iterator[str]:
     while left:
         ready = [name for name in left if (study.frame.get(name) or Frame()).on in done]
         if not ready:
-            raise BadInput(
-                "closed loops of bodies are not built: bodies stand in a tree",
-                where=study.source.where(f"frame.{left[0]}.on"),
-                expected='"ground" at one of them',
-                received=", ".join(left),
-            )
+            what = "closed loops of bodies are not built: bodies stand in a tree"
+            here, expected = f"frame.{left[0]}.on", '"ground" at one of them'
+            raise study.source.fault(here, what, expected=expected, received=", ".join(left))
         for name in ready:
             yield name
             left.remove(name)

@@ -8,7 +8,6 @@ import numpy as np
 
 from engine.floating.elastic import ABOUT_X, Z
 from engine.scene.frames import GROUND, Free
-from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -22,16 +21,13 @@ MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all 
 
 def refuse_scene(study: Study) -> None:
     """Raise BadInput for what a study has that frames that move do not know."""
-    where = study.source.where
+    fault = study.source.fault
     if study.initial == "equilibrium":
-        raise BadInput("bodies in frames that move start undeformed", where=where("initial"), expected='"rest"')
+        raise fault("initial", "bodies in frames that move start undeformed", expected='"rest"')
     for name, body in study.body.items():
         if not body.own_weight and study.gravity > 0.0:
-            raise BadInput(
-                "bodies in frames that move carry their own weight",
-                where=where(f"body.{name}.own_weight"),
-                expected="own_weight = true",
-            )
+            what = "bodies in frames that move carry their own weight"
+            raise fault(f"body.{name}.own_weight", what, expected="own_weight = true")
     for name, carriage in study.carriage.items():
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():
@@ -40,45 +36,32 @@ def refuse_scene(study: Study) -> None:
 
 def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     """Refuse a carriage of another kind, with another motion, or that starts later."""
-    where = study.source.where
+    fault, here, motion = study.source.fault, f"carriage.{name}", carriage.motion
     if carriage.kind not in ("mass", "oscillator"):
-        raise BadInput(
-            "carriages of this kind on bodies in frames that move are not built yet",
-            where=where(f"carriage.{name}.kind"),
-            expected="mass or oscillator",
-            received=carriage.kind,
-        )
-    if not carriage.motion.slides and not carriage.motion.in_pieces:
-        raise BadInput(
-            "this motion on bodies in frames that move is not built yet",
-            where=where(f"carriage.{name}.motion.kind"),
-            expected="free, cruise, out-and-back, sinusoidal or waypoints",
-            received=carriage.motion.kind,
-        )
-    if carriage.motion.legs is not None and carriage.motion.duration > MOST_CYCLES:
-        raise BadInput(
-            "too many cycles on a body in a frame that moves",
-            where=where(f"carriage.{name}.motion.cycles"),
-            expected=f"at most {MOST_CYCLES}",
-            received=f"{carriage.motion.duration:.0f}",
-        )
+        what = "carriages of this kind on bodies in frames that move are not built yet"
+        raise fault(f"{here}.kind", what, expected="mass or oscillator", received=carriage.kind)
+    if not motion.slides and not motion.in_pieces:
+        what = "this motion on bodies in frames that move is not built yet"
+        expected = "free, cruise, out-and-back, sinusoidal or waypoints"
+        raise fault(f"{here}.motion.kind", what, expected=expected, received=motion.kind)
+    if motion.legs is not None and motion.duration > MOST_CYCLES:
+        what, received = "too many cycles on a body in a frame that moves", f"{motion.duration:.0f}"
+        raise fault(f"{here}.motion.cycles", what, expected=f"at most {MOST_CYCLES}", received=received)
     if carriage.start_time > 0.0:
-        raise BadInput("carriages here set off at time 0", where=where(f"carriage.{name}.delay"), expected="0")
+        raise fault(f"{here}.delay", "carriages here set off at time 0", expected="0")
 
 
 def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     """Refuse a sensor of another place or quantity."""
-    where, where_quantity = study.source.where(f"sensor.{name}"), study.source.where(f"sensor.{name}.quantity")
+    fault, here = study.source.fault, f"sensor.{name}"
     if sensor.spot is not None or sensor.carriage is not None:
-        raise BadInput("this place is not read in frames that move", where=where, expected="at, or under")
+        raise fault(here, "this place is not read in frames that move", expected="at, or under")
     if sensor.under is not None and sensor.quantity != "displacement":
-        raise BadInput(
-            "under a carriage only the displacement is read here", where=where_quantity, expected="displacement"
-        )
+        what = "under a carriage only the displacement is read here"
+        raise fault(f"{here}.quantity", what, expected="displacement")
     if sensor.quantity == "axial_force":
-        raise BadInput(
-            "axial_force is not available here", where=where_quantity, expected="displacement, bending_moment, …"
-        )
+        what = "axial_force is not available here"
+        raise fault(f"{here}.quantity", what, expected="displacement, bending_moment, …")
 
 
 def refuse_model(model: FloatingModel) -> None:
@@ -97,54 +80,39 @@ def _check_held(model: FloatingModel) -> None:
             continue
         at = body.fields(np.zeros(1), (0,))[0, 0]
         far = np.abs(body.fields(np.linspace(0.0, body.length, 9), (0,))[0, :, : Z + 1]).max()
-        where = model.study.source.where(f"body.{name}.supports")
+        fault, here = model.study.source.fault, f"body.{name}.supports"
         if np.abs(at[: Z + 1]).max() > HELD * far:
-            raise BadInput(
-                "the track begins where its joint holds it: its shapes must vanish there",
-                where=where,
-                expected="pinned or clamped at its beginning",
-            )
+            what = "the track begins where its joint holds it: its shapes must vanish there"
+            raise fault(here, what, expected="pinned or clamped at its beginning")
         innermost = next((joint for joint in reversed(joints) if joint.turns), None)
         axis = None if innermost is None else innermost.turned_about
         if axis is not None and np.abs(axis @ at[ABOUT_X:]).max() > HELD * far * np.linalg.norm(axis) / body.length:
-            raise BadInput(
-                "a joint that is driven or controlled holds the track's direction: shapes must not turn there",
-                where=where,
-                expected="clamped at its beginning",
-                remedy="a rigid body on the joint that carries this one, for a beam in a cradle",
-            )
+            what = "a joint that is driven or controlled holds the track's direction: shapes must not turn there"
+            remedy = "a rigid body on the joint that carries this one, for a beam in a cradle"
+            raise fault(here, what, expected="clamped at its beginning", remedy=remedy)
 
 
 def _check_readings(model: FloatingModel) -> None:
     """Forces and stresses are read of single beams alone."""
     for name, sensor in model.study.sensor.items():
         if sensor.under is None and not model.bodies[str(sensor.body)].slender and sensor.reads.derivative:
-            raise BadInput(
-                "this quantity is read of single beams alone in frames that move",
-                where=model.study.source.where(f"sensor.{name}.quantity"),
-                expected="displacement, velocity or acceleration",
-                received=sensor.quantity,
-            )
+            what = "this quantity is read of single beams alone in frames that move"
+            here, expected = f"sensor.{name}.quantity", "displacement, velocity or acceleration"
+            raise model.study.source.fault(here, what, expected=expected, received=sensor.quantity)
 
 
 def _check_rolling(model: FloatingModel) -> None:
     """Nothing turns with a track whose rotation about itself no row of its model tells."""
-    where = model.study.source.where
+    fault = model.study.source.fault
     for name, carriage in model.study.carriage.items():
         is_mass = carriage.suspension is None  # what is sprung has neither key
         turns = is_mass and any(model.study.value(f"carriage.{name}.{key}") for key in ("inertia", "height"))
         if turns and not model.bodies[carriage.on].rolls:
-            raise BadInput(
-                "a solid model's rotation about its track is not known: nothing turns with it",
-                where=where(f"carriage.{name}"),
-                expected="no inertia and no height",
-            )
+            what = "a solid model's rotation about its track is not known: nothing turns with it"
+            raise fault(f"carriage.{name}", what, expected="no inertia and no height")
     for name in model.bodies:
         on = model.frame(name).on
         if on != GROUND and not model.bodies[on].rolls:
-            raise BadInput(
-                "a solid model's rotation about its track is not known: nothing hangs on it",
-                where=where(f"frame.{name}.on"),
-                expected="a beam, a frame of beams, or a rigid body",
-                received=on,
-            )
+            what = "a solid model's rotation about its track is not known: nothing hangs on it"
+            expected = "a beam, a frame of beams, or a rigid body"
+            raise fault(f"frame.{name}.on", what, expected=expected, received=on)

@@ -194,9 +194,8 @@ def _check(study: Study, name: str, frame: Frame) -> None:
         ("rigid_body_modes", frame.rigid_body_modes, "keep"),
     ):
         if given != wanted:
-            where = study.source.where(f"body.{name}.{key}")
             what = "the unreduced model cannot be marched so"
-            raise BadInput(what, where=where, expected=f'"{wanted}"', received=f'"{given}"')
+            raise study.source.fault(f"body.{name}.{key}", what, expected=f'"{wanted}"', received=f'"{given}"')
 
 
 def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> FullBody:

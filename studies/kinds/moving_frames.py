@@ -11,7 +11,6 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Time
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.variables import declare
 from studies.moving import findings
@@ -49,17 +48,14 @@ class MovingFrames(PiecedKind):
     drawn_by = "studies.pictures.moving_frames"
 
     def check(self, study: Study) -> None:
+        fault = study.source.fault
         if not study.body:
-            raise BadInput("there is no body", where=study.source.where("body"), expected="a table [body.NAME]")
+            raise fault("body", "there is no body", expected="a table [body.NAME]")
         if study.solver.fidelity not in ("auto", "full"):
-            where = study.source.where("solver.fidelity")
-            raise BadInput("frames that move have one model", where=where, expected='"auto"')
+            raise fault("solver.fidelity", "frames that move have one model", expected='"auto"')
         if study.output.histories not in ("auto", "all", "none"):
-            what, where = (
-                "histories of frames that move are kept at some 800 times",
-                study.source.where("output.histories"),
-            )
-            raise BadInput(what, where=where, expected='"auto", "all" variants or "none"')
+            what = "histories of frames that move are kept at some 800 times"
+            raise fault("output.histories", what, expected='"auto", "all" variants or "none"')
 
     def pieces(self, study: Study) -> Sequence[Piece]:
         from studies.moving.parts import pieces

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from engine.scene.study import Study
-from results_schema.errors import BadInput
 from results_schema.variables import declare
 from studies.kinds.moving_frames import MovingFrames
 from studies.moving import findings
@@ -30,11 +29,8 @@ class SlidingMass(MovingFrames):
     def check(self, study: Study) -> None:
         super().check(study)
         if len(study.carriage) != 1 or not next(iter(study.carriage.values())).motion.slides:
-            raise BadInput(
-                "one carriage slides here",
-                where=study.source.where("carriage"),
-                expected='one table [carriage.NAME] whose motion is of the kind "free"',
-            )
+            expected = 'one table [carriage.NAME] whose motion is of the kind "free"'
+            raise study.source.fault("carriage", "one carriage slides here", expected=expected)
 
     def findings(self, results: Results) -> list[str]:
         return [*findings.sliding(results), *_beside_the_paper(results), *findings.others(results)]
