@@ -238,8 +238,6 @@ def _map(seen: View, sensor: str) -> Figure:
 
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
-    assert seen.x is not None and seen.y is not None
     axes = drawing.subplots()
     mesh = draw_map(axes, seen, 100.0 * seen.results.of_sensor("odd_rms", sensor), **banded(BANDS))
-    axes.set(xlabel=seen.x.title, ylabel=seen.y.title)
     colour_bar(axes, mesh, "odd part (% of the static range)", spacing="uniform")

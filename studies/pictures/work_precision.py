@@ -126,7 +126,6 @@ def _fill(dataset: xr.Dataset, fill: Any, drawing: Drawing) -> None:
         axes.set_ylabel("error")
     for place, axes in enumerate(places[: len(scenes)]):
         if place + columns >= len(scenes):
-            axes.set_xlabel(axes.get_xlabel() or "")
             axes.xaxis.set_tick_params(labelbottom=True)
         else:
             axes.set_xlabel("")

@@ -38,6 +38,17 @@ ARM = {
     "supports": "clamped-free",
     "modes": 6,
 }
+FLYER = {
+    "kind": "beam",
+    "length": 10.0,
+    "area": 4e-3,
+    "second_moment": 2e-5,
+    "youngs_modulus": 7e9,
+    "density": 3000.0,
+    "supports": "free-free",
+    "modes": 3,
+}
+SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
 
 
 def sliding_mass(**beam: object) -> Study:

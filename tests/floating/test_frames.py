@@ -10,10 +10,8 @@ from engine.floating.model import build
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from tests.floating.scenes import ARM, FOX_GOODWIN, history, steps
+from tests.floating.scenes import ARM, FLYER, FOX_GOODWIN, SPIN_UP, history, steps
 from tests.naive.particles_in_frames import Particles, beam_in_plane
-
-SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
 
 
 def arm(frame: dict[str, object], **body: object) -> Study:
@@ -65,18 +63,6 @@ def test_a_steadily_turning_beam_stretches_as_in_statics() -> None:
     )
     end = history(model, marched, "ends", 0, 3)[-1]
     assert np.hypot(end[0], end[2]) - 10.0 == pytest.approx(3000.0 * 25.0 * 1000.0 / (3.0 * 7e10), rel=2e-3)
-
-
-FLYER = {
-    "kind": "beam",
-    "length": 10.0,
-    "area": 4e-3,
-    "second_moment": 2e-5,
-    "youngs_modulus": 7e9,
-    "density": 3000.0,
-    "supports": "free-free",
-    "modes": 3,
-}
 
 
 def test_a_free_body_with_a_carriage_keeps_its_momentum() -> None:

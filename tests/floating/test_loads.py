@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from engine.scene.study import Study
-from tests.floating.scenes import ARM, history, steps
+from tests.floating.scenes import ARM, FLYER, history, steps
 
 LENGTH, STIFFNESS = 10.0, 7e10 * 2e-7
 
@@ -83,18 +83,6 @@ def test_an_axial_load_along_a_beam_bends_it() -> None:
     assert settled(cantilever(loads, stiffening=True), 40.0) == pytest.approx(wanted, rel=2e-3)
 
 
-HULL = {
-    "kind": "beam",
-    "length": 10.0,
-    "area": 4e-3,
-    "second_moment": 2e-5,
-    "youngs_modulus": 7e9,
-    "density": 3000.0,
-    "supports": "free-free",
-    "modes": 3,
-}
-
-
 def test_impulses_become_momenta() -> None:
     """A free body that is pushed off its middle and twisted, both in the ground's axes: momentum is the force's
     integral, angular momentum that of the torque and of r x f, with order 2."""
@@ -103,7 +91,7 @@ def test_impulses_become_momenta() -> None:
     study = Study(
         kind="moving-frames",
         gravity=0.0,
-        body={"hull": HULL},
+        body={"hull": FLYER},
         frame={"hull": {"joints": [{"kind": "free", "rate": [0.1, 0.3, 0.2]}]}},
         load={"jet": {"on": "hull", "force": list(force), "torque": list(torque), "course": swing}},
     )
@@ -133,7 +121,7 @@ def test_springs_between_bodies_keep_energy() -> None:
         "one": {"joints": [free | {"rate": [0.0, 0.4, 0.1]}]},
         "two": {"position": [11.0, 0.5, 0.2], "joints": [free]},
     }
-    study = Study(kind="moving-frames", gravity=0.0, body={"one": HULL, "two": HULL}, frame=joints, spring=links)
+    study = Study(kind="moving-frames", gravity=0.0, body={"one": FLYER, "two": FLYER}, frame=joints, spring=links)
     drifts = []
     for count in (2000, 4000):
         model, marched = steps(study, 4.0, count, 10)

@@ -15,10 +15,9 @@ from engine.scene.study import Study
 from results_schema.status import Status
 from studies.kinds.moving_frames import KIND
 from studies.results.results import Results
-from tests.floating.scenes import ARM, steps
+from tests.floating.scenes import ARM, SPIN_UP, steps
 
 RATES = [0.4, 0.9, 6.0]  # rad/s; the arm's lowest frequency is 3.8 rad/s
-SPIN_UP = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 6.0, "time": 15.0}}
 
 
 def spin_up(duration: float, arm: dict[str, object], **more: object) -> Study:
