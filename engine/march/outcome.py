@@ -115,9 +115,10 @@ def outcome(
         **_reduced(asked.reduction, tables, values, own, reduction),
     }
     status, diverged_step = _status(tables.model, marched)
+    nothing = lost(status)
     for array in numbers.values():
         if array.dtype == np.float64:
-            array[lost(status)] = np.nan
+            array[nothing] = np.nan
     return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
 
 
@@ -160,8 +161,8 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
         seen = np.isfinite(statistics[layout.LARGEST]) | np.isnan(statistics[layout.LARGEST])
         found[f"{sensor.name}_max"] = np.where(seen, statistics[layout.LARGEST], np.nan)
         found[f"{sensor.name}_min"] = np.where(seen, statistics[layout.SMALLEST], np.nan)
-        found[f"{sensor.name}_max_position"] = tables.timeline.positions(0, statistics[layout.LARGEST_AT])
-        found[f"{sensor.name}_min_position"] = tables.timeline.positions(0, statistics[layout.SMALLEST_AT])
+        places = tables.timeline.positions(0, statistics[[layout.LARGEST_AT, layout.SMALLEST_AT]])
+        found[f"{sensor.name}_max_position"], found[f"{sensor.name}_min_position"] = places
         found[f"{sensor.name}_rms"] = np.sqrt(
             statistics[layout.SQUARES] / np.where(statistics[layout.SECONDS] > 0.0, statistics[layout.SECONDS], 1.0)
         )
@@ -204,9 +205,8 @@ def _contact_forces(tables: SceneTables, values: VariantValues, marched: Marched
             continue
         statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
         seen = (statistics[:, layout.LARGEST_AT] >= 0.0).any(axis=0)
-        least = np.argmin(statistics[:, layout.SMALLEST], axis=0)[
-            None
-        ]  # where a contact never counts, its smallest is infinite
+        # where a contact never counts, its smallest is infinite
+        least = np.argmin(statistics[:, layout.SMALLEST], axis=0)[None]
         found[f"{carriage.name}_contact_force_max"] = np.where(seen, statistics[:, layout.LARGEST].max(axis=0), np.nan)
         found[f"{carriage.name}_contact_force_min"] = np.where(seen, statistics[:, layout.SMALLEST].min(axis=0), np.nan)
         place = tables.timeline.positions(c, np.take_along_axis(statistics[:, layout.SMALLEST_AT], least, axis=0)[0])
@@ -318,10 +318,10 @@ def histories(
         arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], values.size, axis=0)
         arrays[f"{carriage.name}_speed"] = path.dS / time_scale[:, None]
         arrays[f"{carriage.name}_acceleration_along"] = path.ddS / time_scale[:, None] ** 2
-    status, _ = _status(tables.model, marched)
+    nothing = lost(_status(tables.model, marched)[0])
     for name, array in arrays.items():
         if name != "elapsed":
-            array[lost(status)] = np.nan
+            array[nothing] = np.nan
     return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
 
