@@ -45,6 +45,7 @@ def run_chunk(
         "status": status,
         "diverged_step": found.outcome.diverged_step,
         **found.used,
+        "work": np.where(missing, np.nan, found.used["work"]),
         "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
         "error_estimate": _worst(error, results),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from results_schema.store.parts import Lock
 from studies.commands import catalogue
 from studies.commands import error_exit as trouble
 from studies.commands.cli import main
+from tests.engine.build import beam, mass, study, swing
 from tests.schema.samples import FailNth
 from tests.studies.small import SEPARATED, SMALL, write
 
@@ -88,6 +90,20 @@ def test_a_finished_study_is_left_alone_and_its_code_stays(here: Path, capsys: C
     assert Path("small.nc").read_bytes() == before
     code, third = run_json(capsys, "small.toml", "--overwrite")
     assert code == 3 and not third["was_finished"] and third["resumed"] == 0
+
+
+@pytest.mark.fault(17)
+def test_a_study_in_which_a_variant_diverges_ends_with_3(here: Path, capsys: Captured) -> None:
+    """Parametric resonance without damping, beside two light carriages."""
+    sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
+    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 40)
+    given = study(beam(modes=3), mass(0.5, way), sweep=sweep, solver={"steps": 400, "tolerance": 0.1})
+    write(here, given.source.text)
+    code, told = run_json(capsys, "small.toml")
+    assert code == told["exit_code"] == 3 and told["status"] == {"ok": 2, "diverged": 1}
+    root = open_archive("small.nc").root
+    assert root.status.values.tolist() == [0, 5, 0] and np.isnan(root.midspan_max.values).tolist() == [0, 1, 0]
+    assert (root.diverged_step.values >= 0).tolist() == [0, 1, 0]
 
 
 @pytest.mark.fault(28)

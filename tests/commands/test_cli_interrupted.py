@@ -127,6 +127,20 @@ def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code
     assert list(here.glob("long.nc.parts/*.sha256")) and not (here / "long.nc").exists()
 
 
+@pytest.mark.fault(48)
+def test_a_run_ends_while_its_kernels_compile(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A signal comes when one kernel is compiled and the next one, which takes many seconds, is not."""
+    monkeypatch.setenv("WANDERLAST_CACHE", str(here / "cache"))
+    process = start(here, "run", "small.toml")
+    while not list(here.glob("cache/*/*/*.nbc")):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    errors = process.communicate(timeout=60)[1]
+    assert process.returncode == 130 and "Traceback" not in errors
+    assert not [path for path in here.glob("cache/*/*/*.nbc") if "march_one" in path.name]
+
+
 def test_stop_carries_the_code_of_its_signal() -> None:
     before = signal.getsignal(signal.SIGINT)
     with stop_on_signals() as stop:
