@@ -2,7 +2,8 @@
 
 `python -m tests.calibration.held [--seed N] [--scenes FIRST LAST] [--size V] [--tolerances T ...]` chooses for V
 variants of every scene (8: they converge by themselves) and judges 8 of them, none a pilot, beside marches of one level
-more than the references of pilots have. Every scene follows from seed and number.
+more than the references of pilots have. Every scene follows from seed and number. With `--fixed` each has some of its
+numerics fixed, and what counts is what is told of its errors.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ import numpy as np
 from engine.accuracy.results import results_of
 from engine.batch.audit import SEED, audit
 from engine.linear_algebra import one_thread
-from tests.calibration.scenes import draw, judged, planned, reads_moment
+from results_schema.errors import BadInput
+from tests.calibration.scenes import draw, judged, planned, reads_moment, with_fixed
 
 JUDGED = 8  # variants of a scene
 CANNOT_JUDGE = 0.3  # of the tolerance: a truth that may be off by more
@@ -41,9 +43,13 @@ class Row(NamedTuple):
 
 
 @one_thread()
-def rows_of(seed: int, size: int, tolerance: float, number: int) -> list[Row]:
-    """The rows of a scene."""
-    plan = planned(draw(seed, number, size, tolerance))
+def rows_of(seed: int, size: int, tolerance: float, fixed: bool, number: int) -> list[Row]:
+    """The rows of a scene; none where what is fixed breaks a rule."""
+    given = draw(seed, number, size, tolerance)
+    try:
+        plan = planned(with_fixed(given, seed, number) if fixed else given)
+    except BadInput:
+        return []
     picked = judged(plan, JUDGED, [SEED, number])
     found = audit(plan, picked)
     held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
@@ -84,11 +90,12 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--tolerances", type=float, nargs="+", default=(1e-2, 1e-3, 1e-4))
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--fixed", action="store_true")
     given = parser.parse_args()
     numbers, started = range(*given.scenes), time.perf_counter()
     with get_context("spawn").Pool(given.processes) as pool:
         for tolerance in given.tolerances:
-            work = partial(rows_of, given.seed, given.size, tolerance)
+            work = partial(rows_of, given.seed, given.size, tolerance, given.fixed)
             rows = [row for part in pool.imap_unordered(work, numbers) for row in part]
             for moment, words in ((False, "displacements"), (True, "with a moment")):
                 print(f"{tolerance:g}, {said([row for row in rows if row.moment is moment], words)}", flush=True)

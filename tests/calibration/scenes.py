@@ -5,6 +5,8 @@ A beam has L = E I = rho A = 1, so that a carriage's mass is its mass ratio mu, 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,6 +49,28 @@ def draw(seed: int, number: int, size: int, tolerance: float) -> Study:
     axes = {f"axis{n}": {"of": path, "values": column.tolist()} for n, (path, column) in enumerate(columns.items())}
     tables = {"kind": KINDS[motion["kind"]], "sensor": sensors, "sweep": {"zip": True} | axes, "gravity": GRAVITY}
     return study(bed, carriage, **tables, solver={"tolerance": tolerance})
+
+
+FIXED = ("steps", "modes", "scheme", "fidelity", "static correction")
+
+
+def with_fixed(given: Study, seed: int, number: int) -> Study:
+    """A scene with one or two of its numerics fixed, in turn and at random. Raises BadInput where they break a rule."""
+    random = np.random.default_rng([seed, number, 1])
+    names = {FIXED[number % len(FIXED)], str(random.choice(FIXED))}
+    found: dict[str, Any] = {}
+    if "steps" in names:
+        found["solver.steps"] = int(_log(random, 100, 10000, 1)[0])
+    if "modes" in names:
+        found["body.bed.modes"] = int(random.integers(2, 13))
+    if "scheme" in names:
+        found["solver.scheme"] = str(random.choice(["average-acceleration", "fox-goodwin", "richardson", "hht-alpha"]))
+        found |= {"solver.alpha": -0.05} if found["solver.scheme"] == "hht-alpha" else {}
+    if "fidelity" in names:
+        found["solver.fidelity"] = str(random.choice(["force", "mass", "full"]))
+    if "static correction" in names:
+        found["solver.static_correction"] = False
+    return given.with_values(found)
 
 
 def planned(study: Study) -> Plan:
