@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -131,12 +132,24 @@ def deflections(model: RobotModel, found: Outcome, kept: Counts) -> Array:
     return down
 
 
+class Way(NamedTuple):
+    """A move: the number of its robot, its own number from 1, and when it begins and ends, s."""
+
+    robot: int
+    number: int
+    start: float
+    end: float
+
+
+def ways(model: RobotModel) -> Iterator[Way]:
+    """All moves of all robots in which a joint moves."""
+    for r in range(len(model.robots)):
+        for m, move in enumerate(model.system.moves[r]):
+            length = 2.0 * move[UP] + move[STEADY]
+            if np.isfinite(move[START]) and length > 0.0:
+                yield Way(r, m + 1, float(move[START]), float(move[START] + length))
+
+
 def moving_at(model: RobotModel, time: float) -> list[str]:
     """Robots and the numbers of their moves (from 1) that are under way at a time (s)."""
-    found = []
-    for r, name in enumerate(model.robots):
-        moves = model.system.moves[r]
-        ends = moves[:, START] + 2.0 * moves[:, UP] + moves[:, STEADY]
-        for m in np.flatnonzero((moves[:, START] <= time) & (time <= ends)):
-            found.append(f"move {m + 1} of {name}")
-    return found
+    return [f"move {way.number} of {model.robots[way.robot]}" for way in ways(model) if way.start <= time <= way.end]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from results_schema.arrays import Array
 from studies.pictures.scene_layout import UP, Layout, Placed
 
 WIDTH, LEAST_HEIGHT = 320.0, 110.0  # of a picture, in its own units
+PLAYED_WIDTH = 640.0
 MARGIN = 12.0
 SWING = 0.11  # largest motion over the size of what moves
 BLOCK = 0.018  # half a carriage over the same
@@ -107,6 +109,36 @@ def moving(pieces: Sequence[Piece], view: Array, label: str) -> str:
             drawn.append(f'<path class="moving" stroke-width="{width:.2f}" d="{out}">{swinging}</path>')
     box = f'viewBox="0 0 {WIDTH:.0f} {height:.0f}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {box} role="img" aria-label="{label}">{"".join(drawn)}</svg>'
+
+
+def played(frames: Sequence[Sequence[Array]], marks: Mapping[str, Array], seconds: float, label: str) -> str:
+    """An SVG element in which lines (P, 2) go through frames again and again, the grey ones of the first stay; marks:
+    places (frames, 2) of names."""
+    every = np.concatenate([line for lines in frames for line in lines])
+    low, high = every.min(axis=0), every.max(axis=0)
+    scale = (PLAYED_WIDTH - 8.0 * MARGIN) / (high[0] - low[0])
+    height = scale * (high[1] - low[1]) + 4.0 * MARGIN
+    pace = f'dur="{seconds:.2f}s" repeatCount="indefinite"'
+
+    def on_page(points: Array) -> Array:
+        return np.asarray((points - low) * [scale, -scale] + [MARGIN, height - 2.0 * MARGIN])
+
+    drawn = []
+    for number, line in enumerate(frames[0]):
+        drawn.append(f'<path stroke="#c9ced6" stroke-width="0.8" d="{_path(on_page(line), False)}"/>')
+        ways = ";".join(_path(on_page(lines[number]), False) for lines in frames[1:])
+        moving_line = f'<animate attributeName="d" values="{ways}" {pace}/>'
+        drawn.append(f'<path stroke="#0072b2" stroke-width="1.6" d="{ways.split(";")[0]}">{moving_line}</path>')
+    for name, places in marks.items():
+        ways = ";".join(f"{x:.1f} {y:.1f}" for x, y in on_page(places))
+        go = f'<animateTransform attributeName="transform" type="translate" values="{ways}" {pace}/>'
+        text = f'<text x="4" y="3" fill="#22272e" stroke="none" font-size="9">{escape(name)}</text>'
+        drawn.append(f'<g transform="translate({ways.split(";")[0]})">{go}<circle r="2.2" fill="#d55e00"/>{text}</g>')
+    box = f'viewBox="0 0 {PLAYED_WIDTH:.0f} {height:.0f}" font-family="sans-serif"'
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" {box} fill="none" role="img" aria-label="{escape(label)}">'
+        f'<rect width="100%" height="100%" fill="#ffffff"/>{"".join(drawn)}</svg>'
+    )
 
 
 def _path(points: NDArray[np.float64], dots: bool) -> str:

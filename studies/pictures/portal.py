@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,16 +21,19 @@ from studies.pictures.common.figures import (
     draw,
     legend_of_all,
 )
-from studies.results.formatting import quantity, scale_for
+from studies.pictures.moving_shapes import played
+from studies.results.formatting import listed, quantity, scale_for
 from studies.results.results import Index, Results
 from studies.robots.findings import accuracy, of_front
 
-MOST_ROBOTS, MOST_SHAPES, MOST_NAMES = 6, 4, 3
-SIZE = 0.25  # of the gauge between rails: how large the largest deflection is drawn
+MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES = 6, 4, 3, 40
+SIZE = 0.4  # of the distance between rails as drawn: how large the largest deflection is drawn at most
+ROWS_APART = 0.07  # of the longest rail, between two as drawn
+ALIKE = 0.01  # of the longest: times that are one
 
 
 def pictures(results: Results) -> list[Figure]:
-    """The front of a sweep, one variant over time, its rails where errors are longest."""
+    """The front of a sweep, one variant over time, its rails where errors are longest and in its worst move."""
     found = [_front_of(results)] if results.size > 1 and of_front(results).size else []
     traced = results.traced()
     if not traced:
@@ -36,7 +41,8 @@ def pictures(results: Results) -> list[Figure]:
     chosen = of_front(results)
     best = results.index_of(int(chosen[0])) if chosen.size else traced[0]
     shown = best if best in traced else traced[0]
-    return [*found, _strip(results, shown), _shapes(results, shown)]
+    worst = _worst_move(results, shown)
+    return [*found, _strip(results, shown), _shapes(results, shown), *([worst] if worst else [])]
 
 
 def _front_of(results: Results) -> Figure:
@@ -101,51 +107,132 @@ def _draw_strip(results: Results, index: Index, drawing: Drawing) -> None:
     legend_of_all(drawing, rows[0])
 
 
-def _marked(results: Results, index: Index) -> Array:
-    """Times of the longest errors of the robots, each once, in order."""
-    times = np.sort(results.dataset["error_largest_time"].values[index])
-    times = times[np.isfinite(times)]
-    apart = np.diff(times, prepend=-np.inf) > 0.01 * max(float(times.max(initial=0.0)), 1e-9)
-    return np.asarray(times[apart][:MOST_SHAPES])
+@dataclass(frozen=True, eq=False)
+class _View:
+    """How rails are drawn, one below another: places along them (B, E + 1) and how far they are down (S, B, E + 1), m,
+    at times (S,); apart: m between two; exaggeration of deflections."""
+
+    times: Array
+    places: Array
+    down: Array
+    apart: float
+    exaggeration: float
+
+    @classmethod
+    def of(cls, results: Results, index: Index) -> _View:
+        times, down = (results.row(results.dataset[name], index) for name in ("elapsed", "rail_deflection"))
+        places = results.dataset["rail_place"].values
+        apart = ROWS_APART * float(np.nanmax(places))
+        most = SIZE * apart / max(float(np.nanmax(np.abs(down))), 1e-12)
+        power = 10.0 ** np.floor(np.log10(most))
+        return cls(times, places, down, apart, power * max(step for step in (1.0, 2.0, 5.0) if step * power <= most))
+
+    def station(self, time: float) -> int:
+        return int(np.nanargmin(np.abs(self.times - time)))
+
+    def line(self, station: int | None, rail: int) -> Array:
+        """(P, 2) a rail at a station, or without load."""
+        known = np.isfinite(self.places[rail])
+        down = 0.0 if station is None else self.down[station, rail][known]
+        height = np.broadcast_to(-rail * self.apart - self.exaggeration * down, known.sum())
+        return np.stack([self.places[rail][known], height], axis=1)
+
+    def in_words(self) -> str:
+        return f"{len(self.places)} rails one below another, deflections {self.exaggeration:,.0f} times as large"
+
+
+def _marked(results: Results, index: Index) -> dict[float, list[str]]:
+    """Times of the longest errors, each once, in order, with the robots whose error is longest then."""
+    times = results.dataset["error_largest_time"].values[index]
+    found = dict[float, list[str]]()
+    for r in np.argsort(times):
+        if np.isfinite(times[r]):
+            alike = [time for time in found if times[r] - time <= ALIKE * np.nanmax(times)]
+            found.setdefault(alike[0] if alike else float(times[r]), []).append(list(results.study.robot)[r])
+    return dict(list(found.items())[:MOST_SHAPES])
 
 
 def _shapes(results: Results, index: Index) -> Figure:
-    marked = _marked(results, index)
-    rails = results.dataset["rail"].values
-    down = results.row(results.dataset["rail_deflection"], index)
-    gap = 1.0
-    factor = SIZE * gap / max(float(np.nanmax(np.abs(down))), 1e-12)
-    words = quantity(float(np.nanmax(np.abs(down))), "m")
-    title = f"The rails bend by up to {words} where errors are longest"
-    caption = (
-        f"The {len(rails)} rails one above another, as they bend at the times of the longest errors; the largest "
-        f"deflection of the run is drawn as a quarter of the distance between two."
-    )
-    return draw("rails", title, caption, 1.0 + 1.5 * marked.size, partial(_draw_shapes, results, index, marked, factor))
+    marked, view = _marked(results, index), _View.of(results, index)
+    title = f"The rails bend by up to {quantity(float(np.nanmax(np.abs(view.down))), 'm')}"
+    caption = f"At the times of the longest errors: {view.in_words()}. Bars are robots on their rails, at their tools."
+    rows = {time: f"{time:.3g} s: {listed(names)} off the most" for time, names in marked.items()}
+    height = 0.6 + (0.3 + 6.0 * ROWS_APART * len(view.places)) * len(rows)
+    return draw("rails", title, caption, height, partial(_draw_rows, results, index, view, rows))
 
 
-def _draw_shapes(results: Results, index: Index, marked: Array, factor: float, drawing: Drawing) -> None:
-    dataset = results.dataset
-    times, down = results.row(dataset["elapsed"], index), results.row(dataset["rail_deflection"], index)
-    planned = results.row(dataset["tool_centre_point"], index)
-    scale = scale_for(float(np.nanmax(np.abs(down))), "m")
-    largest = float(np.nanmax(np.abs(down))) * scale.factor
-    for axes, time in zip(drawing.subplots(marked.size, 1, squeeze=False, sharex=True)[:, 0], marked, strict=True):
-        station = int(np.nanargmin(np.abs(times - time)))
-        for b, name in enumerate(dataset["rail"].values):
-            x, bent = dataset["rail_place"].values[b], down[station, b]
-            known = np.isfinite(x) & np.isfinite(bent)
-            points = np.stack([x[known], -b - factor * bent[known]], axis=1)
-            axes.axhline(-b, color=MUTED, linewidth=0.4)
+def _draw_rows(results: Results, index: Index, view: _View, rows: Mapping[float, str], drawing: Drawing) -> None:
+    largest = float(np.nanmax(np.abs(view.down)))
+    scale, end = scale_for(largest, "m"), float(np.nanmax(view.places))
+    planned = results.row(results.dataset["tool_centre_point"], index)
+    every = drawing.subplots(len(rows), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, (time, words) in zip(every, rows.items(), strict=True):
+        station = view.station(time)
+        for b, name in enumerate(results.dataset["rail"].values):
+            rest, points = view.line(None, b), view.line(station, b)
+            axes.plot(rest[:, 0], rest[:, 1], color=MUTED, linewidth=0.4)
             lines = LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), cmap=SEQUENTIAL, linewidths=2.2)
-            lines.set_array(np.abs(bent[known][:-1]) * scale.factor)
-            lines.set_clim(0.0, largest)
+            lines.set_array(np.abs(rest - points)[:-1, 1] / view.exaggeration * scale.factor)
+            lines.set_clim(0.0, largest * scale.factor)
             axes.add_collection(lines)
-            axes.text(x[known][-1], -b, f"  {name}", va="center", color=MUTED)
-        for r, name in enumerate(results.study.robot):
-            axes.text(planned[station, r, 0], 0.35, name, ha="center", fontsize=7, color=DISTINCT[r % len(DISTINCT)])
-        axes.set_ylim(-len(dataset["rail"]) + 0.4, 0.7)
+            axes.text(end, -b * view.apart, f"  {name}", va="center", color=MUTED)
+        for r, foot in enumerate(_feet(results, view)):
+            x, colour = planned[station, r, 0], DISTINCT[r % len(DISTINCT)]
+            axes.plot([x, x], foot, color=colour, linewidth=1.2)
+            name = list(results.study.robot)[r]
+            axes.text(x, _beside(foot), f" {name}", va="center", fontsize=7, color=colour)
+        axes.set_aspect("equal")
+        axes.set_xlim(-0.02 * end, 1.1 * end)
+        axes.set_ylim((0.5 - len(view.places)) * view.apart, 0.5 * view.apart)
         axes.set_yticks([])
-        axes.set_title(f"{time:.3g} s")
-        colour_bar(axes, lines, f"({scale.unit})")
-    axes.set_xlabel("along the rails (m)")
+        axes.set_title(words)
+    colour_bar(list(every), lines, f"deflection ({scale.unit})", fraction=0.04, aspect=30)
+    every[-1].set_xlabel("along the rails (m)")
+
+
+def _feet(results: Results, view: _View) -> list[tuple[float, float]]:
+    """Of every robot the heights between which it is drawn: from rail to rail, or below its only one."""
+    rails, found = list(results.dataset["rail"].values), []
+    for robot in results.study.robot.values():
+        rows = [-rails.index(name) * view.apart for name in robot.rails]
+        found.append((max(rows), min(rows) if len(rows) > 1 else rows[0] - 0.7 * view.apart))
+    return found
+
+
+def _beside(foot: tuple[float, float]) -> float:
+    """The height of a robot's name."""
+    return 0.3 * foot[0] + 0.7 * foot[1]
+
+
+def _worst_move(results: Results, index: Index) -> Figure | None:
+    """The move in which a tool of its robot is off the most, in motion; None where nothing moves."""
+    from engine.robots.converge import with_open_modes
+    from engine.robots.model import build
+    from engine.robots.results import ways
+    from engine.scene.sweep import expand
+
+    flat = int(np.ravel_multi_index(index, results.shape)) if index else 0
+    model = build(with_open_modes(expand(results.study).study_of(results.study, flat)))
+    view = _View.of(results, index)
+    planned, error = (
+        results.row(results.dataset[name], index) for name in ("tool_centre_point", "tool_centre_point_error")
+    )
+    size = np.linalg.norm(error, axis=2)
+    during = {way: np.flatnonzero((view.times >= way.start) & (view.times <= way.end)) for way in ways(model)}
+    most = {way: float(size[stations, way.robot].max()) for way, stations in during.items() if stations.size > 1}
+    if not most:
+        return None
+    way = max(most, key=most.__getitem__)
+    shown = during[way][np.unique(np.linspace(0, during[way].size - 1, MOST_FRAMES).round().astype(int))]
+    rails, name = range(len(view.places)), model.robots[way.robot]
+    frames = [[view.line(station, b) for b in rails] for station in (None, *shown.tolist())]
+    heights = [_beside(foot) for foot in _feet(results, view)]
+    marks = {
+        robot: np.stack([planned[shown, r, 0], np.full(shown.size, heights[r])], axis=1)
+        for r, robot in enumerate(model.robots)
+    }
+    title = f"In move {way.number} of {name} its tool is off by up to {quantity(most[way], 'm')}"
+    caption = f"That move again and again, at its own pace: {view.in_words()}. Points are tools."
+    at = {float(view.times[during[way][np.argmax(size[during[way], way.robot])]]): f"move {way.number} of {name}"}
+    still = draw("worst move", title, caption, 2.2, partial(_draw_rows, results, index, view, at))
+    return replace(still, moving=played(frames, marks, way.end - way.start, title))

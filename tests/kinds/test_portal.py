@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -75,7 +76,30 @@ def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
     assert f"{best.size} of 6 variants are best" in answer
     assert "While portal stands still" in answer and "left goes down by" in answer and "stress" not in answer
     figures = pictures(results)
-    assert [figure.name for figure in figures] == ["front", "over-time", "rails"]
+    assert [figure.name for figure in figures] == ["front", "over-time", "rails", "worst-move"]
+
+
+def test_the_worst_move_is_played_as_exaggerated_as_its_caption_says(found: Any) -> None:
+    """Rails in the SVG element, at the station where a rail is down the most, against the dataset."""
+    results = Results.of(found)
+    figure = pictures(results)[-1]
+    rest = [_points(path) for path in re.findall(r'stroke="#c9ced6"[^>]* d="([^"]*)"', figure.moving)]
+    played = [
+        np.array([_points(path) for path in values.split(";")])
+        for values in re.findall(r'attributeName="d" values="([^"]*)"', figure.moving)
+    ]
+    assert len(rest) == len(played) == 2 and "<script" not in figure.moving
+    times = float(re.findall(r"deflections ([\d,]+) times", figure.caption)[0].replace(",", ""))
+    per_metre = np.ptp(rest[0][:, 0]) / 12.0
+    sunk = max(float((line - still)[..., 1].max()) for line, still in zip(played, rest, strict=True))
+    index = next(i for i in np.ndindex(3, 2) if f"At {results.at(i)}." in pictures(results)[-3].caption)
+    down = results.row(found["rail_deflection"], index)
+    assert sunk / per_metre / times <= float(down.max()) * 1.02
+    assert sunk / per_metre / times >= float(down.max()) * 0.8
+
+
+def _points(path: str) -> Any:
+    return np.array([float(x) for x in re.findall(r"[\d.]+", path)]).reshape(-1, 2)
 
 
 def test_the_front_is_what_no_point_beats() -> None:

@@ -82,7 +82,8 @@ STYLE: Any = {
 class Figure:
     """A drawing with its plain file name, its title and its caption.
 
-    on_method: it shows how exact the answer is or how it was computed, not the answer.
+    on_method: it shows how exact the answer is or how it was computed, not the answer. moving: an SVG element without
+    script that shows in pages what the drawing holds of one instant.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Figure:
     caption: str
     drawing: Drawing
     on_method: bool = False
+    moving: str = ""
 
     def _repr_html_(self) -> str:
         """How notebooks show it."""
@@ -128,6 +130,8 @@ def plain_name(text: str) -> str:
 
 def svg(figure: Figure) -> str:
     """The figure as an SVG element that may stand in a page beside others; the same figure gives the same text."""
+    if figure.moving:
+        return figure.moving
     stream = io.StringIO()
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": figure.name}):
         _settle(figure)
@@ -199,10 +203,10 @@ def note(axes: Axes, text: str) -> None:
     axes.set(xticks=[], yticks=[])
 
 
-def colour_bar(axes: Axes, mesh: Any, label: str, **options: Any) -> Any:
-    """The bar of a map, with plain numbers."""
+def colour_bar(axes: Axes | Sequence[Axes], mesh: Any, label: str, **options: Any) -> Any:
+    """The bar of a map, or of several, with plain numbers."""
     plain = FuncFormatter(lambda value, _: printed(value))
-    bar = axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, format=plain, **options)
+    bar = mesh.axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, format=plain, **options)
     bar.outline.set_visible(False)
     bar.ax.minorticks_off()
     return bar
