@@ -77,6 +77,15 @@ def history(model: FloatingModel, marched: Marched, group: str, first: int = 0, 
     return marched.history[0, :, start : start + count]
 
 
+def largest_drift(study: Study, count: int) -> float:
+    """Of energy and of both momenta of everything that flies over 1 s, as parts of what they begin with."""
+    model, marched = steps(study, 1.0, count, 40)
+    energy = history(model, marched, "whole", 0, 2).sum(axis=1)
+    momentum = history(model, marched, "whole", 2, 6)
+    size = np.repeat([np.abs(momentum[0, :3]).max(), np.abs(momentum[0, 3:]).max()], 3)
+    return float(max(np.ptp(energy) / energy[0], (np.ptp(momentum, axis=0) / size).max()))
+
+
 def mutated(module: ModuleType, old: str, new: str) -> ModuleType:
     """A module of kernels that are not compiled, with another text."""
     source = Path(str(module.__file__)).read_text(encoding="utf-8")
