@@ -9,13 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.kernels import layout
 from engine.march.march import Marched
 from engine.model.lane_table import weights
 from engine.statics.static_response import static_readings
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
 
 if TYPE_CHECKING:
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from engine.model.station_path import Along
     from engine.observation.signals import Signal
     from engine.scene.variants import VariantValues
-
-Flags = NDArray[np.bool_]
 
 MOST_READINGS = 2**22  # stations x signals x variants at a time
 
@@ -65,7 +62,7 @@ def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
     return static_readings(model, readers, tables.ways_at(counts))
 
 
-def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> Flags:
+def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> Mask:
     """(S, J) where each signal reads anything."""
     found = []
     for signal in signals:
@@ -75,7 +72,7 @@ def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> 
     return np.stack(found, axis=1)
 
 
-def _statistics(readings: Array, counted: Flags, at: Array) -> Array:
+def _statistics(readings: Array, counted: Mask, at: Array) -> Array:
     """(J, STATISTICS, V) of readings (S, J, V) at stations by their count (S,)."""
     found = np.full((readings.shape[1], layout.STATISTICS, readings.shape[2]), -1.0)  # none has diverged
     seen = counted[:, :, None]
@@ -84,7 +81,7 @@ def _statistics(readings: Array, counted: Flags, at: Array) -> Array:
         place = np.argmax(signed, axis=0)
         found[:, value] = sign * np.take_along_axis(signed, place[None], axis=0)[0]
         found[:, where] = np.where(np.asarray(counted.any(axis=0))[:, None], at[place], -1.0)
-    below: Flags = np.logical_and(seen, readings < 0.0)
+    below: Mask = np.logical_and(seen, readings < 0.0)
     found[:, layout.BELOW_AT] = np.where(np.any(below, axis=0), at[np.argmax(below, axis=0)], -1.0)
     return found
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.observation.readings import Sensor
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
     from engine.model.ties import Attachment
     from engine.model.timeline import Rider, Timeline
     from engine.observation.readings import Channel
-
-Flags = NDArray[np.bool_]
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
 
@@ -62,7 +59,7 @@ class ContactForce(OfContact):
     def offset_order(self) -> int:
         return 0
 
-    def counted(self, model: SceneModel, along: Along) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Mask:
         """Whether the carriage is on the body and off the last part of the span towards a held end."""
         rider = self.rides(model)
         way = along[rider]
@@ -90,7 +87,7 @@ class ContactSensor(OfContact, Sensor):
     def unit_reading(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         return np.ones(1)
 
-    def counted(self, model: SceneModel, along: Along) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Mask:
         return along[self.rides(model)].on
 
 

@@ -12,21 +12,18 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.attachment import along_shapes, holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import Along, StationPath
 from engine.model.ties import Attachment
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
     from engine.model.scene_model import BodyPart, SceneModel
     from results_schema.quantities import Quantity
-
-Flags = NDArray[np.bool_]
 
 SILENT, PLACES = 1e-9, 33  # of the largest that its body's modes show at so many places: less is rounding
 
@@ -224,7 +221,7 @@ class Sensor:
         """The power of 1/h that makes the offset SI."""
         return self.reads.rate
 
-    def counted(self, model: SceneModel, along: Along) -> Flags:
+    def counted(self, model: SceneModel, along: Along) -> Mask:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, True) if self.under is None else along[self.under].on
 

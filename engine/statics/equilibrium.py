@@ -15,18 +15,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.attachment import modal_flexibility_between, residual, shared, tie_shapes
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
 
-
 UNFELT = 1e-9  # of the largest row of a loose coordinate: what springs feel of one that they do not hold is rounding
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +32,11 @@ class StaticState:
     coordinates (S or 1, m, L), whose numbers among all modes are ``loose``."""
 
     force: Array
-    loose: Indices
+    loose: Counts
     coordinate: Array
 
 
-def unrestrained_coordinates(model: SceneModel) -> Indices:
+def unrestrained_coordinates(model: SceneModel) -> Counts:
     """Numbers of the coordinates that nothing but springs hold."""
     found: list[int] = []
     for carriage in model.carriages:

@@ -15,15 +15,12 @@ from engine.bodies.files.model import DIRECTIONS, FileModel
 from engine.bodies.frame.assembly import cross_matrix
 from engine.bodies.modal.flexibility import Flexibility, factorised, symmetric_lu
 from engine.bodies.modal.modal_body import Array
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput
 from results_schema.late import linalg, sparse
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from engine.bodies.imported.imported import Imported
-
-    Counts = NDArray[np.int64]
 
 SMALL_STRAIN = 1e-6  # energy over that of the diagonal: motions that may be rigid ones
 RIGID = 1e-7  # square of the frequency over that of the first elastic mode: motions that are
