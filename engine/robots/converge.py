@@ -171,7 +171,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     resting, status = rest(ladder.coarsest, ladder.level(Rung(0, 0)).times)
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), status)))
     steps = int(level.times.steps.sum())
-    return Converged(level.model, beyond_rest(now, record, resting), error, steps, rung, whole)
+    return Converged(level.model, beyond_rest(now, record, resting, tolerance), error, steps, rung, whole)
 
 
 def left(change: Array, before: Array, least: float) -> Array:

@@ -78,12 +78,15 @@ def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Out
     return Outcome(numbers, times, planned, error, sunk, stress, record.coordinates[:, : model.modes, 0], status)
 
 
-def beyond_rest(found: Outcome, record: Record, resting: Record) -> Outcome:
-    """The same with the largest lengths of what tools are off from where they would rest."""
+def beyond_rest(found: Outcome, record: Record, resting: Record, tolerance: float) -> Outcome:
+    """The same with the largest lengths of what tools are off from where they would rest, and for which part of the
+    time that is within a tolerance of the largest error."""
     own, other = (one.robots[:, :, SEEN_ACTUAL : SEEN_ACTUAL + 3] for one in (record, resting))
     size, phase = np.linalg.norm(own - other, axis=2), record.robots[:, :, SEEN_PHASE]
     lost = 1.0 if found.status.values_kept else np.nan
     more = {f"beyond_rest_{name}": lost * largest(np.where(phase == k, size, np.nan)) for name, k in DOING.items()}
+    close = size <= tolerance * np.linalg.norm(found.error, axis=2).max(axis=0)
+    more["at_rest"] = lost * np.diff(found.times) @ close[1:] / np.ptp(found.times)
     return replace(found, numbers=found.numbers | more)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from results_schema.arrays import Array, Counts, Mask
 from studies.results.findings_common import in_words, told_statuses
-from studies.results.formatting import quantity
+from studies.results.formatting import listed, percent, quantity, scientific
 from studies.results.results import extreme
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def answer(results: Results) -> list[str]:
     return [
         *_front(results),
         *_errors(results),
+        *_statics(results),
         *_deflections(results),
         *_causes(results),
         *told_statuses(results),
@@ -66,6 +67,24 @@ def _errors(results: Results) -> Iterator[str]:
             said += f" and {quantity(float(part['error_working'].values[work]), 'm')} at work"
         dynamic = float(np.nanmax(part["beyond_rest_moving"].values))
         yield f"{said}{in_words(results, index)}; from where it would rest by up to {quantity(dynamic, 'm')} in moves."
+
+
+def _statics(results: Results) -> Iterator[str]:
+    """How often an answer by statics alone would have done, and where not."""
+    dataset, words = results.dataset, {"moving": "in moves", "working": "at work", "holding": "while they hold"}
+    doing = {name: dataset[f"error_{name}"].values for name in words}
+    largest = np.nanmax(np.nan_to_num(list(doing.values()), nan=-1.0), axis=0)
+    known = np.isfinite(dataset["at_rest"].values) & (largest > 0.0)
+    if not known.any():
+        return
+    least, most = (percent(float(bound(dataset["at_rest"].values[known]))) for bound in (np.min, np.max))
+    off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in words}
+    told = listed([f"{percent(float(off[name]))} {words[name]}" for name in words])
+    limit = scientific(results.study.solver.tolerance)
+    yield (
+        f"Statics alone would have told tools to {limit} of their largest errors for {least} to {most} of the time; "
+        f"else it is off by up to {told}."
+    )
 
 
 def _causes(results: Results) -> Iterator[str]:

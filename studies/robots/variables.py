@@ -24,6 +24,8 @@ RESULTS = outputs("""
         likewise; NaN where it never does
     beyond_rest_holding | robot | m | | largest length of what a tool is off from rest while it stands without work
         likewise; NaN where it never does
+    at_rest | robot | | | part of the time for which a tool is where it would rest
+        within the tolerance, of its largest error
     * | | | |
     error_largest | robot component | m | | largest component of the error of the tool centre point
         actual less planned

@@ -26,6 +26,7 @@ SWEPT = {
     "acceleration": {"of": ["robot.portal.acceleration_scale"], "values": [0.5, 1.0, 3.0]},
     "payload": {"of": ["robot.portal.payload_scale"], "values": [0.0, 2.0]},
 }
+SCALES = ("acceleration_scale", "speed_scale")
 
 
 def swept(**more: Any) -> Study:
@@ -47,6 +48,13 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
     for name in ("cycle_time", "error_moving", "error_largest", "beyond_rest_working", "deflection_largest"):
         np.testing.assert_array_equal(found[name].values[2, 0], alone.outcome.numbers[name])
     assert (found["cycle_time"].diff("acceleration") < 0.0).all()
+
+
+def test_statics_do_for_all_of_the_time_where_robots_crawl(found: Any) -> None:
+    assert ((found["at_rest"] > 0.0) & (found["at_rest"] < 0.2)).all()
+    crawling = {f"robot.{name}.{key}": 1e-3 for name in ("portal", "hanging") for key in SCALES}
+    alone = converge(scene(solver={"tolerance": 1e-2}).with_values(crawling), 2.0, 0.0, "unloaded")
+    np.testing.assert_allclose(alone.outcome.numbers["at_rest"], 1.0)
 
 
 @pytest.mark.parametrize("modes", [6, "auto"])
@@ -74,7 +82,12 @@ def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
     answer = " ".join(kind_of(results.study).findings(results))
     best = of_front(results)
     assert f"{best.size} of 6 variants are best" in answer
-    assert "While portal stands still" in answer and "left goes down by" in answer and "stress" not in answer
+    assert (
+        "While portal stands still" in answer
+        and "left goes down by" in answer
+        and "stress" not in answer
+        and "Statics alone would" in answer
+    )
     figures = pictures(results)
     assert [figure.name for figure in figures] == ["front", "over-time", "rails", "worst-move"]
 
