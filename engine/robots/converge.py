@@ -35,6 +35,8 @@ FIRST_STEPS, REFINED, MOST_STEPS = 12, 6, 2_000_000
 #: on), twice the steps 0.08 to 0.18. Changes of single results are small by chance, so that 0.7 were left; they count
 #: as so much of the largest at least.
 LEFT_BY_MODES, LEFT_BY_STEPS, ALIKE = 1.0, 0.5, 0.5
+#: The same of steps that a study fixes, which may be too long: with 0.5 one error of 1,000 steps was told 0.64 times.
+LEFT_BY_FIXED_STEPS = 1.0
 MOST_ALIKE = 0.75  # ratio of two changes in a row by which the rest is told
 WORTH = 0.1  # of the tolerance: what no march is taken to be rid of
 LEAST_BETA = 1.0 / 12.0  # of Fox-Goodwin: below, the phase is worse again
@@ -151,6 +153,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     level = ladder.level(rung)
     record, now = marched(level, zero)
     unknown = np.full(len(results_of(level.model)), np.nan)
+    least = LEFT_BY_MODES, LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
     change, told = [unknown, unknown], [unknown if ladder.most.modes else np.zeros(unknown.size), unknown]
     while not (told[0] + told[1]).max() <= tolerance:
         by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in told)
@@ -162,7 +165,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
         record, now = marched(level, zero)
         apart = differences(level.model, before, now)
-        told[axis] = left(apart, change[axis], (LEFT_BY_MODES, LEFT_BY_STEPS)[axis])
+        told[axis] = left(apart, change[axis], least[axis])
         rung, change[axis] = finer, apart
     error = told[0] + told[1]
     judged = Status.UNRESOLVED
