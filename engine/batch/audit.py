@@ -63,8 +63,8 @@ def sampled(plan: Plan) -> Counts:
 
 def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
     """So many of ``size`` variants, none of some of them."""
-    everyone = np.random.default_rng(SEED).permutation(size)
-    return np.sort(everyone[~np.isin(everyone, but)][:count])
+    first = np.random.default_rng(SEED).permutation(size)[: count + len(but)]
+    return np.sort(first[~np.isin(first, but)][:count])
 
 
 def audit_size(plan: Plan) -> int:

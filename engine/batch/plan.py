@@ -47,6 +47,7 @@ MOST_LANES = 65536  # of one chunk
 MOST_MEMORY = 16 * 2**30
 CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
 EVERY_MARCH = "march"  # the kind of results that every march has
+NUMBERS_REDUCED = 4  # of 8 bytes, of a variant where extremes alone are kept: its number, its status, what it took
 PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
@@ -179,7 +180,8 @@ class Plan:
         if self.study.output.histories == "auto" and self.study.output.keeps_variants:
             kept = min(kept + NAMED, self.size)
         shown = kept * self.stations_shown * (len(self.study.sensor) + 2)
-        return 8 * (self.size * numbers_per_variant(self.asked) + shown) + 65536
+        numbers = numbers_per_variant(self.asked) if self.study.output.keep != "extremes" else NUMBERS_REDUCED
+        return 8 * (self.size * numbers + shown) + 65536
 
     @property
     def memory_bytes(self) -> int:

@@ -53,7 +53,8 @@ class Axis:
 
     def columns(self, entries: Any) -> dict[str, Any]:
         """What it sets at some entries of its values, by dotted key."""
-        return {path: self.values[entries] * factor for path, factor in self.targets.items()}
+        own = self.values[entries]
+        return {path: own if factor == 1.0 else own * factor for path, factor in self.targets.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +85,13 @@ class Cases:
 
     def columns_of(self, indices: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Swept numbers (V,) of variants given by their flat numbers (V,), by dotted key."""
-        positions = self.positions(indices)
+        entries: Mapping[str, Any] = dict.fromkeys(self.dims, slice(None))
+        if len(self.dims) != 1 or not np.array_equal(indices, np.arange(self.size)):  # all: no copies
+            entries = self.positions(indices)
         return {
             path: np.asarray(column, dtype=np.float64)
             for axis in self.axes
-            for path, column in axis.columns(positions[axis.dim]).items()
+            for path, column in axis.columns(entries[axis.dim]).items()
         }
 
     def column(self, path: str) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.scene.study import CELLS
-from engine.scene.sweep import cells_of
+from engine.scene.sweep import VARIANT, cells_of
 from results_schema.arrays import Array, Counts
 from results_schema.late import xr
 from results_schema.status import Status, label
@@ -30,6 +30,7 @@ USED = ("fidelity_used", "modes_used", "steps_used")
 NOT_KEPT = ("estimated_error",)  # of every result: the largest of those that are held is `error_estimate`
 ENDS = ("smallest", "largest")
 AT_ONCE = 2**20  # variants whose statuses are counted
+REDUCED_AT_ONCE = 2**14  # rows: reducing a few takes as long as reducing thousands
 
 
 class Numbers(NamedTuple):
@@ -55,9 +56,14 @@ def ends_of(values: Array, cells: Counts, variants: Counts) -> tuple[Counts, Cou
     """Which of n values is the smallest and which the largest of each cell, cells ascending; of equal ones that of the
     first variant. Those that are no numbers are none."""
     known = np.flatnonzero(np.isfinite(values))
-    found = []
-    for sign in (1.0, -1.0):
-        order = known[np.lexsort((variants[known], sign * values[known], cells[known]))]
+    if not known.size:
+        return known, known
+    known = known[np.argsort(cells[known], kind="stable")]
+    starts = np.flatnonzero(np.diff(cells[known], prepend=-1))
+    sizes, found = np.diff(starts, append=known.size), []
+    for best in (np.minimum, np.maximum):
+        equal = known[values[known] == np.repeat(best.reduceat(values[known], starts), sizes)]
+        order = equal[np.lexsort((variants[equal], cells[equal]))]
         found.append(order[np.flatnonzero(np.diff(cells[order], prepend=-1))])
     return found[0], found[1]
 
@@ -108,10 +114,8 @@ class ReducedVariants(Variants):
         percent = self.plan.study.output.percentiles
         columns = _Columns(store) if percent else None
         used = np.zeros((len(USED), self.cells.size), dtype=np.int64)
-        candidates: Rows | None = None
-        for name in store.finished():
-            if name == PILOTS:
-                continue
+        waiting: list[Rows] = []
+        for name in [name for name in store.finished() if name != PILOTS]:
             rows, selected = Chunk.of(store.read(name))
             assert selected is not None and (self.statuses[rows.variants] == -1).all(), "a variant comes twice"
             cells = self.plan.cases.numbers_in(self.cells, rows.variants)
@@ -120,10 +124,11 @@ class ReducedVariants(Variants):
                 np.maximum.at(most, cells, rows.arrays[array])
             if columns is not None:
                 columns.add(numbers_of(self.kind, self.plan, selected).values, cells)
-            both = joined([rows for rows in (candidates, selected) if rows is not None])
-            candidates = _candidates(self.plan, both or selected, self.kind)
-        assert candidates is not None and (self.statuses >= 0).all(), "variants are missing"
-        dataset = self._dataset(candidates, used)
+            waiting.append(selected)
+            if sum(rows.variants.size for rows in waiting) > REDUCED_AT_ONCE:
+                waiting = [self._among(waiting)]
+        assert (self.statuses >= 0).all(), "variants are missing"
+        dataset = self._dataset(self._among(waiting), used)
         if columns is None:
             return dataset
         found = columns.percentiles(self.cells.size, percent)
@@ -131,13 +136,20 @@ class ReducedVariants(Variants):
             percent=("percent", np.array(percent, dtype=np.float64), axes()["percent"].attributes())
         )
 
+    def _among(self, parts: Sequence[Rows]) -> Rows:
+        """Those of some rows that may be extremes of their cells."""
+        both = joined(parts)
+        assert both is not None
+        return _candidates(self.plan, both, self.kind)
+
     def to_audit(self, root: xr.Dataset) -> xr.Dataset:
         from engine.batch.dataset import coordinates, results_over
 
         nobody = self.plan.cases.part(np.zeros(1, dtype=np.int64))
         tolerance = results_over(self.plan, nobody, {})[["tolerance"]]
         status = (self.plan.cases.dims, self.statuses.reshape(self.plan.cases.shape))
-        return tolerance.assign_coords(coordinates(self.plan.cases)).assign(status=status)
+        swept = {name: values for name, values in coordinates(self.plan.cases).items() if name != VARIANT}
+        return tolerance.assign_coords(swept).assign(status=status)
 
     def _dataset(self, candidates: Rows, used: Counts) -> xr.Dataset:
         """The dataset of the cells but for percentiles."""

@@ -62,7 +62,8 @@ keep = "{keep}"
 """
 MODES, STEPS = 10, 500  # of all studies but those in which they vary
 WORKERS, VARIANTS = 100, 10**9  # of the plan on paper
-TASK_SECONDS = 0.4  # of a chunk of variants, at most
+HOSTS = 10  # that have these workers as threads: a hundred hosts in one process are in their own way
+TASK_SECONDS = 0.4  # of a chunk of variants, at most: that of the scheduler's load
 PROGRAM = 300 * 2**20  # bytes of a process that has planned a small study
 
 
@@ -140,44 +141,48 @@ def efficiency(seconds: float, law: np.ndarray) -> str:
     )
 
 
-def scheduler_pace(workers: int, seconds: float, tasks: int) -> tuple[float, float]:
-    """Tasks per second that a dask scheduler of this machine hands out to so many workers (threads of this process),
-    which sleep so long in each; and the part of the ideal pace."""
+def scheduler_load(seconds: float, tasks: int) -> tuple[float, float]:
+    """What a dask scheduler of this machine hands out to threads of this process, as many as the plan has workers,
+    which sleep so long in each task: tasks per second, and CPU seconds of a task, those of its worker among them."""
     import logging
 
-    from distributed import Client, LocalCluster, as_completed
+    from distributed import Client, LocalCluster
 
-    options = {"processes": False, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
-    with LocalCluster(n_workers=workers, **options) as cluster, Client(cluster) as client:
-        client.gather(client.map(time.sleep, [0.0] * workers, pure=False))
-        started, left = time.monotonic(), tasks
-        ahead = min(2 * workers, tasks)
-        going = as_completed([client.submit(time.sleep, seconds, pure=False) for _ in range(ahead)])
-        left -= ahead
-        for _ in going:
-            if left:
-                going.add(client.submit(time.sleep, seconds, pure=False))
-                left -= 1
-        pace = tasks / (time.monotonic() - started)
-    return pace, pace * seconds / workers
+    options = {"processes": False, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+    with (
+        LocalCluster(n_workers=HOSTS, threads_per_worker=WORKERS // HOSTS, **options) as cluster,
+        Client(cluster) as client,
+    ):
+        client.gather(client.map(time.sleep, [0.0] * WORKERS, pure=False))
+        started, cpu = time.monotonic(), time.process_time()
+        client.gather(client.map(time.sleep, [seconds] * tasks, pure=False))
+        return tasks / (time.monotonic() - started), (time.process_time() - cpu) / tasks
 
 
-def plan(law: np.ndarray, whole: Cost, of: Size, pace: float) -> Iterator[str]:
-    """The plan on paper for very many variants on very many workers."""
-    _, b, c = law
-    each = b + c * MODES * STEPS
-    chunk = TASK_SECONDS / (c * MODES * STEPS)
-    tasks = VARIANTS / chunk
-    hours = VARIANTS * each / WORKERS / 3600.0
-    yield f"- CPU: {VARIANTS * each / 3600:,.0f} h on one core, {hours:.1f} h on {WORKERS} workers of one thread"
-    yield (
-        f"- tasks: {chunk:,.0f} variants in {TASK_SECONDS} s each, {tasks:,.0f} of them, {WORKERS / TASK_SECONDS:.0f} "
-        f"a second; the scheduler was measured to hand out {pace:.0f} a second: no task must be shorter than "
-        f"{WORKERS / pace:.2f} s, {chunk * WORKERS / pace / TASK_SECONDS:,.0f} variants"
-    )
-    yield f"- parts, reduced on the workers: {whole.parts / of.variants * VARIANTS / 2**30:,.0f} GiB in all"
-    peak = (whole.peak - PROGRAM) / of.variants * VARIANTS
-    yield f"- memory of the process that plans and gathers, as one study: {peak / 2**30:,.0f} GiB"
+def chunk_of(size: Size) -> int:
+    """Variants of a task in a study of a size."""
+    import engine
+    from studies.protocol.study import kind_of
+
+    study = engine.load(TEXT.format(**size._asdict()))
+    plan = kind_of(study).parts(study).plan  # type: ignore[attr-defined]
+    return int(next(plan.chunks(None, None))[1].size)
+
+
+def plan(law: np.ndarray, largest: Cost, of: Size, cpu: float) -> Iterator[str]:
+    """The plan on paper for very many variants on very many workers, by the largest study. cpu: of the scheduler, s a
+    task."""
+    each = law[1] + law[2] * MODES * STEPS
+    chunk = chunk_of(of)
+    task, tasks = chunk * each, VARIANTS / chunk
+    needed = WORKERS * cpu / each
+    peak = (largest.peak - PROGRAM) / of.variants
+    yield f"{VARIANTS:,} variants on {WORKERS} workers of one thread:"
+    yield f"- CPU: {VARIANTS * each / 3600:,.0f} h on one core, {VARIANTS * each / WORKERS / 3600:.2f} h on all workers"
+    yield f"- tasks: {tasks:,.0f} of {chunk:,} variants, {task:.2f} s each, {WORKERS / task:.0f} a second"
+    yield f"- the scheduler, alone on a core: {1 / cpu:.0f} tasks a second, so at least {needed:,.0f} variants a task"
+    yield f"- parts, reduced on the workers: {largest.parts / of.variants * VARIANTS / 1e9:,.0f} GB"
+    yield f"- memory of the process that plans and gathers: {peak:.0f} bytes a variant, {peak * VARIANTS / 1e9:,.0f} GB"
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -189,6 +194,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--tasks", type=int, default=5000, help="of the scheduler's load")
     chosen = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        cost(Size(1000))  # compiles kernels, where they are not
         print("| variants | modes | steps | keep | wall (s) | CPU (s) | peak (MB) | parts (MB) | archive (MB) |")
         print("|---|---|---|---|---|---|---|---|---|", flush=True)
         found = []
@@ -202,14 +208,14 @@ def main(arguments: Sequence[str]) -> None:
             told = law @ [1.0, size.variants, float(size.variants) * size.modes * size.steps]
             print(f"  {size.variants:>12,} x {size.modes} x {size.steps}: {one.cpu:.1f} s, fitted {told:.1f} s")
         print(efficiency(chosen.seconds, law), flush=True)
-    paces = [scheduler_pace(WORKERS, seconds, chosen.tasks) for seconds in (0.0, TASK_SECONDS, 5 * TASK_SECONDS)]
-    for seconds, (pace, part) in zip((0.0, TASK_SECONDS, 5 * TASK_SECONDS), paces, strict=True):
-        ideal = f", {100 * part:.0f} % of what {WORKERS} idle workers could take" if seconds else ""
+    loads = [(seconds, *scheduler_load(seconds, chosen.tasks)) for seconds in (0.0, TASK_SECONDS)]
+    for seconds, pace, cpu in loads:
+        ideal = f", {100 * pace * seconds / WORKERS:.0f} % of the ideal" if seconds else ""
         print(
-            f"scheduler, {WORKERS} workers in threads, tasks of {seconds:.1f} s: {pace:.0f} tasks/s{ideal}", flush=True
+            f"scheduler, {WORKERS} threads, tasks of {seconds:.1f} s: {pace:.0f}/s{ideal}, CPU {1e3 * cpu:.2f} ms each"
         )
     largest = max(found, key=lambda pair: pair[0].variants)
-    print("\n".join(plan(law, largest[1], largest[0], paces[0][0])))
+    print("\n".join(plan(law, largest[1], largest[0], loads[-1][2])))
 
 
 def _show(size: Size, one: Cost) -> None:
