@@ -165,6 +165,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
         record, now = marched(level, zero)
         apart = differences(level.model, before, now)
+        apart = np.maximum(apart, ALIKE * apart.max())
         told[axis] = left(apart, change[axis], least[axis])
         rung, change[axis] = finer, apart
     error = told[0] + told[1]
@@ -179,7 +180,6 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
 
 def left(change: Array, before: Array, least: float) -> Array:
     """(results,) what is left of results after a change by twice as many modes or steps, and one before (NaN: none)."""
-    change = np.maximum(change, ALIKE * change.max())
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.nan_to_num(change / before).clip(0.0, MOST_ALIKE)
     return np.where(np.isinf(change), np.nan, change * np.maximum(least, ratio / (1.0 - ratio)))

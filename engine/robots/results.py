@@ -39,15 +39,13 @@ KEPT = 800  # stations of a history
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What a variant reports by one march: numbers by name, over robots (R,), components (R, 3) or rails (B,); at all
-    S stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2), and the
-    largest stress of every rail (S, B)."""
+    S stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2)."""
 
     numbers: dict[str, Array]
     times: Array
     planned: Array
     error: Array
     sunk: Array
-    stress: Array
     coordinates: Array
     status: Status
 
@@ -62,20 +60,19 @@ def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Out
         error = error - at_start
     phase, size = seen[:, :, SEEN_PHASE], np.linalg.norm(error, axis=2)
     times, sunk = record.coordinates[:, 0, 3], record.grips[:, :, :, SUNK]
-    stress = largest_stress(model, record)
     numbers = {
         "cycle_time": model.done.max(),
         "error_at_start": at_start,
         "error_largest": np.abs(error).max(axis=0),
         "error_largest_time": times[np.argmax(size, axis=0)],
         "deflection_largest": np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))]),
-        "stress_largest": stress.max(axis=0),
+        "stress_largest": largest_stress(model, record).max(axis=0),
         "rail_force_largest": record.grips[:, :, :, VERTICAL].max(axis=(0, 2)),
     }
     numbers |= {f"error_{name}": largest(np.where(phase == doing, size, np.nan)) for name, doing in DOING.items()}
     if not status.values_kept:
         numbers = {name: np.full_like(array, np.nan) for name, array in numbers.items()}
-    return Outcome(numbers, times, planned, error, sunk, stress, record.coordinates[:, : model.modes, 0], status)
+    return Outcome(numbers, times, planned, error, sunk, record.coordinates[:, : model.modes, 0], status)
 
 
 def beyond_rest(found: Outcome, record: Record, resting: Record, tolerance: float) -> Outcome:
@@ -103,8 +100,9 @@ def results_of(model: RobotModel) -> list[str]:
 
 
 def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
-    """(results,) how far two marches are apart at any station, over the largest length of each robot's error, the
-    largest deflection or the largest stress; NaN where ``other`` has none, infinite where ``one`` has none."""
+    """(results,) how far two marches are apart at any station, over the largest length of each robot's error or the
+    largest deflection, and of stresses the largest, which alone are reported; NaN where ``other`` has none, infinite
+    where ``one`` has none."""
     count = len(results_of(model))
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(count, np.inf if other.status.values_kept else np.nan)
@@ -113,9 +111,9 @@ def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     sunk, bodies = np.abs(one.sunk - other.sunk), model.system.body
     gaps = [sunk[:, bodies == b].max() for b in range(len(model.rails))]
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
-    strained = np.abs(one.stress - other.stress).max(axis=0)[told]
-    apart = np.concatenate([apart, gaps, strained])
-    size = np.concatenate([size, other.numbers["deflection_largest"], other.numbers["stress_largest"][told]])
+    largest_one, largest_other = (each.numbers["stress_largest"][told] for each in (one, other))
+    apart = np.concatenate([apart, gaps, np.abs(largest_one - largest_other)])
+    size = np.concatenate([size, other.numbers["deflection_largest"], largest_other])
     found: Array = np.divide(apart, size, out=np.where(apart > 0.0, np.inf, 0.0), where=size > 0.0)
     return found
 
