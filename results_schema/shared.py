@@ -113,12 +113,16 @@ declare(
             of the cell, whose own status, model, modes and steps are the most serious and the largest of its variants
         smallest | result | - | nan | smallest value of every reported number
             over the variants of the cell that have one, in its unit; NaN where none has
+        smallest_error | result | | nan | estimated error of the smallest value
+            as `estimated_error` of its variant, over the same scale; NaN where no estimate exists
         smallest_variant | result | | int64 | variant with the smallest value
             its flat number in the sweep's grid, last axis fastest; -1 where there is none
         smallest_at | result swept | - | nan | swept numbers of the variant with the smallest value
             in their units
         largest | result | - | nan | largest value of every reported number
             over the variants of the cell that have one, in its unit; NaN where none has
+        largest_error | result | | nan | estimated error of the largest value
+            as `estimated_error` of its variant, over the same scale; NaN where no estimate exists
         largest_variant | result | | int64 | variant with the largest value
             its flat number in the sweep's grid, last axis fastest; -1 where there is none
         largest_at | result swept | - | nan | swept numbers of the variant with the largest value

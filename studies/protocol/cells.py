@@ -27,29 +27,35 @@ if TYPE_CHECKING:
     from studies.protocol.study import Kind
 
 USED = ("fidelity_used", "modes_used", "steps_used")
-NOT_KEPT = ("estimated_error",)  # of every result: the largest of those that are held is `error_estimate`
+ERROR = "estimated_error"
 ENDS = ("smallest", "largest")
 AT_ONCE = 2**20  # variants whose statuses are counted
 REDUCED_AT_ONCE = 2**14  # rows: reducing a few takes as long as reducing thousands
 
 
 class Numbers(NamedTuple):
-    """Results of n variants that are one number each: full names (K,), units (K,), and values (n, K)."""
+    """Results of n variants that are one number each: full names (K,), units (K,), values (n, K), and the errors
+    estimated of these, NaN where no estimate exists."""
 
     names: list[str]
     units: list[str]
     values: Array
+    errors: Array
 
 
 def numbers_of(kind: Kind, plan: Plan, rows: Rows) -> Numbers:
     """The results of some variants, each of which is summarised by itself."""
     from engine.batch.dataset import results_over
 
-    dataset = results_over(plan, plan.cases.part(rows.variants), dict(rows.arrays))
-    found = list(single_numbers(summarised(kind, dataset, plan.study)))
+    marched = results_over(plan, plan.cases.part(rows.variants), dict(rows.arrays))
+    dataset = summarised(kind, marched, plan.study)
+    found = list(single_numbers(dataset))
     units = [str(array.attrs.get("units") or plan.study.sensor_units.get(sensor, "1")) for _, sensor, array in found]
     names = [f"{name} {sensor}".strip() for name, sensor, _ in found]
-    return Numbers(names, units, np.stack([array.values for *_, array in found], axis=1))
+    told = dict(zip(dataset["result"].values.tolist(), dataset[ERROR].values.T, strict=True))
+    unknown = np.full(rows.variants.size, np.nan)
+    errors = np.stack([told.get(name, unknown) for name in names], axis=1)
+    return Numbers(names, units, np.stack([array.values for *_, array in found], axis=1), errors)
 
 
 def ends_of(values: Array, cells: Counts, variants: Counts) -> tuple[Counts, Counts]:
@@ -72,7 +78,6 @@ def reduced(plan: Plan, chunk: Chunk, kind: Kind) -> Chunk:
     """What is kept of a chunk: of every variant its status and what it was computed with, and the rows of those that
     may be extremes of their cells, or of all where percentiles are asked for. It may be reduced again with others."""
     rows = chunk.rows if chunk.selected is None else chunk.selected
-    rows = Rows(rows.variants, {name: array for name, array in rows.arrays.items() if name not in NOT_KEPT})
     if plan.study.output.keep == "extremes":
         rows = _candidates(plan, rows, kind)
     own = {name: chunk.rows.arrays[name] for name in ("status", *USED)}
@@ -177,13 +182,15 @@ class ReducedVariants(Variants):
         dataset = self._with(dataset, "status_count", ("status_name",), counts)
         shape = self.cells.size, len(numbers.names)
         for side, end in enumerate(ENDS):
-            found, who = np.full(shape, np.nan), np.full(shape, -1)
+            found, error, who = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, -1)
             at = np.full((*shape, swept.shape[1]), np.nan)
             for k, column in enumerate(numbers.values.T):
                 rows = ends_of(column, cells, candidates.variants)[side]
                 place = cells[rows], k
                 found[place], who[place], at[place] = column[rows], candidates.variants[rows], swept[rows]
+                error[place] = numbers.errors[rows, k]
             dataset = self._with(dataset, end, ("result",), found)
+            dataset = self._with(dataset, f"{end}_error", ("result",), error)
             dataset = self._with(dataset, f"{end}_variant", ("result",), who)
             dataset = self._with(dataset, f"{end}_at", ("result", "swept"), at)
         return dataset.assign_attrs(study_kind=self.plan.study.kind, title=self.plan.study.title)

@@ -65,6 +65,15 @@ def columns(whole: xr.Dataset, name: str, one_cell: bool) -> np.ndarray:
     return values.reshape(1, -1) if one_cell else values
 
 
+def told(whole: xr.Dataset, name: str, one_cell: bool) -> np.ndarray:
+    """(cells, variants of each) the estimated errors of a result, NaN where no estimate exists."""
+    errors = whole["estimated_error"].transpose("speed", "variant", "result")
+    known = name in whole["result"].values
+    found = errors.sel(result=name).values if known else np.full(errors.shape[:2], np.nan)
+    assert known is not name.startswith(("work", "error_estimate", "mass_ratio", "speed_ratio"))
+    return found.reshape(1, -1) if one_cell else found
+
+
 @pytest.mark.parametrize("kept", ["extremes", "percentiles", "one cell"])
 def test_cells_have_what_numpy_finds_in_all_variants(whole: xr.Dataset, kept: str) -> None:
     found, one = studies.run(study(kept)), kept == "one cell"
@@ -82,6 +91,7 @@ def test_cells_have_what_numpy_finds_in_all_variants(whole: xr.Dataset, kept: st
             rows = np.arange(cells), at
             own = found.isel(result=place)
             np.testing.assert_array_equal(own[end].values.ravel(), values[rows])
+            np.testing.assert_array_equal(own[f"{end}_error"].values.ravel(), told(whole, name, one)[rows])
             np.testing.assert_array_equal(own[f"{end}_variant"].values.ravel(), numbers[rows])
             for axis, column in swept.items():
                 np.testing.assert_array_equal(own[f"{end}_at"].sel(swept=axis).values.ravel(), column[rows])
