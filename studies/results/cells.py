@@ -15,6 +15,7 @@ from studies.results.formatting import quantity, typed_unit
 if TYPE_CHECKING:
     from studies.results.results import Results
 
+DIGITS = 4  # of swept numbers, by which a variant is found again
 _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 
@@ -98,7 +99,7 @@ def words_of(results: Results, values: Mapping[str, float]) -> dict[str, str]:
     for name, value in values.items():
         typed, unit = typed_unit(results.study, name), results.study.unit(results.study.sweep.axes[name].of[0])
         if typed is None:
-            found[name] = quantity(value, unit.symbol if unit else "1")
+            found[name] = quantity(value, unit.symbol if unit else "1", DIGITS)
         else:
-            found[name] = quantity(value * typed.factor, "1") + f" {typed.unit}"
+            found[name] = quantity(value * typed.factor, "1", DIGITS) + f" {typed.unit}"
     return found

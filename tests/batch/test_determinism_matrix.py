@@ -48,7 +48,7 @@ WAY = cruise(-0.1, 1.1, 1.0, after=0.3)
 
 def swept(key: str, low: float, high: float) -> Table:
     """70 variants, whose histories are kept."""
-    return {"sweep": {"swept": {"of": key, "from": low, "to": high, "count": 70}}, "output": {"histories": "all"}}
+    return {"sweep": {"varied": {"of": key, "from": low, "to": high, "count": 70}}, "output": {"histories": "all"}}
 
 
 def by_scheme(name: str) -> Study:
