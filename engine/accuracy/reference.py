@@ -235,8 +235,8 @@ def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> C
         return np.ones(values.size, dtype=np.int64)
     model = grid.model(levels.numerics[level])
     alike = sum(grid.model(before).body_modes == model.body_modes for before in levels.numerics[:level])
-    # from the study's own steps on, where it fixes them: levels that all took these would say nothing of their error
-    wanted = np.full(values.size, max(unit_steps(grid.scene), grid.unit) * 4.0**level)
+    # Of steps that the study fixes twice as many each time: levels that all took its own would not tell their error.
+    wanted = np.full(values.size, max(unit_steps(grid.scene) * 4.0**level, grid.unit * 2.0**level))
     own = MARGIN * least_steps(model, values) * 2.0**alike  # no two levels are the same march
     if not np.isfinite(model.scheme.stability_limit):
         periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
