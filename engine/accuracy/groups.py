@@ -204,11 +204,11 @@ class ConvergingGroup(Group):
         tighter = values.tighter
         if is_free(self.grid):
             return Found(own.outcome, own.used, own.error, worst_held(own.error, results, tighter))
-        whole = np.flatnonzero(~lost(own.outcome.status))  # nothing is told of the others
-        truth = converge(self.grid, values.part(whole), in_full(self.grid), TRUTH_PART, share=InTurn(halted))
         apart = np.full(own.error.shape, np.nan)
-        beside = differences(asked, self.scene, values.part(whole), own.outcome.of(whole), truth.outcome)
-        apart[:, whole] = beside + truth.error
+        if (whole := np.flatnonzero(~lost(own.outcome.status))).size:  # nothing is told of the others
+            truth = converge(self.grid, values.part(whole), in_full(self.grid), TRUTH_PART, share=InTurn(halted))
+            beside = differences(asked, self.scene, values.part(whole), own.outcome.of(whole), truth.outcome)
+            apart[:, whole] = beside + truth.error
         left_open = len(levels.numerics) > 1
         held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)
         return Found(own.outcome, own.used, apart, held)

@@ -136,6 +136,12 @@ def test_a_diverging_variant_has_no_error() -> None:
     assert np.isnan(found.outcome.numbers["midspan_max"]).tolist() == [False, True, False]
 
 
+def test_a_study_whose_only_variant_diverges_has_no_error() -> None:
+    way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 40)
+    found = studies.run(study(beam(modes=3), mass(1.0, way), solver={"steps": 400, "tolerance": 0.1}))
+    assert int(found.status) == Status.DIVERGED and np.isnan(found.estimated_error).all() and np.isnan(found.work)
+
+
 @pytest.mark.parametrize(
     ("changes", "free"),
     [
