@@ -18,7 +18,6 @@ from results_schema.variables import declarations
 from studies.findings.numerics_used import is_marched
 from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
-from studies.results.cells import counts_of
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -96,8 +95,9 @@ def _findings(archive: Archive, study: Study) -> Iterator[str]:
     yield from _axis_findings(root, study)
     yield from _label_findings(root, study)
     yield from root_findings(root, study.kind, study.results(study.results_kind))
+    variants = _variants(root)
     for path, group in archive.groups.items():
-        yield from (f"{path}: {text}" for text in group_findings(group, path, sum(counts_of(root).values())))
+        yield from (f"{path}: {text}" for text in group_findings(group, path, variants))
     yield from _model_findings(root, study, {p: g for p, g in archive.groups.items() if p.startswith(MODELS)})
 
 
@@ -140,6 +140,12 @@ def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
         yield f"status: expected the axes {sizes} of the study, received {dict(root['status'].sizes)}"
         return
     yield from _differing(root, expand(study).axes)
+
+
+def _variants(root: xr.Dataset) -> int:
+    """How many variants there are, of whatever statuses."""
+    counts = root.get("status_count")
+    return int(root["status"].size if counts is None or counts.dtype.kind != "i" else counts.sum())
 
 
 def _differing(root: xr.Dataset, axes: Sequence[Axis]) -> Iterator[str]:
