@@ -38,7 +38,7 @@ _RESERVED_WORDS = """
     critical_mass_ratio relative_step growth multiplier observed_error estimated_error sample
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
     tolerance_asked worst_result left_out scheme_used result_unit swept swept_unit status_name status_count percent
-    smallest smallest_variant smallest_at largest largest_variant largest_at percentile
+    smallest smallest_error smallest_variant smallest_at largest largest_error largest_variant largest_at percentile
 """
 _NONE: Mapping[str, str] = MappingProxyType({})
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.

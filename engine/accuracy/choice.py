@@ -219,16 +219,6 @@ class Kept(Protocol):
         """Keep it."""
 
 
-class Nowhere:
-    """Keeps nothing."""
-
-    def read(self, drawn: Counts) -> Found | None:
-        """Nothing is known."""
-
-    def write(self, found: Found) -> None:
-        """Nothing is kept."""
-
-
 def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Found:
     """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find. Raises Halted, and Crashed
     by flat numbers of pilots.

@@ -15,7 +15,7 @@ from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job
 from engine.batch.places import Place, Shared, Threads, Where, cores, place, run_jobs
-from engine.batch.plan import EVERY_MARCH, NOBODY, NOWHERE, Plan, make_plan
+from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
 from engine.march.richardson import march_pair, march_scheme
@@ -104,7 +104,7 @@ def warm_up(plan: Plan) -> None:
         _first_steps(grid)
 
 
-def choose(plan: Plan, here: Place, stop: threading.Event | None, kept: Kept = NOWHERE) -> None:
+def choose(plan: Plan, here: Place, stop: threading.Event | None, kept: Kept | None = None) -> None:
     """What the variants are computed with, measured by pilots, unless what these found is ``kept``; those that end
     every process are left out. Raises Interrupted when ``stop`` is set."""
     without = NOBODY

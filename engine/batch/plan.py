@@ -13,7 +13,7 @@ from math import prod
 
 import numpy as np
 
-from engine.accuracy.choice import PILOTS, Choice, Kept, Nowhere, Pilots, choose, find, pilots_of, tolerance_span
+from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
 from engine.accuracy.grids import SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
 from engine.accuracy.jobs import Share
@@ -55,7 +55,6 @@ NAMED = 16  # most of those beside, which the answer names
 #: about as much as the convergence of two hundred variants of one scene.
 FEW, FEW_IN_SCENE = 256, 16
 NOBODY: Counts = np.zeros(0, dtype=np.int64)
-NOWHERE = Nowhere()
 
 
 def _whole(plan: Plan, chunk: Chunk) -> Chunk:
@@ -115,16 +114,17 @@ class Plan:
         """(V,) `solver.tolerance` of every variant over the study's."""
         return cases_tolerance(self.study, self.cases)
 
-    def choose(self, share: Share, pilots: int = PILOTS, without: Counts = NOBODY, kept: Kept = NOWHERE) -> None:
+    def choose(self, share: Share, pilots: int = PILOTS, without: Counts = NOBODY, kept: Kept | None = None) -> None:
         """Measure pilots, at most so many and ``without`` some variants, and choose, where the study has many variants.
-        ``kept``: where what pilots found is kept. Raises Halted, and Crashed by flat numbers of pilots."""
+        ``kept``: where what pilots found is kept, if anywhere. Raises Halted, and Crashed by flat numbers of pilots."""
         if not self.converges and self.choice is None:
             of = Pilots(self.asked, self.cases, self.grids, tolerance_span(self.asked, self.cases))
             drawn = np.setdiff1d(pilots_of(self.cases, self.members, pilots), without)
-            found = kept.read(drawn)
+            found = kept.read(drawn) if kept else None
             if found is None:
                 found = find(of, self.members, drawn, share)
-                kept.write(found)
+                if kept:
+                    kept.write(found)
             self.choice = choose(of, found, share)
             self._groups = ()  # those of before the choice told sizes only
             self.__dict__.pop("seconds", None)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from results_schema.store.tables import Column, Table
+from results_schema.store.tables import Table, from_arrays
 
 Arrays = dict[str, np.ndarray]
 
@@ -101,14 +101,11 @@ def _table(rows: Rows) -> Table:
         raise ValueError(f"variants: expected (n > 0,) numbers >= 0, received shape {variants.shape}")
     if VARIANTS in rows.arrays:
         raise ValueError(f"an array is called {VARIANTS!r}, the name of the numbers of the variants")
-    columns, sizes = {}, dict[str, int]()
-    for name, array in {VARIANTS: variants, **rows.arrays}.items():
+    arrays = {VARIANTS: variants, **rows.arrays}
+    for name, array in arrays.items():
         if array.shape[:1] != variants.shape or array.size == 0 or array.dtype.kind not in "iuf":
             raise ValueError(f"{name}: expected numbers ({variants.size}, ...), received {array.dtype} {array.shape}")
-        dims = tuple(f"{name}_{axis}" for axis in range(array.ndim))
-        sizes |= dict(zip(dims, array.shape, strict=True))
-        columns[name] = Column(dims, array, {})
-    return Table(sizes, columns)
+    return from_arrays(arrays)
 
 
 def _rows(table: Table) -> Rows:

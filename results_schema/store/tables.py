@@ -56,6 +56,16 @@ class Table:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
+def from_arrays(arrays: Mapping[str, np.ndarray]) -> Table:
+    """Arrays of numbers by name, each over dimensions of its own."""
+    sizes, columns = dict[str, int](), dict[str, Column]()
+    for name, array in arrays.items():
+        dims = tuple(f"{name}_{axis}" for axis in range(array.ndim))
+        sizes |= dict(zip(dims, array.shape, strict=True))
+        columns[name] = Column(dims, array, {})
+    return Table(sizes, columns)
+
+
 def from_dataset(dataset: xr.Dataset) -> Table:
     """A dataset as a table, coordinates first. Raises ValueError for what a netCDF-4 file of ours cannot hold."""
     sizes = {str(name): int(size) for name, size in dataset.sizes.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ import numpy as np
 
 from results_schema.arrays import Counts
 from results_schema.errors import ArchiveError
-from results_schema.store.tables import Column, Table
+from results_schema.store.tables import Table, from_arrays
 
 if TYPE_CHECKING:
     from engine.accuracy.choice import Found
@@ -40,19 +39,10 @@ class KeptPilots:
     def write(self, found: Found) -> None:
         """Keep it."""
         measured = {field.name: getattr(found.measured, field.name) for field in fields(found.measured)}
-        self._store.write(NAME, {"/": _table({_SCENE: found.scene, _PILOTS: found.pilots, **measured})})
-
-
-def _table(values: Mapping[str, object]) -> Table:
-    """Numbers and arrays by name."""
-    sizes, columns = dict[str, int](), dict[str, Column]()
-    for name, value in values.items():
-        data = np.asarray(value)
-        data = data.astype(np.int8) if data.dtype == np.bool_ else data
-        dims = tuple(f"{name}_{axis}" for axis in range(data.ndim))
-        sizes |= dict(zip(dims, data.shape, strict=True))
-        columns[name] = Column(dims, data, {})
-    return Table(sizes, columns)
+        values = {_SCENE: found.scene, _PILOTS: found.pilots, **measured}
+        arrays = {name: np.asarray(value) for name, value in values.items()}
+        flags = {name: array.astype(np.int8) for name, array in arrays.items() if array.dtype == np.bool_}
+        self._store.write(NAME, {"/": from_arrays(arrays | flags)})
 
 
 def _found(table: Table) -> Found:

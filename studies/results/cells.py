@@ -10,12 +10,11 @@ import numpy as np
 from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.status import Status
-from studies.results.formatting import quantity, typed_unit
+from studies.results.formatting import swept_quantity, typed_unit
 
 if TYPE_CHECKING:
     from studies.results.results import Results
 
-DIGITS = 4  # of swept numbers, by which a variant is found again
 _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 
@@ -97,9 +96,6 @@ def words_of(results: Results, values: Mapping[str, float]) -> dict[str, str]:
     """Swept numbers of one variant, by the names of their axes, in words."""
     found = {}
     for name, value in values.items():
-        typed, unit = typed_unit(results.study, name), results.study.unit(results.study.sweep.axes[name].of[0])
-        if typed is None:
-            found[name] = quantity(value, unit.symbol if unit else "1", DIGITS)
-        else:
-            found[name] = quantity(value * typed.factor, "1", DIGITS) + f" {typed.unit}"
+        unit = results.study.unit(results.study.sweep.axes[name].of[0])
+        found[name] = swept_quantity(value, unit.symbol if unit else "1", typed_unit(results.study, name))
     return found

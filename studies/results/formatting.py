@@ -161,6 +161,11 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
 
 
+def swept_quantity(value: float, units: str, typed: Scale | None) -> str:
+    """A swept number (SI) with its unit: the one in which the study file has it, where it has one."""
+    return quantity(value, units) if typed is None else f"{number(value * typed.factor, 4)} {typed.unit}"
+
+
 def typed_unit(study: Study, axis: str) -> Scale | None:
     """The unit in which a study file has the values of a swept number; None where they are plain numbers."""
     written, unit = study.data["sweep"][axis], study.unit(study.sweep.axes[axis].of[0])

@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
 from studies.results.cells import counts_of
-from studies.results.formatting import Scale, axis_title, number, quantity, spanned, typed_unit
+from studies.results.formatting import Scale, axis_title, quantity, spanned, swept_quantity, typed_unit
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
@@ -71,9 +71,7 @@ class Axis:
 
     def in_words(self, value: float) -> str:
         """A value (SI) with its unit."""
-        if self.typed is None:
-            return quantity(value, self.units)
-        return f"{number(value * self.typed.factor, 4)} {self.typed.unit}"
+        return swept_quantity(value, self.units, self.typed)
 
     @property
     def span(self) -> str:
