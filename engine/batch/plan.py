@@ -33,7 +33,7 @@ from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
 from engine.scene.variants import VariantValues, cases_tolerance
 from results_schema.arrays import Array, Counts
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
 from results_schema.store.rows import Chunk
 from results_schema.variables import declarations, registered
@@ -116,10 +116,14 @@ class Plan:
 
     def choose(self, share: Share, pilots: int = PILOTS, without: Counts = NOBODY, kept: Kept | None = None) -> None:
         """Measure pilots, at most so many and ``without`` some variants, and choose, where the study has many variants.
-        ``kept``: where what pilots found is kept, if anywhere. Raises Halted, and Crashed by flat numbers of pilots."""
+        ``kept``: where what pilots found is kept, if anywhere. Raises Halted, Crashed by flat numbers of pilots, and
+        WorkersGaveUp where all of them crashed."""
         if not self.converges and self.choice is None:
             of = Pilots(self.asked, self.cases, self.grids, tolerance_span(self.asked, self.cases))
             drawn = np.setdiff1d(pilots_of(self.cases, self.members, pilots), without)
+            if not drawn.size:
+                what = "every variant that was tried ends the process that computes it"
+                raise WorkersGaveUp(what, remedy="try the study without workers")
             found = kept.read(drawn) if kept else None
             if found is None:
                 found = find(of, self.members, drawn, share)

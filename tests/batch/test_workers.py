@@ -9,10 +9,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from results_schema.arrays import Counts
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Status
 from results_schema.store.rows import Chunk, Collector
+from tests.accuracy.chosen import sweep
 from tests.engine.build import beam, cruise, mass, study
 
 POISON = 11
@@ -200,9 +202,24 @@ def poisoned(plan: Plan, variants: Counts, halted: Halted, group: int, beside: i
 
 @pytest.mark.fault(32)
 def test_a_variant_that_ends_every_process_is_found(workers: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
+    on_threads()  # of this process, which is not to end
     monkeypatch.setattr(chunk_of_plan, "march_chunk", poisoned)
     found = marched(workers)
     assert_same_bits(found, (POISON,))
     assert np.flatnonzero(found.arrays["status"] == Status.CRASHED).tolist() == [POISON]
     numbers = [array[POISON] for array in found.arrays.values() if array.dtype.kind == "f"]
     assert len(numbers) > 10 and all(np.isnan(number).all() for number in numbers)
+
+
+class Fatal(Threads):
+    """Threads of which every variant is said to end every process."""
+
+    def share_out(self, subject: Any, jobs: Sequence[Job[Any]], *rest: Any, **grace: float) -> Sequence[Counts]:
+        return [job.lanes for job in jobs]
+
+
+@pytest.mark.fault(32)
+@pytest.mark.parametrize("make", [small, sweep], ids=["marched at once", "with pilots before"])
+def test_a_study_of_which_every_variant_ends_its_process_is_given_up(make: Callable[[], Study]) -> None:
+    with pytest.raises(WorkersGaveUp, match="ends the process that computes it"):
+        execute(make_plan(make()), Collector(48).add, Fatal(1))

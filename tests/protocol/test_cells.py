@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,18 @@ import xarray as xr
 
 import engine
 import studies
+from engine.accuracy.jobs import Job
+from engine.batch.places import Threads
+from engine.batch.plan import Plan
 from engine.scene.study import Study
+from results_schema.arrays import Counts
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.statuses import lost
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command
+from studies.protocol.parts import Memory, Work
+from studies.protocol.study import kind_of
 from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED
 
@@ -137,6 +145,37 @@ def test_variants_that_fail_are_counted_and_have_no_extreme(monkeypatch: pytest.
     own = found.sel(result="midspan_max")
     np.testing.assert_array_equal(own["largest"], np.nanmax(values, axis=1))
     np.testing.assert_array_equal(own["percentile"], np.nanpercentile(values, PERCENT, axis=1).T)
+
+
+class Deadly(Threads):
+    """Threads of which variants of a number that seven divides are said to end every process; pilots end none."""
+
+    def share_out(self, subject: Any, jobs: Sequence[Job[Any]], *rest: Any, **grace: float) -> Sequence[Counts]:
+        if not isinstance(subject, Plan):
+            return super().share_out(subject, jobs, *rest, **grace)
+        safe = [replace(job, lanes=job.lanes[job.lanes % 7 != 0]) for job in jobs]
+        super().share_out(subject, [job for job in safe if job.lanes.size], *rest, **grace)
+        return [bad for job in jobs if (bad := job.lanes[job.lanes % 7 == 0]).size]
+
+
+@pytest.mark.fault(18, 32)
+@pytest.mark.parametrize("kept", ["extremes", "percentiles"])
+def test_variants_that_end_every_process_are_counted_as_crashed(whole: xr.Dataset, kept: str) -> None:
+    parts, store = kind_of(study(kept)).parts(study(kept)), Memory()
+    parts.compute(store, Work(place=Deadly(2)))
+    found = parts.gather(store)
+    statuses, values = (whole[name].transpose("speed", "variant").values.copy() for name in ("status", "midspan_max"))
+    bad = np.arange(900).reshape(3, 300) % 7 == 0
+    statuses[bad], values[bad] = Status.CRASHED, np.nan
+    wanted = [[np.count_nonzero(row == status) for status in Status] for row in statuses]
+    np.testing.assert_array_equal(found["status_count"], wanted)
+    assert (found["status"].values == Status.CRASHED).all()
+    own = found.sel(result="midspan_max")
+    np.testing.assert_array_equal(own["smallest"], np.nanmin(values, axis=1))
+    np.testing.assert_array_equal(own["largest"], np.nanmax(values, axis=1))
+    np.testing.assert_array_equal(own["largest_variant"] % 300, np.nanargmax(values, axis=1))
+    if kept == "percentiles":
+        np.testing.assert_array_equal(own["percentile"], np.nanpercentile(values, PERCENT, axis=1).T)
 
 
 @pytest.mark.parametrize("kept", ["extremes", "percentiles"])

@@ -9,15 +9,15 @@ import dask.threaded
 from studies.commands.cli import main
 
 
-def forked(*arguments: str) -> int:
-    """The number of a process that runs the command, with its screen closed."""
+def forked(*arguments: str, screen: str = os.devnull) -> int:
+    """The number of a process that runs the command; what it says goes to the file `screen`."""
     number = os.fork()
     if number == 0:
         dask.threaded.pools.clear()  # of threads that this process does not have
         dask.threaded.default_pool = None
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
+        written = os.open(screen, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(written, 1)
+        os.dup2(written, 2)
         os._exit(main(arguments))
     return number
 
