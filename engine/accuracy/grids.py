@@ -17,14 +17,14 @@ from engine.model.scene_model import with_numerics
 from engine.model.timeline import build_grid, refined
 from engine.observation.kinks import stops
 from engine.scene.sensors import MOST_PLACES
+from engine.statics.static_response import Statics
 from results_schema.arrays import Counts
 
 if TYPE_CHECKING:
     from engine.march.outcome import Asked
-    from engine.march.tables import StaticUnit
     from engine.model.numerics import Numerics
     from engine.model.scene_model import SceneModel
-    from engine.model.timeline import Grid
+    from engine.model.timeline import Grid, Timeline
     from engine.scene.variants import VariantValues
 
 
@@ -51,7 +51,7 @@ class SceneGrid:
     unit: int
     places: int = MOST_PLACES
     _models: dict[Numerics, SceneModel] = field(default_factory=dict)
-    _readings: dict[tuple[str, int], StaticUnit] = field(default_factory=dict)
+    _readings: dict[tuple[str, int, int, int], Statics] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process makes the same of: without what was built meanwhile."""
@@ -123,21 +123,25 @@ class SceneGrid:
         """The tables of a march with ``by`` steps in one of the grid's; a pair's coarser march has as many."""
         stride = model.scheme.stride
         found = SceneTables(model, self.unit * by * stride, self.asked.window, self.readings, stride)
-        found.timeline = refined(self.grid.timeline(by, self.free_by(model, by * stride) // stride), stride)
-        found.static_over_window = self._statics(model)
+        free_by = self.free_by(model, by * stride) // stride
+        found.timeline = refined(self.grid.timeline(by, free_by), stride)
+        found.statics = self._statics(model, (by * stride, free_by * stride), found.timeline)
         return with_companions(found, self.places)
 
-    def _statics(self, model: SceneModel) -> StaticUnit:
-        """Static readings along the way: where all modes are known they are the scene's own, to the last bit, whichever
-        march asks first."""
+    def _statics(self, model: SceneModel, by: tuple[int, int], timeline: Timeline) -> Statics:
+        """Static readings along a timeline of so many steps in one of the grid's and of its free vibration: where all
+        modes are known they are the scene's own, to the last bit, whichever march asks first, and the largest are
+        looked for at the same places."""
         numerics = model.numerics
-        key = (numerics.fidelity, 0 if numerics.static_correction else model.body_modes)
+        key = (numerics.fidelity, 0 if numerics.static_correction else model.body_modes, *by)
         if key not in self._readings:
             corrected = self.scene.numerics._replace(fidelity=numerics.fidelity, static_correction=True)
             teller = self.model(corrected) if numerics.static_correction else model
-            own = SceneTables(teller, self.unit, self.asked.window, self.readings)
-            own.timeline = self.grid.timeline(1, 1)
-            self._readings[key] = own.static_over_window
+            sensors = SceneTables(teller, self.unit, self.asked.window, self.readings).sensors
+            found = Statics(teller, timeline, sensors)
+            if by != (1, 1):
+                found.over_window = self._statics(model, (1, 1), self.grid.timeline(1, 1)).over_window
+            self._readings[key] = found
         return self._readings[key]
 
     def stations(self, model: SceneModel, by: int) -> Counts:

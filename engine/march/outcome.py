@@ -264,7 +264,7 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 
 def _statics(tables: SceneTables, values: VariantValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
-    unit = tables.static_over_window
+    unit = tables.statics.over_window
     loads, gravity = weights(tables.model, values), values.gravity
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
@@ -348,7 +348,7 @@ def _reduced(
     loads = weights(tables.model, values)
 
     def static() -> Array:
-        unit = tables.static_at(counts)
+        unit = tables.statics.at(counts)
         found = unit.gravity[:, :, None] * values.gravity
         for r in range(loads.shape[0]):
             found = found + unit.force[:, :, r, None] * loads[r]
@@ -361,6 +361,6 @@ def _reduced(
         history=history,
         motion=tables.model.clock,
         find_static=static,
-        find_slope=lambda: tables.static_slope_at(counts)[:, :, None] * loads[0],
+        find_slope=lambda: tables.statics.slope_at(counts)[:, :, None] * loads[0],
     )
     return dict(reduction(cycle))

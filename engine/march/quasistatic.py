@@ -13,6 +13,7 @@ import numpy as np
 from engine.kernels import layout
 from engine.march.march import Marched
 from engine.model.lane_table import weights
+from engine.model.station_path import standing
 from engine.statics.static_response import static_readings
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
@@ -33,8 +34,8 @@ def quasistatic_extremes(
     the first ``sampled`` signals, or of the sensors, at stations by their count."""
     model, signals = tables.model, tables.signals
     loads = np.stack([*weights(model, values), values.gravity])[:, :size]
-    at = tables.static_counts
-    unit, counted = _unit(tables, at), _counted(tables, signals, tables.ways_at(at))
+    at = tables.statics.counts
+    unit, counted = _unit(tables, at), _counted(tables, signals, standing(tables.timeline, at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
     statistics = np.zeros((len(signals), layout.STATISTICS, distinct.shape[1]))
     piece = max(1, MOST_READINGS // unit[:, :, 0].size)
@@ -49,7 +50,7 @@ def quasistatic_extremes(
     shown = sensors if sampled is None else sampled
     history = np.zeros((counts.size, shown, size))
     if counts.size:
-        here = _counted(tables, signals[:shown], tables.ways_at(counts))[:, :, None]
+        here = _counted(tables, signals[:shown], standing(tables.timeline, counts))[:, :, None]
         found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
     return Marched(statistics, unrecorded, history, np.full(size, Status.OK, dtype=np.int8))
@@ -59,7 +60,7 @@ def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
     """(S, J, C + 1) readings of all signals per unit weight of each carriage, and last per unit gravity."""
     model = tables.model
     readers = [signal.as_sensor(model) for signal in tables.signals]
-    return static_readings(model, readers, tables.ways_at(counts))
+    return static_readings(model, readers, standing(tables.timeline, counts))
 
 
 def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> Mask:
@@ -93,14 +94,14 @@ def _squares(tables: SceneTables, loads: Array, time_scale: Array) -> tuple[Arra
     vibration all stand where they stopped. Readings are linear in the loads (L, V), so their squares are loads Q loads
     with one matrix Q for all variants, which differ in their pace.
     """
-    at, timeline, sensors = tables.static_counts, tables.timeline, len(tables.sensors)
+    at, timeline, sensors = tables.statics.counts, tables.timeline, len(tables.sensors)
     parts = [(0.5 * (at[:-1] + at[1:]), np.diff(timeline.moments(at)[1]), time_scale)]
     parked = [segment for segment in timeline.segments if segment.free and segment.recorded]
     if parked:
         parts.append((np.array([parked[0].first + 0.5]), np.ones(1), np.full_like(time_scale, tables.free_seconds)))
     squares, seconds = np.zeros((sensors, time_scale.size)), np.zeros((sensors, time_scale.size))
     for counts, lengths, scale in parts:
-        weight = _counted(tables, tables.signals[:sensors], tables.ways_at(counts)) * lengths[:, None]
+        weight = _counted(tables, tables.signals[:sensors], standing(tables.timeline, counts)) * lengths[:, None]
         unit = _unit(tables, counts)[:, :sensors]
         products = np.einsum("sj,sjl,sjm->jlm", weight, unit, unit, optimize=True)
         for row, load in zip(np.moveaxis(products, 1, 0), loads, strict=True):

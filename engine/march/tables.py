@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -15,22 +15,20 @@ from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Along, StationPath, ways
+from engine.model.station_path import Along, ways
 from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import closed, tie_rows, ties_of
 from engine.observation import kinks, signals
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
-from engine.statics.static_response import static_readings
+from engine.statics.static_response import Statics
 from results_schema.arrays import Array, Counts
 
 SegmentKey = tuple[float, float, int, tuple[bool, ...]]
 Missed = list[Array]  # of one segment: residual flexibility between ties, and of the signals; or empty
 
 KEPT_BYTES = 96 * 2**20  # tables kept per scene; those beyond are built again
-STATIC_STATIONS = 1024  # at which the largest static reading of a sensor is looked for
-SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
 
 class SegmentTable(NamedTuple):
@@ -45,13 +43,6 @@ class SegmentTable(NamedTuple):
     def bytes(self) -> int:
         """Size in memory."""
         return sum(array.nbytes for part in self[1:] for array in part)
-
-
-class StaticUnit(NamedTuple):
-    """Static readings at some stations: per unit force of each carriage (H, J, C), and per unit gravity (H, J)."""
-
-    force: Array
-    gravity: Array
 
 
 @dataclass(eq=False)
@@ -200,22 +191,9 @@ class SceneTables:
         self.__dict__.pop("coarser", None)
 
     @cached_property
-    def static_counts(self) -> Array:
-        """Stations, by their count, spread over the recorded part, and where a carriage passes a sensor, as influence
-        lines have their kinks there."""
-        first, last = self.timeline.window
-        last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
-        counts = np.linspace(first, last, STATIC_STATIONS)
-        places = {sensor.at for sensor in self.sensors if sensor.under is None}
-        ways = [self.timeline.positions(rider, counts) for rider in range(len(self.model.carriages)) if places]
-        passing = [_crossings(counts, way, at) for way in ways for at in places]
-        bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
-        return np.unique(np.concatenate([counts, bounds, *passing]))
-
-    @cached_property
-    def static_over_window(self) -> StaticUnit:
-        """Static readings at `static_counts`."""
-        return self.static_at(self.static_counts)
+    def statics(self) -> Statics:
+        """Static readings of the sensors while the carriages go their way."""
+        return Statics(self.model, self.timeline, self.sensors)
 
     @cached_property
     def static_scales(self) -> Array:
@@ -228,58 +206,6 @@ class SceneTables:
             found.append(largest * body.omega.max() ** sensor.offset_order)
         return np.array(found)
 
-    def ways_at(self, counts: Array | Counts) -> Along:
-        """Places of all riders at stations by their count; ``active`` says whether it is on its body at any of them."""
-        found = []
-        for rider in range(len(self.model.riders)):
-            place = self.timeline.positions(rider, counts)
-            here = np.isfinite(place)
-            nowhere = np.zeros_like(place)
-            found.append(StationPath(np.where(here, place, 0.0), nowhere, nowhere, bool(here.any()), here))
-        return tuple(found)
-
-    def static_at(self, counts: Array | Counts) -> StaticUnit:
-        """Static readings of every sensor with the carriages where they are at stations by their count."""
-        along = self.ways_at(counts)
-        readings = self._readings(along)
-        return StaticUnit(readings[:, :, :-1], readings[:, :, -1])
-
-    def static_slope_at(self, counts: Array | Counts) -> Array:
-        """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""
-        along = self.ways_at(counts)
-        first = along[0]
-        assert first.here is not None
-        if not first.active:
-            return np.zeros((counts.size, len(self.sensors)))
-        return np.where(first.here[:, None], self._slope(along), 0.0)
-
-    def _readings(self, along: Along) -> Array:
-        """(S, J, C + 1) static readings of every sensor per unit weight of each carriage, and last per unit gravity."""
-        return static_readings(self.model, self.sensors, along)
-
-    def _slope(self, along: Along) -> Array:
-        """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
-        apart, which it reaches with all its contacts."""
-        riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
-        own = {0, *(load.rider for load in self.model.carriages[0].loads)}
-        lowest = np.minimum.reduce([along[r].s for r in own])
-        highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
-        before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)
-        left, right = (
-            tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
-            for shift in (before, after)
-        )
-        change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
-        return np.asarray(change / (after - before)[:, None])
-
 
 def _key(segment: Segment) -> SegmentKey:
     return round(segment.start, 12), round(segment.end, 12), segment.steps, segment.active
-
-
-def _crossings(counts: Array, places: Array, at: float) -> Array:
-    """Fractional counts at which a carriage passes a place, by interpolation between stations."""
-    gap = places - at
-    before = np.flatnonzero(gap[:-1] * gap[1:] < 0.0)
-    part = gap[before] / (gap[before] - gap[before + 1])
-    return np.asarray(counts[before] + part * (counts[before + 1] - counts[before]))

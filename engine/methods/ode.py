@@ -20,6 +20,7 @@ from engine.march.initial_state import initial_state
 from engine.march.tables import SceneTables
 from engine.model.lane_table import lane_table, moving_mass, weight
 from engine.model.scene_model import SceneModel
+from engine.model.station_path import standing
 from engine.model.timeline import Segment, build_timeline
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
@@ -151,7 +152,7 @@ class ModalEquations:
     def readings(self, tables: SceneTables, counts: Counts, states: Array) -> Array:
         """(S, signals) of states (2 N, S) at stations of tables by their count: sensors, then the contact force, which
         is NaN where it does not count."""
-        modes, along = self.model.omega.size, tables.ways_at(counts)
+        modes, along = self.model.omega.size, standing(tables.timeline, counts)
         force = self.forces(tables, counts, states)
         found = np.zeros((counts.size, len(tables.signals)))
         for number, signal in enumerate(tables.signals):

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.scene_model import SceneModel
-    from engine.model.timeline import Rider, Segment
+    from engine.model.timeline import Rider, Segment, Timeline
 
 
 NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
@@ -88,6 +88,17 @@ def _highest(model: SceneModel) -> list[int]:
     for spring in model.springs:
         found[spring.rider] = max(found[spring.rider], 2 if spring.rigid else int(spring.damped))
     return found
+
+
+def standing(timeline: Timeline, counts: Array | Counts) -> Along:
+    """All riders at rest where they are at stations by their count; ``active`` says whether one is on its body at any
+    of them."""
+    found = []
+    for rider in range(len(timeline.riders)):
+        place = timeline.positions(rider, counts)
+        here, still = np.isfinite(place), np.zeros_like(place)
+        found.append(StationPath(np.where(here, place, 0.0), still, still, bool(here.any()), here))
+    return tuple(found)
 
 
 def frozen(model: SceneModel, places: Array) -> Along:

@@ -1,23 +1,30 @@
-"""Static readings of a scene with its carriages at rest at given places: what sensors and contacts tell there."""
+"""Static readings of a scene with its carriages at rest at given places, or where they are at stations of a march."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from engine.model.lane_table import weights
+from engine.model.station_path import Along, standing
 from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.readings import Sensor
 from engine.statics.equilibrium import static_state
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Along
+    from engine.model.timeline import Timeline
     from engine.observation.contact_forces import ContactForce
     from engine.scene.variants import VariantValues
+
+
+STATIONS = 1024  # at which the largest static reading of a sensor is looked for
+SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
 
 class StaticReadings(NamedTuple):
@@ -83,3 +90,86 @@ def _together(one: Array, other: Array) -> tuple[Array, Array]:
     """Two arrays with as many stations as the one that has more."""
     stations = max(len(one), len(other))
     return np.broadcast_to(one, (stations, *one.shape[1:])), np.broadcast_to(other, (stations, *other.shape[1:]))
+
+
+class StaticUnit(NamedTuple):
+    """Static readings at some stations: per unit force of each carriage (H, J, C), and per unit gravity (H, J)."""
+
+    force: Array
+    gravity: Array
+
+
+@dataclass(eq=False)
+class Statics:
+    """Static readings of sensors by one model along one timeline; what was asked for once is kept, as most marches of
+    a study ask for the same."""
+
+    model: SceneModel
+    timeline: Timeline
+    sensors: tuple[Sensor, ...]
+    _kept: dict[bytes, StaticUnit] = field(default_factory=dict)
+    _slopes: dict[bytes, Array] = field(default_factory=dict)
+
+    @cached_property
+    def counts(self) -> Array:
+        """Stations, by their count, spread over the recorded part, and where a carriage passes a sensor, as influence
+        lines have their kinks there."""
+        first, last = self.timeline.window
+        last = min([last, *(segment.first for segment in self.timeline.segments if segment.free)])
+        counts = np.linspace(first, last, STATIONS)
+        places = {sensor.at for sensor in self.sensors if sensor.under is None}
+        ways = [self.timeline.positions(rider, counts) for rider in range(len(self.model.carriages)) if places]
+        passing = [_crossings(counts, way, at) for way in ways for at in places]
+        bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
+        return np.unique(np.concatenate([counts, bounds, *passing]))
+
+    @cached_property
+    def over_window(self) -> StaticUnit:
+        """Readings at `counts`."""
+        return self.at(self.counts)
+
+    def at(self, counts: Array | Counts) -> StaticUnit:
+        """Readings at stations by their count."""
+        key = counts.tobytes()
+        if key not in self._kept:
+            readings = self._readings(standing(self.timeline, counts))
+            self._kept[key] = StaticUnit(readings[:, :, :-1], readings[:, :, -1])
+        return self._kept[key]
+
+    def slope_at(self, counts: Array | Counts) -> Array:
+        """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""
+        key = counts.tobytes()
+        if key not in self._slopes:
+            along = standing(self.timeline, counts)
+            here, active = along[0].here, along[0].active
+            assert here is not None
+            none = np.zeros((counts.size, len(self.sensors)))
+            self._slopes[key] = np.where(here[:, None], self._slope(along), 0.0) if active else none
+        return self._slopes[key]
+
+    def _readings(self, along: Along) -> Array:
+        """(S, J, C + 1) readings per unit weight of each carriage, and last per unit gravity."""
+        return static_readings(self.model, self.sensors, along)
+
+    def _slope(self, along: Along) -> Array:
+        """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
+        apart, which it reaches with all its contacts."""
+        riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
+        own = {0, *(load.rider for load in self.model.carriages[0].loads)}
+        lowest = np.minimum.reduce([along[r].s for r in own])
+        highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
+        before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)
+        left, right = (
+            tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
+            for shift in (before, after)
+        )
+        change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
+        return np.asarray(change / (after - before)[:, None])
+
+
+def _crossings(counts: Array, places: Array, at: float) -> Array:
+    """Fractional counts at which a carriage passes a place, by interpolation between stations."""
+    gap = places - at
+    before = np.flatnonzero(gap[:-1] * gap[1:] < 0.0)
+    part = gap[before] / (gap[before] - gap[before + 1])
+    return np.asarray(counts[before] + part * (counts[before + 1] - counts[before]))

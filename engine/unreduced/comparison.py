@@ -119,7 +119,7 @@ def _tables(own: SceneTables, study: Study) -> SceneTables:
 
 def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
     """(H, J) static readings of the march's own model."""
-    unit = tables.static_at(counts)
+    unit = tables.statics.at(counts)
     loads = weights(tables.model, values)[:, 0]
     return np.asarray(unit.gravity * values.gravity[0] + unit.force @ loads)
 

@@ -31,7 +31,7 @@ def test_statics_are_what_a_slow_march_tends_to(name: str) -> None:
     tables, values = group.tables, plan.values(group, padded(group.variants))
     counts = np.arange(0, 201, 20)
     found = march(tables, values, counts, 1).history[:, :, 0]
-    unit, twin = tables.static_at(counts), Twin(case)
+    unit, twin = tables.statics.at(counts), Twin(case)
     static = unit.force[:, :, 0] * twin.dead.sum() + unit.gravity * case.gravity
     for j, sensor in enumerate(tables.sensors):
         if sensor.quantity not in ("velocity", "acceleration"):
@@ -50,7 +50,7 @@ def test_static_correction_is_felt_in_the_contacts() -> None:
         bed, solver = beam(modes=modes), {"steps": 400, "static_correction": correction}
         (group,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).groups
         names = [sensor.name for sensor in group.tables.sensors]
-        return float(group.tables.static_at(np.array([0, 77])).force[1, names.index("b"), 0])
+        return float(group.tables.statics.at(np.array([0, 77])).force[1, names.index("b"), 0])
 
     whole = middle(20, True)
     assert abs(middle(2, True) / whole - 1.0) < 1e-9 < 1e-3 < abs(middle(2, False) / whole - 1.0)
@@ -86,4 +86,4 @@ def test_static_slopes_move_all_contacts() -> None:
             group.scene, build_sensors(group.scene), VariantValues(case, {}, 1), apart
         ).influence[:, 0]
         assert abs(right - left) > 1e-7
-        assert float(tables.static_slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)
+        assert float(tables.statics.slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)
