@@ -24,7 +24,6 @@ from results_schema.arrays import Array, Counts
 Window = Literal["whole", "last-cycle"]
 
 MOST_STATIONS = 4096  # of one table; longer segments are marched in slices, so memory does not grow with the steps
-PROBED = 4000  # places of a motion per unit of its own time, between which it passes another one once at most
 _SAME = 1e-12  # events closer than this part of the scene are one
 AT_END = 1e-9  # of the body's length: a contact beyond an end by no more touches it, for its offset is rounded
 
@@ -132,28 +131,12 @@ class Rider:
         beyond = ((0.0, low < -self._slack), (self.length, high > self.length + self._slack))
         for place, passed in beyond:
             if passed:
-                yield from _passes(self.motion, place - self.offset)
+                yield from self.motion.passing(place - self.offset)
 
     def passes(self, place: float) -> Iterator[float]:
         """Scene times at which it passes a place of the body."""
-        for tau in _passes(self.motion, place - self.offset):
+        for tau in self.motion.passing(place - self.offset):
             yield self.delay + tau / self.pace
-
-
-@lru_cache(maxsize=256)
-def _passes(motion: Motion, place: float) -> tuple[float, ...]:
-    """A motion's own times at which it passes a place."""
-    low, high = motion.range()
-    if not low < place < high:
-        return ()
-    from scipy.optimize import brentq
-
-    tau = np.linspace(0.0, motion.duration, PROBED * math.ceil(motion.duration) + 1)
-    beyond = np.signbit(motion.path(tau).S - place)
-    return tuple(
-        float(brentq(lambda t: float(motion.path(t).S) - place, tau[i], tau[i + 1], xtol=1e-15))
-        for i in np.flatnonzero(np.diff(beyond))
-    )
 
 
 class Impact(NamedTuple):

@@ -57,6 +57,10 @@ class Cruise(Motion):
         velocity = np.full_like(tau, self.end - self.start)
         return Path((1.0 - tau) * self.start + tau * self.end, velocity, np.zeros_like(tau))
 
+    def passing(self, place: float) -> tuple[float, ...]:
+        tau = (place - self.start) / (self.end - self.start)
+        return (tau,) if 0.0 < tau < 1.0 else ()
+
     def pieces(self, number: Number) -> Array:
         start, end, speed = (number(key) for key in ("start", "end", "speed"))
         found = blank(start, 2)

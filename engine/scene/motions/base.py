@@ -6,7 +6,9 @@ section 3). It lasts from tau = 0 to `duration`; before, the carriage waits at t
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 
+PROBED = 4000  # places of a motion per unit of its own time, between which it passes another one once at most
 ROUNDING = 1e-12  # tau may pass the end by this part of the duration, as sums of steps do
 
 
@@ -102,6 +105,10 @@ class Motion(Spec):
         """First periods of the body for which free vibration is marched afterwards."""
         return 0.0
 
+    def passing(self, place: float) -> tuple[float, ...]:
+        """tau at which it passes a place of its track, ascending; not where it begins, ends or turns back there."""
+        return _passing(self, place)
+
     @property
     def legs(self) -> Legs | None:
         """Its ways there and back at constant speed but for their ends; it has the keys of an out-and-back then."""
@@ -135,9 +142,24 @@ class Motion(Spec):
 
         tau outside the segment is evaluated at the nearer end.
         """
-        times = np.clip(np.asarray(tau, dtype=np.float64), segment_start, segment_end)
-        found, last = self.path(times, "right"), times == segment_end
+        times = np.minimum(np.maximum(np.asarray(tau, dtype=np.float64), segment_start), segment_end)
+        found, last = self.law(times, "right"), times == segment_end
         if segment_end < self.duration and last.any():  # at its own end a motion has one limit
-            for part, at_end in zip(found, self.path(times[last], "left"), strict=True):
+            for part, at_end in zip(found, self.law(times[last], "left"), strict=True):
                 part[last] = at_end
         return found
+
+
+@lru_cache(maxsize=256)
+def _passing(motion: Motion, place: float) -> tuple[float, ...]:
+    low, high = motion.range()
+    if not low < place < high:
+        return ()
+    from scipy.optimize import brentq
+
+    tau = np.linspace(0.0, motion.duration, PROBED * math.ceil(motion.duration) + 1)
+    beyond = np.signbit(motion.path(tau).S - place)
+    return tuple(
+        float(brentq(lambda t: float(motion.path(t).S) - place, tau[i], tau[i + 1], xtol=1e-15))
+        for i in np.flatnonzero(np.diff(beyond))
+    )
