@@ -73,7 +73,7 @@ def on_this_machine(count: int, threads: int, memory: int | None = None) -> Iter
             processes.keep(count)
             own_computer()  # compiles kernels, if they are not, once for all
             with _answers(cluster.scheduler_address):
-                client.wait_for_workers(count, timeout=LOST_SECONDS)
+                _wait_for(client, count, processes)
             yield Workers(client, threads, partial(processes.keep, count))
         finally:
             processes.end()
@@ -106,6 +106,17 @@ class Processes:
             one.kill()
         for one in self._running:
             one.communicate()
+
+
+def _wait_for(client: Client, count: int, processes: Processes) -> None:
+    """Wait until so many have joined, or any in as much time as they have; those that end meanwhile are started anew.
+    Raises TimeoutError."""
+    end = time.monotonic() + LOST_SECONDS
+    while len(there := client.nthreads()) < count and (not there or time.monotonic() < end):
+        if time.monotonic() > end:
+            raise TimeoutError
+        processes.keep(count)
+        time.sleep(0.1)
 
 
 @contextmanager

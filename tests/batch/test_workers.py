@@ -25,7 +25,7 @@ from engine.batch.execution import execute
 from engine.batch.handshake import check_computer, own_computer
 from engine.batch.places import Place, Threads
 from engine.batch.plan import Plan, make_plan
-from engine.batch.workers import Workers, of_scheduler, on_this_machine
+from engine.batch.workers import Processes, Workers, of_scheduler, on_this_machine
 from engine.scene.study import Study
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput, WorkersGaveUp
@@ -122,6 +122,21 @@ def test_what_a_killed_worker_had_is_done_again(workers: Workers) -> None:
     assert len(set(killed)) >= 2 and not crashed
     assert sorted(found) == list(range(40))
     assert_same_bits(marched(workers, 7))
+
+
+@pytest.mark.fault(31)
+def test_a_worker_killed_as_it_starts_is_started_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    keep, killed = Processes.keep, list[int]()
+
+    def kill_the_first(self: Processes, count: int) -> None:
+        keep(self, count)
+        if not killed:
+            killed.append(self._running[0].pid)
+            self._running[0].kill()
+
+    monkeypatch.setattr(Processes, "keep", kill_the_first)
+    with on_this_machine(1, 1) as here:
+        assert killed and pids(here)[0] != killed[0]
 
 
 def greedy(most: int, lanes: Counts, halted: Halted) -> int:
