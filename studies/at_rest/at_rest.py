@@ -24,7 +24,7 @@ from results_schema.late import xr
 from results_schema.status import Fidelity, Status
 from studies.at_rest.labelling import Gathering, asked_coordinates
 from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
-from studies.protocol.parts import Piece, Work
+from studies.protocol.parts import Piece, Work, unlabelled
 from studies.protocol.study import PiecedKind, question_of
 
 Named = Mapping[str, NDArray[Any]]
@@ -128,7 +128,7 @@ def _numbers(study: Study, asked: Asked, positions: int) -> int:
 def _shapes(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
     """Shapes along all bodies, of the scene without sweep."""
     model = base_scene(study)
-    return _plain(kind.shapes(model, frozen(model, places.all)))
+    return unlabelled(kind.shapes(model, frozen(model, places.all)))
 
 
 def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, work: Work) -> xr.Dataset:
@@ -143,7 +143,7 @@ def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, wo
         numbers.append(variants)
         found.append(_evaluated(kind, model, values, places))
     joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
-    return _plain({"number": np.concatenate(numbers), **joined})
+    return unlabelled({"number": np.concatenate(numbers), **joined})
 
 
 def _evaluated(
@@ -173,7 +173,7 @@ def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, w
             {name: one[0] for name, one in kind.variants(model, VariantValues(model.study, {}, 1), along).items()}
         )
     names = [name for name in found[0] if name != "opened"]
-    return _plain({name: np.stack([one[name] for one in found]) for name in names})
+    return unlabelled({name: np.stack([one[name] for one in found]) for name in names})
 
 
 def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) -> xr.Dataset:
@@ -181,11 +181,4 @@ def _unreduced(kind: AtRestKind, study: Study, places: Positions, work: Work) ->
     model, positions = base_scene(study), places.all[places.unreduced]
     reduced = kind.variants(model, VariantValues(model.study, {}, 1), frozen(model, positions))
     full = kind.unreduced(study.without_sweep(), model, positions)
-    return _plain({**full, **{f"{name}_reduced": reduced[name][0] for name in full}})
-
-
-def _plain(arrays: Named) -> xr.Dataset:
-    """Arrays with dimensions of no meaning, as a piece."""
-    return xr.Dataset(
-        {name: ([f"{name}_{axis}" for axis in range(array.ndim)], array) for name, array in arrays.items()}
-    )
+    return unlabelled({**full, **{f"{name}_reduced": reduced[name][0] for name in full}})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
-from results_schema.status import Fidelity
-from studies.protocol.parts import Piece, Work, usual
+from studies.protocol.converged import HISTORY, Told, labelled
+from studies.protocol.parts import Piece, Work, unlabelled
 from studies.results.formatting import percent, quantity
 from studies.results.results import spread
 
@@ -141,7 +141,7 @@ def _march(
 
     run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
     parts = [found[first] for first in sorted(found)]
-    return _plain({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    return unlabelled({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 def again(
@@ -171,7 +171,7 @@ def again(
 
 
 def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Counts) -> dict[str, NDArray[Any]]:
-    """Results of V variants by name, and the histories of some of them ("history:" before their names)."""
+    """Results of V variants by name, and the histories of some of them."""
     from engine.floating.results import ends, frame_signals, signals
     from engine.kernels.floating.observe import BODY_ATTITUDE, BODY_SPIN, BODY_VELOCITY, OF_BODY
     from engine.march.outcome import number_of
@@ -206,7 +206,7 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
         "momentum": history[:, :, whole + 2 : whole + 5],
         "angular_momentum": history[:, :, whole + 5 : whole + 8],
     }
-    return found | {"kept": own[kept]} | {f"history:{name}": array for name, array in traces.items()}
+    return found | {"kept": own[kept]} | {f"{HISTORY}{name}": array for name, array in traces.items()}
 
 
 def quaternions(rows: Array) -> Array:
@@ -244,87 +244,17 @@ def periods(times: Array, places: Array, speeds: Array) -> Array:
     return found
 
 
-def _plain(arrays: dict[str, NDArray[Any]]) -> xr.Dataset:
-    """Arrays as a dataset without labels."""
-    import xarray as xr
-
-    return xr.Dataset(
-        {name: ([f"{name}:{axis}" for axis in range(array.ndim)], array) for name, array in arrays.items()}
-    )
-
-
 def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
     """Everything, labelled."""
-    import xarray as xr
-
-    from engine.batch.dataset import coordinates
     from engine.floating.model import build
     from engine.floating.results import results_of
     from engine.scene.sweep import expand
-    from results_schema.variables import axes
 
-    cases, model = expand(study), build(study.without_sweep(), 2)
-    declared = study.results(kind)
-    labels = {"frame": list(model.bodies), "component": COMPONENTS, "quaternion": QUATERNION}
-    own = list(parts.values())
-    whole = {str(name): np.concatenate([part[name].values for part in own]) for name in own[0].data_vars}
-    order, kept = np.argsort(whole.pop("number")), np.argsort(whole["kept"])
-    dataset = xr.Dataset(coords=coordinates(cases))
+    model, declared = build(study.without_sweep(), 2), study.results(kind)
     results = results_of(model)
-    everything = [result.name for result in results]
-    dataset = dataset.assign_coords(result=("result", everything, axes()["result"].attributes()))
+    labels = {"frame": list(model.bodies), "component": COMPONENTS, "quaternion": QUATERNION}
     if study.sensor:
-        dataset = dataset.assign_coords(sensor=("sensor", list(study.sensor), {"long_name": "sensor"}))
+        labels["sensor"] = list(study.sensor)
     tolerance = np.array([result.tolerance for result in results])
-    dataset["tolerance"] = declared["tolerance"].holding(tolerance, ("result",))
-    for label, names in labels.items():
-        dataset = dataset.assign_coords({label: declared[label].holding(np.array(names), (label,))})
-    grid = {name: array[order] for name, array in whole.items() if not name.startswith("history:") and name != "kept"}
-    shape = cases.shape
-    used = {
-        "status": grid.pop("status"),
-        "fidelity": np.full(cases.size, int(Fidelity.FRAME)),
-        "modes": grid.pop("modes_used"),
-        "steps": grid.pop("steps_used"),
-    }
-    for name, entry in usual(cases.dims, **{key: array.reshape(shape) for key, array in used.items()}).items():
-        dataset[name] = entry
-    dataset["scheme_used"] = declared["scheme_used"].holding(grid.pop("scheme_used").reshape(shape), cases.dims)
-    error = grid["estimated_error"]
-    held = np.isfinite(tolerance)
-    worst = error[:, held].max(axis=1) if held.any() else np.full(cases.size, np.nan)
-    dataset["error_estimate"] = declared["error_estimate"].holding(worst.reshape(shape), cases.dims)
-    for name, array in grid.items():
-        inner = ("result",) if name == "estimated_error" else declared[name].dims
-        dataset[name] = declared[name].holding(array.reshape((*shape, *array.shape[1:])), (*cases.dims, *inner))
-    return _with_histories(dataset, whole, kept, cases, declared)
-
-
-def _with_histories(
-    dataset: xr.Dataset, whole: dict[str, NDArray[Any]], kept: Counts, cases: Cases, declared: Mapping[str, Any]
-) -> xr.Dataset:
-    """Histories on the whole grid where every variant has one, else along ``history``."""
-    from results_schema.variables import axes
-
-    variants = whole["kept"][kept]
-    if not variants.size:
-        return dataset
-    everyone = variants.size == cases.size
-    lead: Sequence[str] = cases.dims if everyone else ("history",)
-    shape = cases.shape if everyone else (variants.size,)
-    stations = whole["history:elapsed"].shape[1]
-    dataset = dataset.assign_coords(station=axes()["station"].holding(np.arange(stations), ("station",)))
-    if not everyone:
-        dataset = dataset.assign_coords(history=axes()["history"].holding(variants, ("history",)))
-    for name, array in whole.items():
-        if not name.startswith("history:"):
-            continue
-        own = name.removeprefix("history:")
-        variable = axes()[own] if own == "elapsed" else declared[own]
-        inner = ("station", *variable.dims[1:])
-        entry = variable.holding(array[kept].reshape((*shape, *array.shape[1:])), (*lead, *inner))
-        if own == "elapsed":
-            dataset = dataset.assign_coords(elapsed=entry)
-        else:
-            dataset[own] = entry
-    return dataset
+    told = Told(expand(study), declared, [result.name for result in results], tolerance, labels)
+    return labelled(list(parts.values()), told)

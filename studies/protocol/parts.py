@@ -12,6 +12,7 @@ from functools import partial
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine.accuracy.jobs import Job
 from engine.march.stepper import Halted
@@ -361,3 +362,8 @@ def usual(dims: Sequence[str], **values: Any) -> dict[str, tuple[tuple[str, ...]
     names = {"status": "status", "fidelity": "fidelity_used", "modes": "modes_used", "steps": "steps_used"}
     declared = {variable.name: variable for variable in declarations("*")}
     return {names[key]: declared[names[key]].holding(value, dims) for key, value in values.items()}
+
+
+def unlabelled(arrays: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    """Arrays with dimensions of no meaning, as pieces are stored."""
+    return xr.Dataset({name: ([f"{name}_{axis}" for axis in range(part.ndim)], part) for name, part in arrays.items()})

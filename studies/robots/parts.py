@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
-from results_schema.status import Fidelity
-from studies.protocol.parts import Piece, Work, usual
+from studies.protocol.converged import HISTORY, Told, labelled
+from studies.protocol.parts import Piece, Work, unlabelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from engine.robots.converge import Converged
+    from engine.robots.rails import Rail
     from engine.scene.study import Study
     from engine.scene.sweep import Cases
     from studies.robots.question import Question
@@ -25,6 +26,7 @@ PIECE_SECONDS, STEP_SECONDS = 8.0, 4e-5  # of one piece and of a step, about; fo
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
 BUILD_SECONDS = 0.1  # of a variant's model
 COMPONENTS = ("x", "y", "z")
+ONE_AT_A_TIME = "one-at-a-time"  # the piece of robots that stand still in turn
 
 
 def pieces(study: Study, question: Question) -> list[Piece]:
@@ -47,7 +49,7 @@ def pieces(study: Study, question: Question) -> list[Piece]:
         found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     if question.one_at_a_time and len(study.robot) > 1:
         compute = partial(_without, base, question)
-        found.append(Piece("one-at-a-time", "robots that stand still in turn", compute, each * len(study.robot)))
+        found.append(Piece(ONE_AT_A_TIME, "robots that stand still in turn", compute, each * len(study.robot)))
     return found
 
 
@@ -73,7 +75,7 @@ def _march(study: Study, question: Question, cases: Cases, variants: Counts, wor
     arrays = {
         name: np.stack([row[name] for row in rows if name in row]) for name in {n: 0 for row in rows for n in row}
     }
-    return _plain(
+    return unlabelled(
         arrays | {"number": variants, "kept": np.array([v for v in variants.tolist() if v in kept], np.int64)}
     )
 
@@ -111,10 +113,10 @@ def _traces(converged: Converged) -> dict[str, NDArray[Any]]:
     outcome = converged.outcome
     kept = stations(outcome)
     return {
-        "history:elapsed": outcome.times[kept],
-        "history:tool_centre_point": outcome.planned[kept],
-        "history:tool_centre_point_error": outcome.error[kept],
-        "history:rail_deflection": deflections(converged.model, outcome, kept),
+        f"{HISTORY}elapsed": outcome.times[kept],
+        f"{HISTORY}tool_centre_point": outcome.planned[kept],
+        f"{HISTORY}tool_centre_point_error": outcome.error[kept],
+        f"{HISTORY}rail_deflection": deflections(converged.model, outcome, kept),
     }
 
 
@@ -124,94 +126,35 @@ def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
     for name in study.robot:
         alone = _converged(study.with_values({f"robot.{name}.moves": []}), question, work)
         rows.append(np.linalg.norm(alone.outcome.error, axis=2).max(axis=0))
-    return _plain({"error_without": np.stack(rows)})
-
-
-def _plain(arrays: Mapping[str, NDArray[Any]]) -> xr.Dataset:
-    """Arrays as a dataset without labels."""
-    import xarray as xr
-
-    return xr.Dataset({name: ([f"{name}:{axis}" for axis in range(part.ndim)], part) for name, part in arrays.items()})
+    return unlabelled({"error_without": np.stack(rows)})
 
 
 def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
     """Everything, labelled."""
-    import xarray as xr
-
-    from engine.batch.dataset import coordinates
     from engine.robots.converge import with_open_modes
     from engine.robots.model import build
     from engine.robots.results import results_of
     from engine.scene.sweep import expand
-    from results_schema.variables import axes
-    from results_schema.variables import expand as declared_for
 
-    cases, model = expand(study), build(with_open_modes(study.without_sweep()))
-    declared = declared_for(kind, {}, ())
+    model, declared = build(with_open_modes(study.without_sweep())), study.results(kind)
     labels: dict[str, Sequence[str]] = {"robot": model.robots, "rail": list(model.rails), "component": COMPONENTS}
-    dataset = xr.Dataset(coords=coordinates(cases))
-    results = results_of(model)
-    dataset = dataset.assign_coords(result=("result", results, axes()["result"].attributes()))
-    tolerance = np.full(len(results), study.solver.tolerance)
-    dataset["tolerance"] = declared["tolerance"].holding(tolerance, ("result",))
-    extra = {name: part for name, part in parts.items() if name == "one-at-a-time"}
-    if extra:
+    own = dict(parts)
+    alone = own.pop(ONE_AT_A_TIME, None)
+    if alone is not None:
         labels["still"] = model.robots
-    for label, names in labels.items():
-        dataset = dataset.assign_coords({label: declared[label].holding(np.array(names), (label,))})
-    own = [part for name, part in parts.items() if name not in extra]
-    whole = {
-        str(name): np.concatenate([part[name].values for part in own if name in part])
-        for name in dict.fromkeys(str(name) for part in own for name in part.data_vars)
-    }
-    order, kept = np.argsort(whole.pop("number")), whole.pop("kept")
-    traces = {name.removeprefix("history:"): whole.pop(name) for name in list(whole) if name.startswith("history:")}
-    used = {"fidelity": np.full(cases.shape, int(Fidelity.FRAME))}
-    for key, name in (("status", "status"), ("modes", "modes_used"), ("steps", "steps_used")):
-        used[key] = whole.pop(name)[order].reshape(cases.shape)
-    for name, entry in usual(cases.dims, **used).items():
-        dataset[name] = entry
-    worst = whole["estimated_error"][order].max(axis=1)
-    dataset["error_estimate"] = declared["error_estimate"].holding(worst.reshape(cases.shape), cases.dims)
-    for name, array in whole.items():
-        inner = ("result",) if name == "estimated_error" else declared[name].dims
-        dataset[name] = declared[name].holding(
-            array[order].reshape((*cases.shape, *array.shape[1:])), (*cases.dims, *inner)
-        )
-    for part in extra.values():
-        dataset["error_without"] = declared["error_without"].holding(part["error_without"].values)
-    return _with_histories(dataset, traces, kept, cases, model.rails)
+    results = results_of(model)
+    tolerance = np.full(len(results), study.solver.tolerance)
+    dataset = labelled(list(own.values()), Told(expand(study), declared, results, tolerance, labels))
+    if alone is not None:
+        dataset["error_without"] = declared["error_without"].holding(alone["error_without"].values)
+    return _with_places(dataset, model.rails, declared) if "rail_deflection" in dataset else dataset
 
 
-def _with_histories(
-    dataset: xr.Dataset, traces: dict[str, NDArray[Any]], kept: Counts, cases: Cases, rails: Mapping[str, Any]
-) -> xr.Dataset:
-    """Histories on the whole grid where every variant has one, else along ``history``."""
-    from results_schema.variables import axes
-    from results_schema.variables import expand as declared_for
-
-    if not kept.size:
-        return dataset
-    declared, order = declared_for("portal", {}, ()), np.argsort(kept)
-    everyone = kept.size == cases.size
-    lead: Sequence[str] = cases.dims if everyone else ("history",)
-    shape = cases.shape if everyone else (kept.size,)
-    stations = traces["elapsed"].shape[1]
+def _with_places(dataset: xr.Dataset, rails: Mapping[str, Rail], declared: Mapping[str, Any]) -> xr.Dataset:
+    """The places of every rail whose deflections have histories."""
     most = max(rail.ends.size for rail in rails.values())
     places = np.full((len(rails), most), np.nan)
     for b, rail in enumerate(rails.values()):
         places[b, : rail.ends.size] = rail.ends
-    dataset = dataset.assign_coords(
-        station=axes()["station"].holding(np.arange(stations), ("station",)),
-        rail_end=declared["rail_end"].holding(np.arange(most), ("rail_end",)),
-    )
-    dataset["rail_place"] = declared["rail_place"].holding(places)
-    if not everyone:
-        dataset = dataset.assign_coords(history=axes()["history"].holding(np.sort(kept), ("history",)))
-    for name, trace in traces.items():
-        variable = axes()["elapsed"] if name == "elapsed" else declared[name]
-        inner = ("station", *variable.dims[1:])
-        values = trace[order]
-        entry = variable.holding(values.reshape((*shape, *values.shape[1:])), (*lead, *inner))
-        dataset = dataset.assign_coords(elapsed=entry) if name == "elapsed" else dataset.assign({name: entry})
-    return dataset
+    dataset = dataset.assign_coords(rail_end=declared["rail_end"].holding(np.arange(most), ("rail_end",)))
+    return dataset.assign(rail_place=declared["rail_place"].holding(places))
