@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Keys of numbers that a variant may have to itself within one scene.
 OWN_KEYS = re.compile(
-    r"gravity|solver\.(steps|tolerance)|body\.\w+\.damping_ratio(\..+)?"
+    r"gravity|solver\.tolerance|body\.\w+\.damping_ratio(\..+)?"
     r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|inertia\.\d|height)|carriage\.\w+\.motion\.(?!cycles$).+"
     r"|load\.\w+\.(force|torque)(_per_metre)?\.\d|load\.\w+\.course\..+|spring\.\w+\.(stiffness|damping|length)"
     r"|frame\.\w+\.joints\.\d+\.(start|rate(\.\d)?|velocity\.\d|stiffness|damping|motion\..+)"

@@ -14,7 +14,7 @@ from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
-from engine.robots.results import beyond_rest, differences, outcome, results_of
+from engine.robots.results import beyond_rest, differences, outcome, results_of, without_values
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -175,7 +175,10 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     resting, status = rest(ladder.coarsest, ladder.level(Rung(0, 0)).times)
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), status)))
     steps = int(level.times.steps.sum())
-    return Converged(level.model, beyond_rest(now, record, resting, tolerance), error, steps, rung, whole)
+    reported = beyond_rest(now, record, resting, tolerance)
+    if not whole.values_kept:
+        reported = without_values(reported)
+    return Converged(level.model, reported, error, steps, rung, whole)
 
 
 def left(change: Array, before: Array, least: float) -> Array:

@@ -70,8 +70,6 @@ def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Out
         "rail_force_largest": record.grips[:, :, :, VERTICAL].max(axis=(0, 2)),
     }
     numbers |= {f"error_{name}": largest(np.where(phase == doing, size, np.nan)) for name, doing in DOING.items()}
-    if not status.values_kept:
-        numbers = {name: np.full_like(array, np.nan) for name, array in numbers.items()}
     return Outcome(numbers, times, planned, error, sunk, record.coordinates[:, : model.modes, 0], status)
 
 
@@ -80,11 +78,17 @@ def beyond_rest(found: Outcome, record: Record, resting: Record, tolerance: floa
     time that is within a tolerance of the largest error."""
     own, other = (one.robots[:, :, SEEN_ACTUAL : SEEN_ACTUAL + 3] for one in (record, resting))
     size, phase = np.linalg.norm(own - other, axis=2), record.robots[:, :, SEEN_PHASE]
-    lost = 1.0 if found.status.values_kept else np.nan
-    more = {f"beyond_rest_{name}": lost * largest(np.where(phase == k, size, np.nan)) for name, k in DOING.items()}
+    more = {f"beyond_rest_{name}": largest(np.where(phase == k, size, np.nan)) for name, k in DOING.items()}
     close = size <= tolerance * np.linalg.norm(found.error, axis=2).max(axis=0)
-    more["at_rest"] = lost * np.diff(found.times) @ close[1:] / np.ptp(found.times)
+    more["at_rest"] = np.diff(found.times) @ close[1:] / np.ptp(found.times)
     return replace(found, numbers=found.numbers | more)
+
+
+def without_values(found: Outcome) -> Outcome:
+    """The same of a variant that has no values, histories too."""
+    fields = ("planned", "error", "sunk", "coordinates")
+    nothing = {name: np.full_like(getattr(found, name), np.nan) for name in fields}
+    return replace(found, numbers={name: np.full_like(n, np.nan) for name, n in found.numbers.items()}, **nothing)
 
 
 def largest(sizes: Array) -> Array:

@@ -64,6 +64,7 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     from engine.floating.model import build
     from engine.scene.sweep import expand
 
+    _check_steps(study)
     cases = expand(study)
     model = build(study.without_sweep(), 2)
     check_memory(study, cases.size, 8 * cases.size * (len(results_names(model)) + 40))
@@ -79,6 +80,16 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
             compute = partial(_march, scene.study, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found
+
+
+def _check_steps(study: Study) -> None:
+    """Refuse a sweep of steps: histories have as many stations in all variants. Raises BadInput."""
+    from engine.scene.variants import STEPS
+
+    for name, axis in study.sweep.axes.items():
+        if STEPS in axis.of:
+            what, remedy = "variants of frames that move share their steps", "a study for each number of steps"
+            raise study.source.fault(f"sweep.{name}.of", what, received=STEPS, remedy=remedy)
 
 
 def remarks(study: Study, duration: float) -> Iterator[str]:

@@ -104,9 +104,10 @@ def _causes(results: Results) -> Iterator[str]:
     if "error_without" in dataset:
         for still in results.study.robot:
             left = dataset["error_without"].sel(still=still)
-            others = [name for name in results.study.robot if name != still]
-            told = ", ".join(f"{name} {quantity(float(left.sel(robot=name)), 'm')}" for name in others)
-            yield f"While {still} stands still, the largest errors of the others are: {told}."
+            errors = {name: float(left.sel(robot=name)) for name in results.study.robot if name != still}
+            told = ", ".join(f"{name} {quantity(error, 'm')}" for name, error in errors.items() if np.isfinite(error))
+            if told:
+                yield f"While {still} stands still, the largest errors of the others are: {told}."
 
 
 def _deflections(results: Results) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import studies
 from engine.scene.study import Study
@@ -159,6 +160,40 @@ def test_numbers_of_joints_may_be_swept() -> None:
     assert expand(study).size == 2
     tip = studies.run(study)["tip_max"]
     assert tip[1] > 1.5 * tip[0] > 0.0
+
+
+def spun_up(rates: list[float], steps: object = "auto", **more: object) -> xr.Dataset:
+    """An arm that is spun up to some rates."""
+    joint = REVOLUTE | {"motion": {"kind": "spin-up", "rate": 1.0, "time": 15.0}}
+    sweep = {"rate": {"of": "frame.arm.joints.0.motion.rate", "values": rates}} | more
+    return studies.run(
+        Study(
+            kind="moving-frames",
+            gravity=0.0,
+            body={"arm": ARM},
+            frame={"arm": {"joints": [joint], "stiffening": True}},
+            sensor={"tip": {"body": "arm", "at": 10.0}},
+            sweep=sweep,
+            solver={"steps": steps},
+            question={"duration": 20.0},
+        )
+    )
+
+
+@pytest.mark.fault(22)
+def test_a_variant_that_does_not_converge_is_so_alone() -> None:
+    """In a hundred steps Newton's method has no solution at one of two rates; the other's results stay as they are."""
+    both, alone = spun_up([1.0, 50.0], 100), spun_up([50.0], 100)
+    assert both["status"].values.tolist() == [Status.NOT_CONVERGED, Status.UNRESOLVED]
+    for name in ("tip_max", "tip", "end_place", "frame_rate"):
+        values = both[name].transpose("rate", ...).values
+        assert np.isnan(values[0]).all() and np.isfinite(values[1]).all(), name
+        assert values[1].tobytes() == alone[name].transpose("rate", ...).values[0].tobytes(), name
+
+
+def test_steps_are_those_of_all_variants() -> None:
+    with pytest.raises(BadInput, match=r"sweep\.count\.of.*share their steps"):
+        spun_up([1.0, 2.0], count={"of": "solver.steps", "values": [50, 100]})
 
 
 def test_numbers_of_joints_have_units() -> None:

@@ -50,6 +50,18 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
     assert (found["cycle_time"].diff("acceleration") < 0.0).all()
 
 
+@pytest.mark.fault(22)
+def test_a_variant_that_does_not_converge_has_no_values(found: Any) -> None:
+    """A payload of a million times its mass; the results and histories of the others stay."""
+    swept = {"payload": {"of": ["robot.portal.payload_scale"], "values": [0.0, 1e6, 2.0]}}
+    own = studies.run(scene(solver={"tolerance": 1e-2}, sweep=swept, question={"after": 0.5}))
+    assert own["status"].values.tolist() == [Status.OK, Status.NOT_CONVERGED, Status.OK]
+    for name in ("cycle_time", "error_largest", "at_rest", "tool_centre_point_error", "rail_deflection"):
+        values, others = own[name].values, found[name].sel(acceleration=1.0).values
+        assert np.isnan(values[1]).all() and np.isfinite(others).any(), name
+        assert values[[0, 2]].tobytes() == np.ascontiguousarray(others).tobytes(), name
+
+
 def test_statics_do_for_all_of_the_time_where_robots_crawl(found: Any) -> None:
     assert ((found["at_rest"] > 0.0) & (found["at_rest"] < 0.2)).all()
     crawling = {f"robot.{name}.{key}": 1e-3 for name in ("portal", "hanging") for key in SCALES}
