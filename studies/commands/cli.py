@@ -216,6 +216,24 @@ def export(archive: Path, file: Path, names: str) -> None:
 
 
 @commands.command()
+@click.argument("file", type=_FILE)
+@click.argument("tool", required=False)
+@click.option("--name", default="robot", show_default=True, help="NAME of the table.")
+@click.option("--turned", nargs=3, type=float, default=(0.0, 0.0, 0.0), metavar="X Y Z", help="Of its root, rad.")
+def arm(file: Path, tool: str | None, name: str, turned: tuple[float, float, float]) -> None:
+    """Print the table [arm.NAME] of a study file for the robot of a URDF FILE.
+
+    TOOL is the link whose origin is the tool centre point; the file may have one end alone without it.
+    """
+    import numpy as np
+
+    from engine.robots.urdf import table_of
+    from studies.commands import console
+
+    console.say(*table_of(file, tool, name, np.array(turned)).splitlines())
+
+
+@commands.command()
 def schema() -> None:
     """Print the JSON schema of study files, with which editors complete and check them."""
     from engine.scene.study import json_schema
