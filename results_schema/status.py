@@ -66,7 +66,8 @@ class Fidelity(IntEnum):
     MASS_WITHOUT_CONVECTIVE = 2
     MASS = 3
     TIED = 4
-    FRAME = 5
+    GIVEN_FRAME = 5
+    FRAME = 6
 
 
 class SchemeUsed(IntEnum):
@@ -96,7 +97,7 @@ def flag_meanings(flags: type[IntEnum]) -> str:
     """The CF attribute `flag_meanings`: one word each, in the order of `flag_values`.
 
     >>> flag_meanings(Fidelity)
-    'static force mass_without_convective mass tied frame'
+    'static force mass_without_convective mass tied given_frame frame'
     """
     return " ".join(flags(value).name.lower() for value in flag_values(flags))
 

@@ -18,11 +18,12 @@ from engine.kernels.floating.layout import Weights
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
-from results_schema.status import Status
+from results_schema.status import Fidelity, Status
 from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
+    from engine.floating.rung import Rung
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
@@ -52,14 +53,15 @@ class Level:
 @dataclass(frozen=True, eq=False)
 class Converged:
     """What V variants report: error (R, V) of every result, NaN where no estimate exists; modes, steps (V,) that each
-    took, all by one scheme; status (V,): that of the march, or whether what is held has no estimate or misses its
-    tolerance."""
+    took, all by one scheme and one model; status (V,): that of the march, or whether what is held has no estimate or
+    misses its tolerance."""
 
     outcome: Outcome
     error: Array
     modes: Counts
     steps: Counts
     scheme: NewmarkScheme | AlphaScheme
+    fidelity: Fidelity
     status: NDArray[np.int8]
 
 
@@ -117,10 +119,11 @@ def converge(
     values: VariantValues,
     duration: Array,
     longest: float,
+    rung: Rung,
     halted: Callable[[], bool] = lambda: False,
 ) -> Converged:
-    """March variants of one scene level by level; duration (V,) s, and the longest of all variants of the scene. Where
-    the study fixes the steps, these are marched, and twice as many to tell the error. Raises Halted."""
+    """March variants of one scene level by level; duration (V,) s, the longest of all variants of the scene, and its
+    model. Where the study fixes the steps, these are marched, and twice as many to tell the error. Raises Halted."""
     V = values.size
     found: Outcome | None = None
     active = np.arange(V)
@@ -128,7 +131,8 @@ def converge(
         if halted():
             raise Halted
         model, own = level.model, values.part(active)
-        now = outcome(model, march(model, own, duration[active], level.steps, _stations(level), weights(level.scheme)))
+        how = level.steps, stations(level), weights(level.scheme), rung.fidelity
+        now = outcome(model, march(model, own, duration[active], *how))
         if found is None:
             found, results, scheme = now, results_of(model), level.scheme
             error = np.full((len(results), V), np.nan)
@@ -136,11 +140,11 @@ def converge(
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
         apart = differences(model, _part(found, active), now)
-        told = left_over(apart, change[:, active])
+        told = left_over(apart, change[:, active]) + rung.left_out[:, None]
         error[:, active], change[:, active] = told, apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
-        held[active] = _worst(told, results, own)
+        held[active] = worst(told, results, own)
         failed = lost(now.status)
         hopeless = failed & (level.steps >= HOPELESS * coarsest)
         active = active[~(held[active] <= ENOUGH) & ~hopeless]
@@ -152,7 +156,7 @@ def converge(
     missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
     status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
     error[:, lost(found.status)] = np.nan
-    return Converged(found, error, modes, steps, scheme, gravest(status, found.status))
+    return Converged(found, error, modes, steps, scheme, rung.fidelity, gravest(status, found.status))
 
 
 def observed(
@@ -160,11 +164,13 @@ def observed(
     values: VariantValues,
     duration: Array,
     longest: float,
+    rung: Rung,
     halted: Callable[[], bool] = lambda: False,
 ) -> tuple[Array, Array]:
     """What `converge` reports beside one level beyond that of each variant: how far results are off, and the errors
-    told of them (R, V); NaN where there is no such level, or no values. Raises Halted."""
-    found = converge(study, values, duration, longest, halted)
+    told of them (R, V); NaN where there is no such level, or no values. The level beyond has the floating frame. Raises
+    Halted."""
+    found = converge(study, values, duration, longest, rung, halted)
     apart, left = np.full_like(found.error, np.nan), ~lost(found.status)
     for level in levels(study, longest):
         lanes = np.flatnonzero(left & (found.steps < level.steps))
@@ -172,7 +178,7 @@ def observed(
             raise Halted
         if lanes.size:
             beyond = march(
-                level.model, values.part(lanes), duration[lanes], level.steps, _stations(level), weights(level.scheme)
+                level.model, values.part(lanes), duration[lanes], level.steps, stations(level), weights(level.scheme)
             )
             apart[:, lanes] = differences(level.model, _part(found.outcome, lanes), outcome(level.model, beyond))
             left[lanes] = False
@@ -181,12 +187,12 @@ def observed(
     return np.where(np.isfinite(apart), apart, np.nan), found.error
 
 
-def _stations(level: Level) -> Counts:
-    """Stations at the same times on every level."""
+def stations(level: Level) -> Counts:
+    """(S,) stations at the same times on every level."""
     return np.arange(0, level.steps + 1, level.every, dtype=np.int64)
 
 
-def _worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> Array:
+def worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> Array:
     """(V,) the largest error of what is held over its tolerance; 0 where nothing is."""
     found = np.zeros(error.shape[1])
     for result, own in zip(results, error, strict=True):

@@ -15,7 +15,7 @@ from engine.kernels.floating.march import march as march_lanes
 from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
 from engine.kernels.layout import LANES
 from results_schema.arrays import Array, Counts
-from results_schema.status import Status
+from results_schema.status import Fidelity, Status
 from results_schema.statuses import gravest
 
 if TYPE_CHECKING:
@@ -39,9 +39,16 @@ class Marched:
 
 
 def march(
-    model: FloatingModel, values: VariantValues, duration: Array, steps: int, stations: Counts, scheme: Weights
+    model: FloatingModel,
+    values: VariantValues,
+    duration: Array,
+    steps: int,
+    stations: Counts,
+    scheme: Weights,
+    fidelity: Fidelity = Fidelity.FRAME,
 ) -> Marched:
-    """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending)."""
+    """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending); fidelity: what
+    `engine.floating.rung` chose."""
     V, h = values.size, duration / steps
     table = lanes(model, values, h)
     in_lanes = Lane(*map(in_blocks, table))
@@ -50,7 +57,8 @@ def march(
     statistics[:, :, layout.LARGEST], statistics[:, :, layout.SMALLEST] = -np.inf, np.inf
     history = np.full((shape[0], stations.size, shape[1], LANES), np.nan)
     codes, last = np.zeros((2, shape[0], LANES), dtype=np.int64)
-    march_lanes(model.system, in_lanes, scheme, steps, Record(np.asarray(stations), statistics, history, codes, last))
+    system = model.system._replace(given=fidelity == Fidelity.GIVEN_FRAME)
+    march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), statistics, history, codes, last))
     statistics, history, codes, last = (out_of_blocks(part, V) for part in (statistics, history, codes, last))
     # without gravity nothing lies on a track: it holds what moves on it
     heavy = table.gravity[:, 2] > 0.0

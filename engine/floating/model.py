@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 OF_DEPTH = 4  # signals of a body
+ROUNDING = 1e-13  # of a modal mass: modes that share less are orthogonal (beams of 24 modes leave 2e-14)
 
 
 @dataclass(frozen=True)
@@ -226,6 +227,9 @@ def _system(model: FloatingModel) -> System:
         np.arange(B, dtype=np.int64),
         _ends(model, n),
         *_readings(model),
+        np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
+        np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
+        False,
     )
 
 

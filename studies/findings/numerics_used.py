@@ -21,6 +21,7 @@ NAMES: Mapping[Fidelity, str] = {
     Fidelity.MASS_WITHOUT_CONVECTIVE: "moving mass without convective terms",
     Fidelity.MASS: "moving mass",
     Fidelity.TIED: "tied carriage",
+    Fidelity.GIVEN_FRAME: "given frame",
     Fidelity.FRAME: "floating frame",
 }
 

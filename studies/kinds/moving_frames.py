@@ -52,7 +52,7 @@ class MovingFrames(PiecedKind):
         if not study.body:
             raise fault("body", "there is no body", expected="a table [body.NAME]")
         if study.solver.fidelity not in ("auto", "full"):
-            raise fault("solver.fidelity", "frames that move have one model", expected='"auto"')
+            raise fault("solver.fidelity", "frames that move have no such model", expected='"auto" or "full"')
         if study.output.histories not in ("auto", "all", "none"):
             what = "histories of frames that move are kept at some 800 times"
             raise fault("output.histories", what, expected='"auto", "all" variants or "none"')

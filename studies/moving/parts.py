@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from engine.floating.converge import Converged
     from engine.floating.model import FloatingModel
+    from engine.floating.rung import Rung
     from engine.scene.study import Study
     from engine.scene.sweep import Cases
 
@@ -77,7 +78,7 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
         for first in range(0, scene.variants.size, size):
             own = scene.variants[first : first + size]
             words = f"{own.size:,} variants over {longest:.4g} s"
-            compute = partial(_march, scene.study, cases, own, duration, longest)
+            compute = partial(_march, scene, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found
 
@@ -122,8 +123,20 @@ def results_names(model: FloatingModel) -> list[str]:
     return [result.name for result in results_of(model)]
 
 
+def _rung(scene: Scene, cases: Cases, duration: Callable[[Mapping[str, Array], int], Array], longest: float) -> Rung:
+    """The model of a scene, by pilots all over it, whichever of its variants are marched."""
+    from engine.floating.rung import PILOTS, choose
+    from engine.scene.variants import VariantValues
+
+    pilots = scene.variants[spread(scene.variants.size, PILOTS)]
+    columns = cases.columns_of(pilots)
+    return choose(
+        scene.study, VariantValues(scene.study, columns, pilots.size), duration(columns, pilots.size), longest
+    )
+
+
 def _march(
-    study: Study,
+    scene: Scene,
     cases: Cases,
     variants: Counts,
     duration: Callable[[Mapping[str, Array], int], Array],
@@ -138,6 +151,7 @@ def _march(
     from engine.kernels.layout import LANES
     from engine.scene.variants import VariantValues
 
+    study, rung = scene.study, _rung(scene, cases, duration, longest)
     model = build(study, 2)
     kept = shown(study, cases.size)
     found: dict[int, dict[str, NDArray[Any]]] = {}
@@ -147,7 +161,7 @@ def _march(
         own = variants[first : first + at_once]
         columns = cases.columns_of(own)
         values = VariantValues(study, columns, own.size)
-        converged = converge(study, values, duration(columns, own.size), longest, work.halted)
+        converged = converge(study, values, duration(columns, own.size), longest, rung, work.halted)
         found[first] = _arrays(model, converged, np.flatnonzero(np.isin(own, kept)), own)
 
     run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
@@ -171,7 +185,8 @@ def again(
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
         columns = cases.columns_of(own)
         values = VariantValues(scene.study, columns, own.size)
-        apart, told = observed(scene.study, values, duration(columns, own.size), longest, work.halted)
+        rung = _rung(scene, cases, duration, longest)
+        apart, told = observed(scene.study, values, duration(columns, own.size), longest, rung, work.halted)
         for lane, variant in enumerate(own.tolist()):
             known = bool(np.isfinite(apart[:, lane]).any())
             found[variant] = (apart[:, lane], told[:, lane]) if known else None
@@ -194,6 +209,7 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
         "status": converged.status,
         "modes_used": converged.modes,
         "steps_used": converged.steps,
+        "fidelity_used": np.full(own.size, int(converged.fidelity), dtype=np.int8),
         "scheme_used": np.full(own.size, int(number_of(converged.scheme)), dtype=np.int8),
         "estimated_error": np.ascontiguousarray(converged.error.T, dtype=np.float32),
     }

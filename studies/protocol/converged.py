@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
 from results_schema.late import xr
-from results_schema.status import Fidelity
 from results_schema.variable import Variable
 from results_schema.variables import axes
 from studies.protocol.parts import usual
@@ -34,14 +33,14 @@ class Told(NamedTuple):
 
 def labelled(pieces: Sequence[xr.Dataset], told: Told) -> xr.Dataset:
     """All pieces in one. Each has `number` and `kept`, the flat numbers of its variants and of those with histories;
-    `status`, `modes_used`, `steps_used`, `estimated_error` and other results, the variants first."""
+    `status`, `fidelity_used`, `modes_used`, `steps_used`, `estimated_error` and other results, the variants first."""
     cases, declared = told.cases, told.declared
     rows = _joined(pieces)
     order, kept = np.argsort(rows.pop("number")), rows.pop("kept")
     histories = {name.removeprefix(HISTORY): rows.pop(name) for name in list(rows) if name.startswith(HISTORY)}
     rows = {name: rows[name][order] for name in list(rows)}
     dataset = _empty(told)
-    used = {"status": rows.pop("status"), "fidelity": np.full(cases.size, int(Fidelity.FRAME))}
+    used = {"status": rows.pop("status"), "fidelity": rows.pop("fidelity_used")}
     used |= {"modes": rows.pop("modes_used"), "steps": rows.pop("steps_used")}
     for name, entry in usual(cases.dims, **{key: part.reshape(cases.shape) for key, part in used.items()}).items():
         dataset[name] = entry

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
+from results_schema.status import Fidelity
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Work, unlabelled
 
@@ -99,6 +100,7 @@ def again(study: Study, question: Question, variants: Counts, work: Work) -> dic
 def _numbers(converged: Converged) -> dict[str, NDArray[Any]]:
     numbers = converged.outcome.numbers | {
         "status": np.int8(converged.status),
+        "fidelity_used": np.int8(Fidelity.FRAME),
         "steps_used": np.int32(converged.steps),
         "modes_used": np.int32(converged.model.modes),
         "estimated_error": converged.error.astype(np.float32),

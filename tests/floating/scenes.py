@@ -93,3 +93,50 @@ def mutated(module: ModuleType, old: str, new: str) -> ModuleType:
     found = ModuleType("mutated")
     exec(compile(source.replace(old, new), "mutated", "exec"), found.__dict__)
     return found
+
+
+def given_arm(scale: float = 1.0, curved: bool = False) -> Study:
+    """An arm in space on two driven joints, with a mass and an oscillator on given ways, and loads; curved: with
+    stiffening, a mode along it and torques. scale: of all motions and loads, without gravity where not 1."""
+    swing = {"kind": "swing", "amplitude": 0.3 * scale, "frequency": 0.7}
+    shake = {"kind": "swing", "amplitude": 0.05 * scale, "frequency": 1.3}
+    push = {"on": "arm", "force": [3.0 * scale, 2.0 * scale, -4.0 * scale], "axes": "body"}
+    torque = {"torque": [30.0 * scale, -60.0 * scale, -70.0 * scale]} if curved else {}
+    ways = (
+        {"kind": "waypoints", "times": [0, 1, 2], "positions": [1, 6, 3]},
+        {"kind": "waypoints", "times": [0, 2], "positions": [2, 8]},
+    )
+    return Study(
+        kind="moving-frames",
+        gravity=9.81 if scale == 1.0 else 0.0,
+        body={"arm": ARM | {"own_weight": True, "modes": 3, "damping_ratio": 0.01, "second_moment": 2e-6}},
+        frame={
+            "arm": {
+                "lateral_second_moment": 3e-6,
+                "lateral_modes": 2,
+                "axial_modes": int(curved),
+                "stiffening": curved,
+                "turned": [0.1, -0.2, 0.3],
+                "position": [0.1, 0.2, 0.3],
+                "joints": [
+                    {"kind": "revolute", "axis": [0.2, 1.0, 0.3], "motion": swing},
+                    {"kind": "prismatic", "axis": [0.3, 0.1, 1.0], "motion": shake},
+                ],
+            }
+        },
+        carriage={
+            "load": {"kind": "mass", "on": "arm", "mass": 2.0, "motion": ways[0]},
+            "cart": {
+                "kind": "oscillator",
+                "on": "arm",
+                "mass": 1.5,
+                "wheel_mass": 0.2,
+                "stiffness": 300.0,
+                "damping": 4.0,
+                "motion": ways[1],
+            },
+        },
+        load={"wind": {"on": "arm", "between": [2, 8], "force_per_metre": [0, 0.2 * scale, 0]}, "push": push | torque},
+        sensor={"tip": {"body": "arm", "at": 10.0}},
+        question={"duration": 2.0},
+    )

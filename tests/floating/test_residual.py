@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tests.floating import loads_twin, residual_twin, stiffening_twin, tangent_twin
+from tests.floating import given_twin, loads_twin, residual_twin, stiffening_twin, tangent_twin
 from tests.readme import README
 
 TERMS = {
@@ -17,6 +17,7 @@ TERMS = {
     "loads_twin": loads_twin.TERMS,
     "stiffening_twin": stiffening_twin.TERMS | stiffening_twin.OF_LOADS,
     "tangent_twin": tangent_twin.TERMS,
+    "given_twin": given_twin.TERMS | given_twin.LINEARISED,
 }
 
 

@@ -117,7 +117,7 @@ TOP = {"position": [0, 0, 1]}
         ({"initial": "equilibrium"}, "start undeformed"),
         ({"question": {}}, r"question\.duration"),
         ({"output": {"histories": {"every": 3}}}, "some 800 times"),
-        ({"solver": {"scheme": "central-difference", "fidelity": "force"}}, "have one model"),
+        ({"solver": {"scheme": "central-difference", "fidelity": "force"}}, "have no such model"),
         ({"carriage": {"load": LOAD | {"kind": "force", "force": 1.0, "mass": None}}}, "mass"),
         ({"carriage": {"load": LOAD | {"delay": 1.0}}}, "set off at time 0"),
         ({"carriage": {"load": LOAD | {"motion": {"kind": "free", "start": 20.0}}}}, "starts on its body"),

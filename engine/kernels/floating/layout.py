@@ -62,6 +62,9 @@ class System(NamedTuple):
     the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations.
+    leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
+    that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
+    iteration.
     """
 
     tree: IntArray
@@ -84,6 +87,9 @@ class System(NamedTuple):
     points: FloatArray
     readings: FloatArray
     read_under: IntArray
+    leans: BoolArray
+    pairing: IntArray
+    given: bool
 
 
 class Coordinates(NamedTuple):

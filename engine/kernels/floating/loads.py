@@ -39,6 +39,15 @@ from engine.kernels.vector import choose, lanes_at, root
 @called
 def load_forces(system, lane, q, x, work, out):
     """A force and a torque at a grip, as they are at this time."""
+    p = system.load_table[q, GRIP]
+    f, about = load_at(system, lane, q, work)
+    push(system, p, f, x, work, out)
+    twist(system, p, about, x, work, out)
+
+
+@called
+def load_at(system, lane, q, work):
+    """The force and the torque of a load as they are at this time, in the axes of its body."""
     p, m = system.load_table[q, GRIP], system.load_table[q, COURSE]
     f, about = vector(lane.loads, q, 0), vector(lane.loads, q, 3)
     if not system.load_table[q, IN_BODY]:
@@ -47,8 +56,7 @@ def load_forces(system, lane, q, x, work, out):
     if m >= 0:
         factor = lanes_at(work.motions, (m, 0))
         f, about = times(factor, f), times(factor, about)
-    push(system, p, f, x, work, out)
-    twist(system, p, about, x, work, out)
+    return f, about
 
 
 @called

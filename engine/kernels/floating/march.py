@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.kernels.floating.equations import follow_frame, residual
+from engine.kernels.floating.given import step_given
 from engine.kernels.floating.layout import (
     COORDINATE,
     DIVERGED,
@@ -35,8 +36,30 @@ from engine.kernels.floating.layout import (
 )
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.observe import observe, observe_whole
+from engine.kernels.floating.state import (
+    CODE,
+    DONE,
+    EVENT,
+    FRESH,
+    LAST,
+    MEMORY,
+    SCALE,
+    TIME,
+    Solver,
+    State,
+    advance,
+    factor,
+    going_on,
+    of,
+    or_one,
+    put_where,
+    size_of,
+    solve,
+    sound,
+    take,
+)
 from engine.kernels.floating.vectors import after, dot, keep_matrix, matrix, rotation
-from engine.kernels.floating.work import Work, room, three_at
+from engine.kernels.floating.work import room, three_at
 from engine.kernels.jit import called, kernel, piece
 from engine.kernels.layout import LANES, FloatArray
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
@@ -55,56 +78,12 @@ NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
 
 
-class State(NamedTuple):
-    """A block of lanes under way: where it is, and where it is tried to be at the end of the step; all (N, LANES):
-    accelerations of generalized-alpha, those of the step before, the residual, and how heavy each coordinate is,
-    kg^(1/2) or alike."""
-
-    now: Coordinates
-    tried: Coordinates
-    inner: FloatArray
-    before: FloatArray
-    earlier: FloatArray
-    residual: FloatArray
-    weight: FloatArray
-
-
-class Solver(NamedTuple):
-    """Factors of the tangents (N, N, LANES) that are in use and of new ones; motions before and after an event; how it
-    goes with each lane, (MEMORY, LANES): see the rows below."""
-
-    work: Work
-    other: FloatArray
-    matrix: FloatArray
-    fresh: FloatArray
-    before: FloatArray
-    after: FloatArray
-    memory: FloatArray
-
-
 class Room(NamedTuple):
     """What the march of a block of lanes works in; signals (signals, LANES)."""
 
     state: State
     solver: Solver
     signals: FloatArray
-
-
-# rows of Solver.memory: largest weighted acceleration so far, 1 where the tangent is of use, the last correction, 1
-# where the lane's iteration has ended, its code; time at which the lane stands, and the time of its next event
-SCALE, FRESH, LAST, DONE, CODE, TIME, EVENT, MEMORY = 0, 1, 2, 3, 4, 5, 6, 7
-
-
-@called
-def of(memory, row):
-    """A row of the memory."""
-    return lanes_at(memory, (row,))
-
-
-@called
-def put_where(who, table, index, value):
-    """Store a row in some lanes."""
-    put_lanes(table, index, choose(who, value, lanes_at(table, index)))
 
 
 @called
@@ -126,39 +105,6 @@ def tangent(system, lane, state, of_y, of_u, solver):
         put_lanes(x.y, (k,), y)
         put_lanes(x.u, (k,), u)
         put_lanes(x.a, (k,), a)
-
-
-@called
-def factor(M):
-    """LU factors of matrices in their place, without exchanges, as masses lead; 1 in the lanes where they are
-    regular, else 0."""
-    N, regular = M.shape[0], all_lanes(1.0)
-    for k in range(N):
-        pivot = lanes_at(M, (k, k))
-        regular = choose(pivot * pivot > 0.0, regular, 0.0)
-        for i in range(k + 1, N):
-            part = lanes_at(M, (i, k)) / pivot
-            put_lanes(M, (i, k), part)
-            for j in range(k + 1, N):
-                put_lanes(M, (i, j), lanes_at(M, (i, j)) - part * lanes_at(M, (k, j)))
-    return regular
-
-
-@called
-def solve(M, x):
-    """x (N, LANES) by the factors, in its place."""
-    N = M.shape[0]
-    for k in range(1, N):
-        found = lanes_at(x, (k,))
-        for j in range(k):
-            found = found - lanes_at(M, (k, j)) * lanes_at(x, (j,))
-        put_lanes(x, (k,), found)
-    for back in range(N):
-        k = N - 1 - back
-        found = lanes_at(x, (k,))
-        for j in range(k + 1, N):
-            found = found - lanes_at(M, (k, j)) * lanes_at(x, (j,))
-        put_lanes(x, (k,), found / lanes_at(M, (k, k)))
 
 
 @called
@@ -260,40 +206,6 @@ def turn_bases(joints, base, y):
 
 
 @called
-def advance(state, scheme, h):
-    """Coordinates and velocities by the accelerations that are tried: Newmark's formulas with those of
-    generalized-alpha, (1 - m) inner_new + m inner = (1 - f) a_new + f a."""
-    beta, gamma = scheme.beta, scheme.gamma
-    x, new = state.now, state.tried
-    for k in range(state.inner.shape[0]):
-        own, inner, u = inner_of(state, scheme, k), lanes_at(state.inner, (k,)), lanes_at(x.u, (k,))
-        put_lanes(new.y, (k,), lanes_at(x.y, (k,)) + h * u + h * h * ((0.5 - beta) * inner + beta * own))
-        put_lanes(new.u, (k,), u + h * ((1.0 - gamma) * inner + gamma * own))
-
-
-@called
-def inner_of(state, scheme, k):
-    """The acceleration of generalized-alpha that follows from the one that is tried."""
-    m, f = scheme.alpha_m, scheme.alpha_f
-    new, old, inner = lanes_at(state.tried.a, (k,)), lanes_at(state.now.a, (k,)), lanes_at(state.inner, (k,))
-    return ((1.0 - f) * new + f * old - m * inner) / (1.0 - m)
-
-
-@called
-def take(who, state, scheme):
-    """What is tried becomes the state of some lanes."""
-    x, new = state.now, state.tried
-    for k in range(state.inner.shape[0]):
-        own = inner_of(state, scheme, k)
-        put_where(who, x.y, (k,), lanes_at(new.y, (k,)))
-        put_where(who, x.u, (k,), lanes_at(new.u, (k,)))
-        put_where(who, state.earlier, (k,), lanes_at(state.before, (k,)))
-        put_where(who, state.before, (k,), lanes_at(x.a, (k,)))
-        put_where(who, x.a, (k,), lanes_at(new.a, (k,)))
-        put_where(who, state.inner, (k,), own)
-
-
-@called
 def correct(who, state, solver):
     """One correction of the accelerations of some lanes; its size over the largest so far."""
     solve(solver.matrix, state.residual)
@@ -307,18 +219,6 @@ def correct(who, state, solver):
         change = change + (weight * by) * (weight * by)
     put_lanes(solver.memory, (SCALE,), scale)
     return root(change) / or_one(scale)
-
-
-@called
-def size_of(row):
-    """Without sign."""
-    return choose(row < 0.0, -1.0 * row, row)
-
-
-@called
-def or_one(row):
-    """1 where it is 0."""
-    return choose(row > 0.0, row, 1.0)
 
 
 @called
@@ -362,8 +262,7 @@ def step(system, lane, scheme, who, h, state, solver):
     memory = solver.memory
     put_lanes(memory, (DONE,), choose(who, all_lanes(0.0), 1.0))
     for k in range(state.before.shape[0]):
-        now, before, earlier = lanes_at(state.now.a, (k,)), lanes_at(state.before, (k,)), lanes_at(state.earlier, (k,))
-        put_lanes(state.tried.a, (k,), 3.0 * (now - before) + earlier)
+        put_lanes(state.tried.a, (k,), going_on(state, k))
     put_lanes(memory, (LAST,), all_lanes(np.inf))
     for _ in range(MOST_ITERATIONS):
         advance(state, scheme, h)
@@ -380,12 +279,6 @@ def step(system, lane, scheme, who, h, state, solver):
 
 
 @called
-def sound(memory):
-    """Lanes with which nothing has happened."""
-    return of(memory, CODE) < SOUND + 0.5
-
-
-@called
 def go_on(system, lane, scheme, who, end, state, solver):
     """Some lanes, those that are sound, go to another time (s) without an event between."""
     memory = solver.memory
@@ -393,7 +286,11 @@ def go_on(system, lane, scheme, who, end, state, solver):
     end = choose(goes, end, start)
     middle = choose(goes, 0.5 * (start + end), start - 2.0 * near_of(lane))
     motions_at(lane.motions, end, middle, solver.work.piece, solver.work.motions)
-    step(system, lane, scheme, goes, end - start, state, solver)
+    if system.given:
+        regular = step_given(system, lane, scheme, end - start, state, solver)
+        put_where(goes & (regular < 0.5), memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    else:
+        step(system, lane, scheme, goes, end - start, state, solver)
     arrived = goes & sound(memory)
     take(arrived, state, scheme)
     put_where(arrived, memory, (TIME,), end)

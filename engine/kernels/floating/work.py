@@ -19,13 +19,17 @@ HANGING_PLACE, HANGING, HANGING_TURNED, FRAME = 30, 33, 36, 45
 JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
 # columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
 CONTACT, TOUCHED, CONTACTS = 0, 3, 6
+# columns of Work.turning: of a frame that is given, what rates and values of a place do to its acceleration, and both
+# with the acceleration itself, at the end of a step
+RATES, VALUES, WHOLE, TURNING = 0, 9, 18, 27
 
 
 class Work(NamedTuple):
     """Room for a block of lanes, the last axis of each, of frames (B, FRAME), joints (J, JOINT), contacts (C,
     CONTACTS), modes at a place (n, AT_PLACE) and first moments of a body's modes (n, 9); the motions (M, 3) as given
     now: value, rate and acceleration; base (J, 9): attitudes of spherical joints at the start of the step; cells, and
-    gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion."""
+    gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion; turning (B, TURNING), and
+    implied (C (n + 1), 3): what each mode and the sprung mass add to the acceleration at a contact."""
 
     frames: FloatArray
     joints: FloatArray
@@ -37,6 +41,8 @@ class Work(NamedTuple):
     cells: IntArray
     gathered: FloatArray
     piece: FloatArray
+    turning: FloatArray
+    implied: FloatArray
 
 
 @piece
@@ -56,6 +62,8 @@ def room(system, lane):
         np.zeros(LANES, np.int64),
         np.zeros((GATHERED, LANES)),
         np.zeros((PIECE + 1, LANES)),
+        np.zeros((system.tree.shape[0], TURNING, LANES)),
+        np.zeros((system.riders.shape[0] * (widest + 1), 3, LANES)),
     )
 
 

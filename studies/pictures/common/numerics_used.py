@@ -27,6 +27,7 @@ COLOURS = {
     Fidelity.MASS_WITHOUT_CONVECTIVE: look.GREEN,
     Fidelity.MASS: look.BLUE,
     Fidelity.TIED: look.PURPLE,
+    Fidelity.GIVEN_FRAME: look.VERMILION,
     Fidelity.FRAME: look.ORANGE,
 }
 NOUNS = {MODEL: "model", MODES: "modes", STEPS: "steps"}

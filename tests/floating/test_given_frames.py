@@ -1,0 +1,67 @@
+"""Frames that are given in time, whose steps are linear equations, beside the floating frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import studies
+from engine.floating.march import march
+from engine.floating.model import build
+from engine.kernels.floating.layout import Weights
+from engine.scene.study import Study
+from engine.scene.variants import VariantValues
+from results_schema.status import Fidelity
+from tests.floating.scenes import FOX_GOODWIN, given_arm
+
+ALPHA = Weights(0.3025, 0.6, -0.1 / 1.1, 0.0)  # of generalized-alpha
+
+
+def apart(study: Study, scheme: Weights = FOX_GOODWIN) -> tuple[np.ndarray, np.ndarray]:
+    """Largest differences of all signals over 2 s, and their largest values; by a common step."""
+    model, count = build(study), 2000
+    stations, values = np.arange(0, count + 1, 5), VariantValues(study, {}, 1)
+    given, full = (
+        march(model, values, np.array([2.0]), count, stations, scheme, fidelity).history[0]
+        for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME)
+    )
+    return np.abs(given - full).max(axis=0), np.abs(full).max(axis=0)
+
+
+@pytest.mark.parametrize("scheme", [FOX_GOODWIN, ALPHA], ids=["fox-goodwin", "generalized-alpha"])
+@pytest.mark.parametrize("scale", [0.01, 1.0])
+def test_frames_that_are_given_are_those_that_float(scale: float, scheme: Weights) -> None:
+    """Small and large motion of an arm in space with a mass, an oscillator and loads: all signals to 1e-6."""
+    gap, largest = apart(given_arm(scale), scheme)
+    assert (largest > 0.0).sum() > 40
+    assert (gap <= 1e-6 * largest).all()
+
+
+def test_what_is_linearised_differs_in_second_order() -> None:
+    """Stiffening by axial forces of the arm's own vibration, and torques that turn, of the tip's deflection: order 2 of
+    the motion, and below 1e-6 where that is small."""
+    found = []
+    for scale in (0.16, 0.08, 0.04, 0.02):
+        gap, largest = apart(given_arm(scale, curved=True))
+        found.append(gap[0] / largest[0])
+    assert np.log2(np.array(found[:-1]) / found[1:]) == pytest.approx(2.0, abs=0.1)
+    assert found[-1] < 1e-6
+
+
+def test_the_model_is_measured() -> None:
+    """Pilots of the scene choose: the same arm within 1e-3 by frames that are given, which the told error covers, and
+    within 1e-9 by the floating frame; so where that is asked for, or a joint moves by itself."""
+    sweep = {"mass": {"of": "carriage.load.mass", "values": [0.5, 2.0]}}
+    data = {key: value for key, value in given_arm(0.16, curved=True).data.items() if key != "schema_version"}
+    study = Study(**(data | {"sweep": sweep, "solver": {"steps": 1000}}))
+    given = studies.run(study)
+    assert (given["fidelity_used"] == Fidelity.GIVEN_FRAME).all()
+    full = studies.run(study.with_values({"solver.fidelity": "full"}))
+    assert (full["fidelity_used"] == Fidelity.FRAME).all()
+    gap = np.abs(given["tip_max"] - full["tip_max"]) / np.abs(full["tip_max"])
+    told = given["estimated_error"] - full["estimated_error"]
+    assert (gap > 0.0).all() and (gap <= told.sel(result="tip_max") + 1e-6).all()
+    fine = studies.run(study.with_values({"solver.tolerance": 1e-9}))
+    assert fine["tip_max"].equals(full["tip_max"])
+    hinged = study.with_values({"frame.arm.joints.0": {"kind": "revolute", "axis": [0.2, 1.0, 0.3]}})
+    assert (studies.run(hinged)["fidelity_used"] == Fidelity.FRAME).all()
