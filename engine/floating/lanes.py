@@ -154,7 +154,7 @@ def _motions(model: FloatingModel, numbers: Numbers) -> Array:
 def _events(motions: Array) -> Array:
     """(V, E) times at which a motion goes on as another piece."""
     starts = np.sort(motions[:, :, 1:, START].reshape(len(motions), -1), axis=1)
-    again = np.concatenate([np.zeros((len(motions), 1), dtype=bool), np.diff(starts, axis=1) == 0.0], axis=1)
+    again = np.concatenate([np.zeros((len(motions), 1), dtype=bool), starts[:, 1:] == starts[:, :-1]], axis=1)
     return np.sort(np.where(again[:, : starts.shape[1]], np.inf, starts), axis=1)
 
 
