@@ -6,17 +6,21 @@ cut off in a `.cdb`, so that its lines are looked at here first.
 
 from __future__ import annotations
 
+import json
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from engine.bodies.files.ansys_results import recovery_along
 from engine.bodies.files.model import Array, Counts, FileModel, checked, hashes_of, turned
 from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import Line, file_bytes, read_lines, read_paths, real, whole, written
+from engine.bodies.files.track import line_as_told
 from results_schema.errors import BadInput
 from results_schema.late import sparse
 
@@ -29,7 +33,8 @@ _FREEDOMS = 6
 
 
 def read_ansys(files: Mapping[str, str], options: Mapping[str, Any]) -> FileModel:
-    """A model from its files: full, nodes. Raises BadInput."""
+    """A model from its files: full, nodes, and results if they are given, of which stress and strain are read in a
+    ``component`` at the nodes of a ``track``, told as JSON. Raises BadInput."""
     numbers, places, turns, read = _nodes(files["nodes"])
     owner_number, direction, held, stiffness, mass = _matrices(files["full"])
     known = {int(number): place for place, number in enumerate(numbers)}
@@ -41,8 +46,19 @@ def read_ansys(files: Mapping[str, str], options: Mapping[str, Any]) -> FileMode
         what = "a degree of freedom other than displacements and rotations"
         raise BadInput(what, where=files["full"], received=f"number {int(direction.max())}")
     owner = np.array([known[int(number)] for number in owner_number], dtype=np.int64)
-    model = FileModel(stiffness, mass, numbers, places, owner, direction, held, hashes_of(files["full"], *read))
-    return checked(turned(model, turns, files["full"]), files["full"])
+    results = [files["results"]] if "component" in options else []
+    for path in results:
+        file_bytes(path)
+    hashes = hashes_of(files["full"], *read, *results)
+    model = FileModel(stiffness, mass, numbers, places, owner, direction, held, hashes)
+    model = checked(turned(model, turns, files["full"]), files["full"])
+    for path in results:
+        try:
+            line = line_as_told(numbers, places, json.loads(str(options["track"])))
+        except BadInput:
+            break  # the study refuses its track itself, with its key
+        model = replace(model, recovery=recovery_along(model, path, line, str(options["component"])))
+    return model
 
 
 def _nodes(path: str) -> tuple[Counts, Array, Array, list[str]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,15 @@ class NodeLine:
     def length(self) -> float:
         """Of the track, m."""
         return float(self.places[-1])
+
+
+def line_as_told(numbers: Counts, places: Array, track: Mapping[str, Any]) -> NodeLine:
+    """The track by the words of a study: nodes in their order, or all of them near a line. Raises BadInput with the key
+    within the track as its place."""
+    places, tolerance = places * track["length_unit"], track["tolerance"]
+    if track["nodes"] is not None:
+        return line_of_nodes(numbers, places, tuple(track["nodes"]), tolerance)
+    return line_between(numbers, places, (np.array(track["start"]), np.array(track["end"])), tolerance)
 
 
 def line_of_nodes(numbers: Counts, places: Array, wanted: tuple[int, ...], tolerance: float | None) -> NodeLine:

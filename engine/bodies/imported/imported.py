@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import re
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, Strict, ValidationInfo, model_validator
 
+from engine.bodies.files.ansys_results import COMPONENTS
 from engine.bodies.files.model import Counts, FileModel
 from engine.bodies.files.reader import Request, read_files, role_of
-from engine.bodies.files.track import NodeLine, line_between, line_of_nodes
+from engine.bodies.files.track import NodeLine, line_as_told
 from engine.bodies.frame.frame import Place, Support, Vector
 from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
@@ -111,11 +113,13 @@ class Imported(Body):
     @cached_property
     def line(self) -> NodeLine:
         """The track's nodes and places, m. Raises BadInput with the key within the track."""
-        places = self.model.places * self.length_unit
-        if self.track.nodes is not None:
-            return line_of_nodes(self.model.nodes, places, self.track.nodes, self.track.tolerance)
-        ends = np.array(self.track.start), np.array(self.track.end)
-        return line_between(self.model.nodes, places, ends, self.track.tolerance)
+        return line_as_told(self.model.nodes, self.model.places, self.told_track)
+
+    @property
+    def told_track(self) -> dict[str, Any]:
+        """What the line of nodes follows from, in plain words."""
+        told = self.track.model_dump(include={"nodes", "start", "end", "tolerance"})
+        return told | {"length_unit": self.length_unit}
 
     @property
     def length(self) -> float:
@@ -314,17 +318,40 @@ class Matrices(Recovering):
 
 
 class Ansys(Imported):
-    """A body of ANSYS. full: the `.full` file with stiffness and mass; nodes: a `.cdb` or `.rst` file."""
+    """A body of ANSYS. full: the `.full` file with stiffness and mass; nodes: a `.cdb` or `.rst` file.
 
-    roles: ClassVar[tuple[str, ...]] = ("full", "nodes")
+    results: the `.rst` file of a modal analysis of the same model with element results; component: of its stresses and
+    strains, which sensors read.
+    """
+
+    roles: ClassVar[tuple[str, ...]] = ("full", "nodes", "results")
 
     kind: Literal["ansys"]
     full: FilePath
     nodes: FilePath
+    results: FilePath | None = None
+    component: Annotated[str, AfterValidator(one_of(*COMPONENTS))] | None = None
 
     @property
     def request(self) -> Request:
-        return Request("ansys", tuple(self.files.items()))
+        files = tuple(self.files.items())
+        if self.results is None or self.component is None:
+            return Request("ansys", files)
+        return Request("ansys", files, (("component", self.component), ("track", json.dumps(self.told_track))))
+
+    @property
+    def recovered(self) -> Mapping[str, RowsOfNodes]:
+        if self.results is None:
+            return {}
+        count = len(self.line.nodes) if self.recorded is None else 0
+        return {word: tuple((q * count + t + 1,) for t in range(count)) for q, word in enumerate(("stress", "strain"))}
+
+    @model_validator(mode="after")
+    def _component_of_results(self) -> Ansys:
+        if (self.results is None) != (self.component is None):
+            key = "results" if self.results is None else "component"
+            refuse((key,), "this key is missing", expected="results and component together, or none of them")
+        return self
 
 
 class Nastran(Recovering):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
-from scipy.sparse import triu
+from scipy.sparse import csc_array, triu
 from scipy.sparse.linalg import spsolve
 
 import engine
 from engine.bodies.build import build_body
+from engine.bodies.files.ansys_results import recovery_along
+from engine.bodies.files.model import FileModel
+from engine.bodies.files.track import line_between
 from engine.bodies.imported.imported import Ansys
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
@@ -141,3 +145,74 @@ def test_damaged_nodes(tmp_path: Path) -> None:
     head = [line.replace("321,       321", "320,       320") for line in text]
     path.write_text("".join([*head[:100], *head[101:]]), encoding="utf-8")
     assert "node 65 of" in words_of(TABLE | {"nodes": str(path)})
+
+
+RESULTS = {"results": str(EXAMPLES / "file.rst"), "component": "z"}
+
+
+@pytest.fixture(scope="module")
+def results() -> Any:
+    """Six modes of the same beam, free of supports, with their element results."""
+    return optional("ansys.mapdl.reader").read_binary(RESULTS["results"])
+
+
+@pytest.fixture(scope="module")
+def model(results: Any) -> FileModel:
+    """Matrices whose modes are those of the results, all other motions faster: M = P^T P + I - F P and
+    K = M F diag(omega^2) F^T M + c (I - F P), F the shapes and P their pseudoinverse, made symmetric."""
+    shapes = np.array([results.nodal_solution(k)[1].reshape(-1) for k in range(6)]).T
+    inverse, count = np.linalg.pinv(shapes), len(shapes)
+    others, squares = np.eye(count) - shapes @ inverse, (2.0 * np.pi * np.asarray(results.time_values)) ** 2
+    mass = inverse.T @ inverse + others
+    stiffness = mass @ shapes * squares @ shapes.T @ mass + 1e3 * squares.max() * others
+    owner, direction = np.divmod(np.arange(count), 3)
+    matrices = (csc_array(0.5 * (one + one.T)) for one in (stiffness, mass))
+    nodes, places = np.array(results.mesh.nnum, dtype=np.int64), np.array(results.mesh.nodes)
+    return FileModel(*matrices, nodes, places, owner, direction, np.zeros(count, dtype=bool))
+
+
+def test_stress_of_the_modes_is_that_of_the_elements(
+    results: Any, model: FileModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the file has them at the corners of elements, midway between two corners their mean. Twin modes may turn."""
+    line = line_between(model.nodes, model.places, (np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 5.0])), None)
+    recovery = recovery_along(model, RESULTS["results"], line, "z")
+    monkeypatch.setattr("engine.bodies.imported.imported.read_files", lambda _: replace(model, recovery=recovery))
+    found = build_body(Ansys.model_validate(TABLE | RESULTS))
+    assert found.sections is not None
+    numbers = model.nodes[line.nodes]
+    for quantity, read in (("stress", results.nodal_stress), ("strain", results.nodal_elastic_strain)):
+        wanted = np.array([read(k)[1][np.searchsorted(read(k)[0], numbers), 2] for k in range(6)]).T
+        known, rows = np.isfinite(wanted).all(axis=1), found.sections.rows(quantity, line.places)
+        assert known.sum() == 11 and (~known).sum() == 10
+        given, told = (np.stack([np.hypot(part[:, 0], part[:, 1]), np.abs(part[:, 2])]) for part in (rows, wanted))
+        assert np.abs(given[:, known] - told[:, known]).max() < 1e-6 * told[:, known].max()
+        middle = 0.5 * (rows[0:-1:2] + rows[2::2])
+        assert np.abs(rows[1::2] - middle).max() < 1e-9 * np.abs(rows).max()
+
+
+def test_results_of_another_analysis_are_refused(model: FileModel) -> None:
+    """The matrices of the beam that is held at one end, and modes that are not orthogonal."""
+    assert "mode 1 of the results is none of these matrices" in words_of(TABLE | RESULTS)
+    assert "expected" in words_of(TABLE | RESULTS) and "38228.8 Hz by its shape" in words_of(TABLE | RESULTS)
+    line = line_between(model.nodes, model.places, (np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 5.0])), None)
+    with pytest.raises(BadInput, match="none of these matrices"):
+        recovery_along(replace(model, stiffness=1.01 * model.stiffness), RESULTS["results"], line, "z")
+    short = replace(line, nodes=line.nodes[:-1], places=line.places[:-1])
+    with pytest.raises(BadInput, match="where the track ends"):
+        recovery_along(model, RESULTS["results"], short, "z")
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"results": RESULTS["results"]}, "component"),
+        ({"component": "z"}, "results"),
+        (RESULTS | {"component": "r"}, "component"),
+        (RESULTS | {"results": TABLE["full"]}, "no .rst file"),
+        (RESULTS | {"results": "none.rst"}, "no such file"),
+        (RESULTS | {"track": {"nodes": [1, 5000]}}, "track"),
+    ],
+)
+def test_results_that_do_not_fit(more: dict[str, Any], words: str) -> None:
+    assert words in words_of(TABLE | more)
