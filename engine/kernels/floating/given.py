@@ -42,13 +42,22 @@ from engine.kernels.floating.vectors import (
     dot,
     keep_matrix,
     keep_vector,
-    matrix,
     shared_vector,
     times,
-    turned_out,
     vector,
 )
-from engine.kernels.floating.work import ACCELERATION, ANGULAR, CONTACT, RATES, SPIN, TOUCHED, VALUES, WHOLE, add_to
+from engine.kernels.floating.work import (
+    ACCELERATION,
+    ANGULAR,
+    CONTACT,
+    RATES,
+    SLIDING,
+    SPIN,
+    TOUCHED,
+    VALUES,
+    WHOLE,
+    add_to,
+)
 from engine.kernels.jit import called
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 
@@ -162,8 +171,9 @@ def carriage(system, lane, c, ways, state, solver):
     acceleration, mass = acceleration_at(system, work, b, d, rate, change), carried(lane, c, OWN_MASS)
     keep_vector(work.contacts, c, TOUCHED, acceleration)
     f = times(mass, acceleration)
+    sliding(b, along, ways, work)
     for j in range(n):
-        keep_vector(work.implied, row + j, 0, implied(b, j, along, ways, work))
+        keep_vector(work.implied, row + j, 0, implied(system, b, j, along, ways, work))
     if z >= 0:
         mass = mass + carried(lane, c, SPRUNG_MASS)
         f = add(f, sprung(system, lane, c, ways, state, solver))
@@ -224,13 +234,24 @@ def column(table, i, k):
 
 
 @called
-def implied(b, j, along, ways, work):
-    """What the acceleration of mode j adds to that of the contact, at the step's end."""
+def sliding(b, along, ways, work):
+    """What slopes under a carriage that slides over them add to its acceleration, as T of displacements."""
     (of_y, of_u), (_, ds, dds) = ways, along
-    shape, slope, curve = vector(work.modes, j, SHAPE), vector(work.modes, j, SLOPE), vector(work.modes, j, CURVE)
-    found = add(turned_out(matrix(work.turning, b, WHOLE), shape), times(2.0 * of_u * ds + of_y * dds, slope))
-    found = add(found, times(of_y * ds, turned_out(matrix(work.turning, b, RATES), slope)))
-    return add(found, times(of_y * ds * ds, curve))
+    for e in range(9):
+        part = of_y * ds * lanes_at(work.turning, (b, RATES + e))
+        put_lanes(work.turning, (b, SLIDING + e), part + 2.0 * of_u * ds + of_y * dds if e % 4 == 0 else part)
+
+
+@called
+def implied(system, b, j, along, ways, work):
+    """What the acceleration of mode j adds to that of the contact, at the step's end."""
+    found = times(ways[0] * along[1] * along[1], vector(work.modes, j, CURVE))
+    for e in range(3):
+        if system.leans[b, e]:
+            shape, slope = lanes_at(work.modes, (j, SHAPE + e)), lanes_at(work.modes, (j, SLOPE + e))
+            found = add(found, times(shape, column(work.turning, b, WHOLE + e)))
+            found = add(found, times(slope, column(work.turning, b, SLIDING + e)))
+    return found
 
 
 @called

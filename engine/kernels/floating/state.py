@@ -62,17 +62,20 @@ def sound(memory):
 
 @called
 def factor(M):
-    """LU factors of matrices in their place, without exchanges, as masses lead; 1 in the lanes where they are
-    regular, else 0."""
+    """LU factors of matrices in their place, the pivots inverted, without exchanges, as masses lead; 1 in the lanes
+    where they are regular, else 0."""
     N, regular = M.shape[0], all_lanes(1.0)
-    for k in range(N):
-        pivot = lanes_at(M, (k, k))
-        regular = choose(pivot * pivot > 0.0, regular, 0.0)
-        for i in range(k + 1, N):
-            part = lanes_at(M, (i, k)) / pivot
-            put_lanes(M, (i, k), part)
-            for j in range(k + 1, N):
-                put_lanes(M, (i, j), lanes_at(M, (i, j)) - part * lanes_at(M, (k, j)))
+    for i in range(N):
+        for j in range(N):
+            found = lanes_at(M, (i, j))
+            for k in range(min(i, j)):
+                found = found - lanes_at(M, (i, k)) * lanes_at(M, (k, j))
+            if j < i:
+                found = found * lanes_at(M, (j, j))
+            elif j == i:
+                regular = choose(found * found > 0.0, regular, 0.0)
+                found = 1.0 / found
+            put_lanes(M, (i, j), found)
     return regular
 
 
@@ -90,7 +93,7 @@ def solve(M, x):
         found = lanes_at(x, (k,))
         for j in range(k + 1, N):
             found = found - lanes_at(M, (k, j)) * lanes_at(x, (j,))
-        put_lanes(x, (k,), found / lanes_at(M, (k, k)))
+        put_lanes(x, (k,), found * lanes_at(M, (k, k)))
 
 
 @called

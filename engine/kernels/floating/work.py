@@ -20,8 +20,8 @@ JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
 # columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
 CONTACT, TOUCHED, CONTACTS = 0, 3, 6
 # columns of Work.turning: of a frame that is given, what rates and values of a place do to its acceleration, and both
-# with the acceleration itself, at the end of a step
-RATES, VALUES, WHOLE, TURNING = 0, 9, 18, 27
+# with the acceleration itself, at the end of a step; what slopes do to that of the carriage that was looked at last
+RATES, VALUES, WHOLE, SLIDING, TURNING = 0, 9, 18, 27, 36
 
 
 class Work(NamedTuple):
