@@ -12,7 +12,8 @@ from engine.kernels.floating.layout import Weights
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.status import Fidelity
-from tests.floating.scenes import FOX_GOODWIN, given_arm
+from tests.floating.bodies.test_frames_of_beams import PORTAL
+from tests.floating.scenes import ARM, FOX_GOODWIN, given_arm
 
 ALPHA = Weights(0.3025, 0.6, -0.1 / 1.1, 0.0)  # of generalized-alpha
 
@@ -34,6 +35,28 @@ def test_frames_that_are_given_are_those_that_float(scale: float, scheme: Weight
     """Small and large motion of an arm in space with a mass, an oscillator and loads: all signals to 1e-6."""
     gap, largest = apart(given_arm(scale), scheme)
     assert (largest > 0.0).sum() > 40
+    assert (gap <= 1e-6 * largest).all()
+
+
+SWING = {"kind": "revolute", "axis": [0.3, 1.0, 0.4], "motion": {"kind": "swing", "amplitude": 0.2, "frequency": 0.6}}
+SPIN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 2.0, "time": 0.73}}
+WAY = {"kind": "waypoints", "times": [0, 2], "positions": [0.2, 1.0]}
+JUMP = {"kind": "out-and-back", "speed": 5.0, "start": 1.0, "end": 6.0, "turn": 0, "cycles": 1}
+
+
+@pytest.mark.parametrize(
+    ("body", "frame", "motion"),
+    [(PORTAL, {"joints": [SWING]}, WAY), (ARM, {"joints": [SPIN], "stiffening": True}, JUMP)],
+    ids=["modes in all directions", "jumps between steps"],
+)
+def test_other_bodies_and_motions_too(body: dict[str, object], frame: dict[str, object], motion: object) -> None:
+    """A frame of beams in space, and a carriage that turns at an instant on an arm that spins up: to 1e-6."""
+    load = {"kind": "mass", "on": "body", "mass": 2.0, "motion": motion}
+    bodies = {"body": body | {"own_weight": True, "modes": 3, "damping_ratio": 0.01}}
+    gap, largest = apart(
+        Study(kind="moving-frames", gravity=0.0, body=bodies, frame={"body": frame}, carriage={"load": load})
+    )
+    assert (largest > 0.0).sum() >= 18
     assert (gap <= 1e-6 * largest).all()
 
 
