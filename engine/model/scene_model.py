@@ -266,9 +266,10 @@ def check_moves(study: Study) -> None:
 
 
 def _in_use(study: Study, body: str) -> bool:
-    """Whether a body carries a carriage, a robot, a sensor or an envelope."""
+    """Whether a body carries a carriage, a robot, a sensor or an envelope, or its frame moves or holds another one."""
     moving = [name for carriage in study.carriage.values() for name in carriage.bodies]
     moving += [name for robot in study.robot.values() for name in robot.rails]
+    moving += [*study.frame, *(frame.on for frame in study.frame.values())]
     read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
     return body in (*moving, *read)
 
@@ -346,6 +347,8 @@ def _check_rigid_modes(model: SceneModel) -> None:
     """A body that nothing holds has no static equilibrium and no sag, and needs a mode that bends."""
     riding = {carriage.rides for carriage in model.carriages}
     for number, part in enumerate(model.bodies):
+        if part.name in model.study.frame:  # its frame moves, or holds it
+            continue
         where = model.study.source.where(f"body.{part.name}.supports")
         if part.modal.rigid_modes and part.own_weight:
             raise BadInput(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from engine.scene.motions.of_joints import AnySliding, AnyTurning, TimeMotion
@@ -24,6 +25,7 @@ from engine.study_file.units import (
     Stiffness,
     fault,
 )
+from results_schema.arrays import Array
 
 GROUND = "ground"
 MOST_JOINTS = 6
@@ -55,6 +57,11 @@ class Joint(Spec):
         """The axis about which a motion turns what it holds, if there is one."""
         return None
 
+    @property
+    def at_start(self) -> tuple[Array, Array]:
+        """Rotation vector (3,), rad, and shift (3,), m, of what it holds at time 0, in the axes of what it hangs on."""
+        return np.zeros(3), np.zeros(3)
+
 
 class AxisJoint(Joint):
     """A joint about or along one axis, a vector of any length in the axes of what stands before it.
@@ -75,6 +82,12 @@ class AxisJoint(Joint):
     def is_driven(self) -> bool:
         """Whether its motion is given, whatever force that takes."""
         return self.motion is not None and self.stiffness == 0.0 and self.damping == 0.0
+
+    @property
+    def at_start(self) -> tuple[Array, Array]:
+        value = self.motion.at_start if self.motion is not None and self.is_driven else self.start or 0.0
+        along = value * np.array(self.axis) / np.linalg.norm(self.axis)
+        return along * self.turns, along * (not self.turns)
 
     @model_validator(mode="after")
     def _axis_and_start(self) -> AxisJoint:
@@ -156,6 +169,11 @@ class Frame(Spec):
     lateral_modes: int = Field(default=0, ge=0, le=32)
     axial_modes: int = Field(default=0, ge=0, le=32)
     stiffening: bool = False
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is fixed over the ground."""
+        return self.on == GROUND and not self.joints
 
     @model_validator(mode="after")
     def _fitting_keys(self) -> Frame:

@@ -13,15 +13,17 @@ from engine.bodies.modal.outline import Elastic, Held
 from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION, WIDTH, Figure, draw
 from studies.pictures.moving_shapes import FRONT, PLAN, SIDE, SPACE, view_of
-from studies.pictures.scene_layout import UP, Layout, Placed
+from studies.pictures.scene_layout import TURNED_UP, UP, Layout, Placed
 from studies.results.formatting import number
 
 SYMBOL = 1.0 / 42.0  # of the width of the picture
 WIDE = 1.5  # least width over height of a picture
+SPRING = 3.0  # symbols: half of the length of a spring at most
 MOST_NAMED = 16  # nodes of a body, and carriages
 FEW_LINES = 30  # that are drawn bold
 PLOT, ROW, LETTER = 7.3, 0.17, 0.064  # inches: width of the plot, height of a row of names, width of a letter
 COLOURS = (BLUE, PURPLE, SKY)  # of bodies
+IN_MOTION = " Frames that move, their springs and loads, and robots (red, the tool a triangle) are as at time 0."
 AXES, ENDS = np.eye(3), np.array([-1.0, 1.0])
 
 # Symbols as curves between two ends: (part of the way, symbol sizes beside it).
@@ -59,9 +61,14 @@ class Sheet(NamedTuple):
             self.axes.fill(x, y, closed=False, **look)
 
     def spring(self, start: Array, end: Array, *, damped: bool) -> None:
-        """A spring, with a damper beside it."""
+        """A spring, with a damper beside it; of a long one the middle, the rest a line."""
+        middle, half = 0.5 * (start + end), 0.5 * (end - start)
+        part = min(1.0, SPRING * self.u / max(float(np.linalg.norm(half)), self.u))
         for curve in (ZIGZAG, *(DASHPOT if damped else ())):
-            self.symbol(start, end, curve)
+            self.symbol(middle - part * half, middle + part * half, curve)
+        if part < 1.0:
+            for outer, sign in ((start, -1.0), (end, 1.0)):
+                self.line(np.array([outer, middle + sign * part * half]))
 
     def ground(self, place: Array, outward: Array) -> None:
         """The hatched line on which something stands; outward (3,): into the ground."""
@@ -112,6 +119,7 @@ def _picture(scene: Layout, view: Array) -> Figure:
         "To scale, in metres; symbols are not. Carriages (red) stand where they start, those that follow as far behind "
         "as they trail; arrows along their ways; green: sensors; dashed: a track beside what carries it. What rides is "
         "drawn a little above its track."
+        f"{IN_MOTION * bool(scene.model.study.frame or scene.model.study.robot)}"
     )
 
     def fill(drawing: Drawing) -> None:
@@ -205,9 +213,19 @@ def _three(scene: Layout) -> Figure:
 def _draw_scene(scene: Layout, sheet: Sheet) -> None:
     study = scene.model.study
     for place, body in enumerate(scene.bodies.values()):
-        _draw_body(body, sheet, COLOURS[place % len(COLOURS)])
+        frame = study.frame.get(body.part.name)
+        _draw_body(body, sheet, COLOURS[place % len(COLOURS)], stands=frame is None or frame.stands)
     for name in study.carriage:
         _draw_carriage(scene, name, sheet)
+    for name, line in scene.robots.items():
+        for foot in scene.feet(name):
+            sheet.line(np.array([foot, line[0]]), color=VERMILION)
+        sheet.line(line, color=VERMILION, linewidth=1.8, marker="o", markersize=3.0, zorder=3.0)
+        sheet.line(line[-1:], color=VERMILION, marker="v", markersize=6.0, zorder=3.1)
+    for name, ends in scene.springs.items():
+        sheet.spring(ends[0], ends[1], damped=study.spring[name].damping > 0.0)
+    for name in study.load:
+        _draw_load(scene, name, sheet)
     for envelope in study.envelope.values():
         body = scene.bodies[envelope.body]
         sheet.line(body.along(envelope.along(body.part.modal.length)), color=SKY, linewidth=7.0, alpha=0.4, zorder=1.2)
@@ -217,7 +235,7 @@ def _draw_scene(scene: Layout, sheet: Sheet) -> None:
             sheet.line(where[None], color=GREEN, marker="o", markersize=4.5, zorder=5.0)
 
 
-def _draw_body(body: Placed, sheet: Sheet, colour: str) -> None:
+def _draw_body(body: Placed, sheet: Sheet, colour: str, *, stands: bool) -> None:
     outline = body.outline
     width, gap = 2.2 if len(outline.lines) <= FEW_LINES else 0.8, np.full((1, 3), np.nan)
     joined = np.concatenate([part for line in outline.lines for part in (body.at(line.points), gap)])
@@ -225,8 +243,10 @@ def _draw_body(body: Placed, sheet: Sheet, colour: str) -> None:
     if outline.cloud is not None:
         sheet.line(body.at(outline.cloud.points), color=colour, linestyle="", marker=".", markersize=2.0, zorder=2.0)
     sheet.line(body.at(outline.track), linestyle=(0, (5, 3)), zorder=1.9)
-    for held in outline.held:
+    for held in outline.held if stands else ():
         _draw_support(body, held, sheet)
+    if not stands:
+        sheet.line(body.along(0.0)[None], marker="o", markersize=5.0, markerfacecolor="white", zorder=2.7)
     for spring in outline.springs:
         _draw_spring(body, spring, sheet)
     for lump in outline.masses:
@@ -295,6 +315,18 @@ def _draw_carriage(scene: Layout, name: str, sheet: Sheet) -> None:
         _arrow(sheet, foot + 2.6 * u * UP, foot, VERMILION)
 
 
+def _draw_load(scene: Layout, name: str, sheet: Sheet) -> None:
+    """Arrows to the places of a force; a ring where there is but a torque."""
+    load = scene.model.study.load[name]
+    force = np.array(getattr(load, load.keys[0]) or np.zeros(3))
+    away = (scene.bodies[load.on].axes if load.axes == "body" else TURNED_UP) @ force
+    for place in scene.loaded(name):
+        if force.any():
+            _arrow(sheet, place - 3.0 * sheet.u * away / np.linalg.norm(away), place, ORANGE)
+        else:
+            sheet.line(place[None], marker="o", markersize=9.0, markerfacecolor="none", markeredgecolor=ORANGE)
+
+
 def _arrow(sheet: Sheet, start: Array, end: Array, colour: str, style: str = "-|>") -> None:
     look: Any = {"arrowstyle": f"{style},head_width=0.22,head_length=0.45", "color": colour, "linewidth": 1.1}
     sheet.axes.annotate("", sheet.view @ end, sheet.view @ start, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})
@@ -342,6 +374,12 @@ def _labels(scene: Layout, view: Array, u: float) -> list[Label]:
         where = scene.read(sensor)
         if where is not None:
             found.append(Label(view @ where, name, GREEN))
+    for name, line in scene.robots.items():
+        found.append(Label(view @ line[-1], name, VERMILION))
+    for name, ends in scene.springs.items():
+        found.append(Label(view @ ends.mean(axis=0), name, INK))
+    for name in study.load:
+        found.append(Label(view @ scene.loaded(name).mean(axis=0), name, ORANGE))
     for name, envelope in study.envelope.items():
         body = scene.bodies[envelope.body]
         middle = float(np.mean(envelope.along(body.part.modal.length)))

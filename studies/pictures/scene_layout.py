@@ -1,12 +1,13 @@
 """Where the things of a scene stand in space: x and y level, z upward, in m.
 
 Frames and bodies out of files stand where their coordinates say, beams along x. What rides stands over its contacts, a
-little above the tracks so that these can be seen; further bodies under it stand below their contacts.
+little above the tracks so that these can be seen; further bodies under it stand below their contacts. Bodies in frames
+that move stand as they do at time 0, undeformed, and so do robots.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,12 +17,17 @@ from engine.bodies.modal.description import Spot
 from engine.bodies.modal.outline import Outline
 from engine.model.scene_model import BodyPart, SceneModel
 from engine.scene.carriages import Carriage, Contact
+from engine.scene.frames import GROUND
+from engine.scene.robots import Arm, Robot
 from engine.scene.sensors import Sensor
+from engine.scene.study import Study
 from results_schema.arrays import Array
 
 GAP = 0.06  # of the scene's size, between a track and what rides on it
 UP = np.array([0.0, 0.0, 1.0])
+TURNED_UP = np.diag([1.0, -1.0, -1.0])  # from axes of which z is down, as of frames that move
 SAME = 1e-9
+ARROWS = 5  # of a load along a body
 FAR = 3.0  # lengths of a track beside it
 
 
@@ -47,6 +53,11 @@ class Placed:
     def forward(self) -> Array:
         """(3,) level unit vector along the track."""
         return _level(self.turn @ np.diff(self.outline.track, axis=0)[0])
+
+    @property
+    def axes(self) -> Array:
+        """(3, 3) along its track, across, and the way it bends under loads, as columns."""
+        return self.turn @ _own_axes(self.outline)
 
 
 class Standing(NamedTuple):
@@ -84,8 +95,58 @@ class Layout:
 
     @property
     def points(self) -> Array:
-        """(P, 3) all of its bodies."""
-        return np.concatenate([body.at(points) for body in self.bodies.values() for points in _points(body.outline)])
+        """(P, 3) all of its bodies, and what is fixed to them."""
+        found = [body.at(points) for body in self.bodies.values() for points in _points(body.outline)]
+        return np.concatenate([*found, *self.robots.values(), *self.springs.values()])
+
+    def held(self, body: str, at: float | None) -> Array:
+        """(3,) a place on a track, its end if none is given."""
+        found = self.bodies[body]
+        return found.along(found.part.modal.length if at is None else at)
+
+    def loaded(self, name: str) -> Array:
+        """(P, 3) the place of a load, or some of those along a body."""
+        load = self.model.study.load[name]
+        if load.between is None:
+            return self.held(load.on, load.at)[None]
+        return self.bodies[load.on].along(np.linspace(*load.between, ARROWS))
+
+    @property
+    def springs(self) -> dict[str, Array]:
+        """(2, 3) both ends of the springs between bodies in frames that move."""
+        found = {}
+        for name, spring in self.model.study.spring.items():
+            ends = [
+                self.held(end.on, end.at) if end.position is None else TURNED_UP @ np.array(end.position)
+                for end in spring.ends
+            ]
+            found[name] = np.array(ends)
+        return found
+
+    @property
+    def robots(self) -> dict[str, Array]:
+        """(K, 3) of every robot its base point, its joints and its tool, at time 0."""
+        study = self.model.study
+        return {name: self._robot(robot, study.arm[robot.arm]) for name, robot in study.robot.items()}
+
+    def feet(self, robot: str) -> list[Array]:
+        """(3,) where a robot stands on each of its rails, at time 0."""
+        of = self.model.study.robot[robot]
+        first = float(self.bodies[of.rails[0]].along(of.start[0])[0])
+        return [self.bodies[name].along(first - float(self.bodies[name].along(0.0)[0])) for name in of.rails]
+
+    def _robot(self, robot: Robot, arm: Arm) -> Array:
+        starts = np.array([self.bodies[name].along(0.0) for name in robot.rails])
+        place, turn = starts.mean(axis=0) + robot.offset, np.eye(3)
+        place[0] = starts[0, 0] + robot.offset[0] + robot.start[0]
+        found = [place]
+        for link, value in zip(arm.links, robot.start[1:], strict=True):
+            place, turn = place + turn @ link.place, turn @ _turned(link.turned)
+            axis = np.array(link.axis) / np.linalg.norm(link.axis)
+            place = place + turn @ axis * value * link.slides
+            turn = turn @ _turned(axis * value * (not link.slides))
+            found.append(place)
+        return np.array([*found, place + turn @ arm.tool])
 
 
 def _points(outline: Outline) -> list[Array]:
@@ -114,6 +175,8 @@ def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:
     """The scene with its carriages at some positions."""
     carriages = model.study.carriage
     parts = {part.name: (part, model.study.body[part.name].outline(part.modal)) for part in model.bodies}
+    if model.study.frame:
+        return Layout(model, {name: _hung(model.study, *part) for name, part in parts.items()}, positions, {})
     gap = GAP * max(float(np.ptp(np.concatenate(_points(outline)), axis=0).max()) for _, outline in parts.values())
     placed, contacts = dict[str, Placed](), dict[str, tuple[Standing, ...]]()
     riding = {name: c for name, c in carriages.items() if c.riding_body is not None}
@@ -133,6 +196,47 @@ def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:
                 placed[other] = _under(model, carriage, parts[other], placed)
         contacts[name] = tuple(_contacts(model, carriage, placed, positions[name]))
     return Layout(model, {name: placed[name] for name in parts}, positions, contacts)
+
+
+def _hung(study: Study, part: BodyPart, outline: Outline) -> Placed:
+    """A body whose frame moves, or is fixed, where it is at time 0."""
+    attitude, place = _frame(study, part.name)
+    turn = TURNED_UP @ attitude @ _own_axes(outline).T
+    return Placed(part, outline, turn, TURNED_UP @ place - turn @ outline.track[0])
+
+
+def _frame(study: Study, name: str) -> tuple[Array, Array]:
+    """Attitude (3, 3) and place (3,) over the ground of the frame of a body at time 0, z down."""
+    frame = study.frame.get(name)
+    if frame is None:
+        return np.eye(3), np.zeros(3)
+    attitude, place = np.eye(3), np.array(frame.position)
+    if frame.on != GROUND:
+        attitude, place = _frame(study, frame.on)
+        place = place + attitude[:, 0] * (study.body[frame.on].length if frame.at is None else frame.at)
+    attitude = attitude @ _turned(frame.turned)
+    for joint in frame.joints:
+        turn, shift = joint.at_start
+        attitude, place = attitude @ _turned(turn), place + attitude @ shift
+    return attitude, place
+
+
+def _turned(vector: Sequence[float] | Array) -> Array:
+    """(3, 3) turn by a rotation vector, rad."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+def _own_axes(outline: Outline) -> Array:
+    """(3, 3) along the track, across and down, as columns, in a body's own coordinates."""
+    along = np.diff(outline.track, axis=0)[0]
+    along = along / np.linalg.norm(along)
+    down = outline.down - (outline.down @ along) * along
+    if np.linalg.norm(down) < SAME:
+        down = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    down = down / np.linalg.norm(down)
+    return np.array([along, np.cross(down, along), down]).T
 
 
 def _level(vector: Array) -> Array:

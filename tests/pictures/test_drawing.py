@@ -27,8 +27,9 @@ from tests.bodies import models
 from tests.bodies.frames import straight
 from tests.engine import gantries
 from tests.engine.build import Table, beam, cruise, mass, study
-from tests.floating.scenes import ARM
+from tests.floating.scenes import ARM, history, steps
 from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
+from tests.robots.scenes import marched, scene
 
 STUDIES = {f"built-in {name}": path for name, path in catalogue.built_in().items()}
 STARTS = {f"start {kind}": catalogue.start_text(kind) for kind in catalogue.starts()}
@@ -43,9 +44,8 @@ def laid_out(scene: Study) -> Layout:
 
 
 def test_where_nothing_rides_and_nothing_is_read_there_is_nothing_to_draw(tmp_path: Path) -> None:
-    frame = {"joints": [{"kind": "revolute", "axis": [0, 1, 0]}]}
     body = {"arm": ARM | {"own_weight": True}}
-    scene = Study(kind="moving-frames", gravity=9.81, body=body, frame={"arm": frame}, question={"duration": 1})
+    scene = Study(kind="moving-frames", gravity=9.81, body=body, question={"duration": 1})
     with pytest.raises(BadInput, match="nothing to draw"):
         write_drawing(scene, tmp_path / "drawing")
     assert not list(tmp_path.iterdir())
@@ -200,3 +200,48 @@ def test_what_follows_stands_behind() -> None:
 def test_bodies_that_nothing_uses_are_told() -> None:
     found = study(beam(), CAR, body={"bed": beam(), "other": beam()})
     assert any("other" in remark for remark in page_of(found, ()).remarks)
+
+
+def test_bodies_in_frames_that_move_stand_where_they_are_marched_from(tmp_path: Path) -> None:
+    """Ends of tracks at time 0, with a joint that is driven, one that is turned and one that slid; springs between."""
+    swing = {"kind": "swing", "centre": 0.4, "amplitude": 0.3, "frequency": 1.0}
+    rod = {"kind": "rigid", "length": 1.0, "mass": 2.0, "inertia": 0.2, "own_weight": True}
+    frame = {
+        "arm": {"position": [1, 2, -3], "joints": [{"kind": "revolute", "axis": [0, 2, 1], "motion": swing}]},
+        "rod": {
+            "on": "arm",
+            "at": 7.0,
+            "turned": [0.3, 0.2, -0.5],
+            "joints": [
+                {"kind": "prismatic", "axis": [0, 1, 1], "start": 0.3},
+                {"kind": "revolute", "axis": [1, 1, 0], "start": -0.8},
+            ],
+        },
+    }
+    more = {
+        "spring": {"cable": {"ends": [{"on": "rod"}, {"position": [0, 0, 4]}], "stiffness": 5.0, "length": 1.0}},
+        "load": {
+            "wind": {"on": "arm", "between": [1.0, 3.0], "force_per_metre": [0, 0, 2.0]},
+            "push": {"on": "rod", "at": 0.5, "force": [1.0, 0, 0], "axes": "body"},
+            "turn": {"on": "rod", "torque": [0, 1.0, 0]},
+        },
+    }
+    body, question = {"arm": ARM | {"own_weight": True}, "rod": rod}, {"duration": 1.0}
+    scene = Study(kind="moving-frames", gravity=9.81, body=body, frame=frame, question=question, **more)
+    model, marched = steps(scene, 1e-9, 1)
+    placed = laid_out(scene)
+    for place, (name, length) in enumerate((("arm", 10.0), ("rod", 1.0))):
+        x, y, z = history(model, marched, "ends", 3 * place, 3)[0]
+        np.testing.assert_allclose(placed.bodies[name].along(length), [x, -y, -z], atol=1e-9)
+    np.testing.assert_allclose(placed.springs["cable"], [placed.bodies["rod"].along(1.0), [0, 0, -4]], atol=1e-12)
+    np.testing.assert_allclose(placed.loaded("wind")[[0, -1]], placed.bodies["arm"].along(np.array([1.0, 3.0])))
+    text = write_drawing(scene, tmp_path / "drawing").read_text(encoding="utf-8")
+    assert "their springs and loads" in text
+
+
+def test_robots_stand_where_their_plans_begin() -> None:
+    record = marched(scene(), 0.05, 0.1)[1]
+    placed = laid_out(scene())
+    for place, line in enumerate(placed.robots.values()):
+        np.testing.assert_allclose(line[-1], record.robots[0, place, :3], atol=1e-9)
+    assert [len(placed.feet(name)) for name in placed.robots] == [2, 1]

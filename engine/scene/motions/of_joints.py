@@ -34,6 +34,17 @@ class TimeMotion(Spec):
     def pieces(self, number: Number) -> Array:
         """(V, pieces, 10): the columns above."""
 
+    @property
+    def at_start(self) -> float:
+        """Its value at time 0."""
+        piece = self.pieces(self._number)[0, 0]
+        return float(piece[CONSTANT] + piece[AMPLITUDE] * np.sin(piece[PHASE]))
+
+    def _number(self, key: str) -> Array:
+        """(1,) a number of its own, such as "values.2"."""
+        name, _, place = key.partition(".")
+        return np.array([float(getattr(self, name)[int(place)] if place else getattr(self, name))])
+
 
 def blank(like: Array, count: int) -> Array:
     """(V, count, 10) pieces of nothing for numbers (V,)."""
