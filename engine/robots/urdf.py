@@ -16,12 +16,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from engine.study_file.spec import nearest
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 MOST_BYTES = 2**22
 MOVABLE = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 ROUND = 1e-12  # of the largest: products of inertia, and parts of vectors, that are rounding
+DIGITS = 12  # of printed numbers: torques of drives change by 6e-12 of the largest, in the tests' robot
+#: Of the largest moment: by how much it may exceed the sum of the others. Files with three digits are up to 0.6 % off.
+FEW_DIGITS = 0.01
 #: Within which s drives reach their full speed, and their full acceleration: a guess, which the table's comment tells.
 UP_TIME, JERK_TIME = 0.5, 0.1
 PLAIN_SPEED = 1.0  # m/s or rad/s, where the file has no limit: likewise
@@ -67,7 +71,8 @@ class Solid:
 
 
 class Joint(NamedTuple):
-    """A joint of the file: what it joins, where it is in the axes of its parent, its axis, and its speed or 0."""
+    """A joint of the file: what it joins, where it is in the axes of its parent, its axis, its speed or 0, and between
+    which values it goes, where the file tells."""
 
     name: str
     kind: str
@@ -76,6 +81,7 @@ class Joint(NamedTuple):
     pose: Pose
     axis: Array
     speed: float
+    ends: tuple[float, float] | None
 
 
 class Chain(NamedTuple):
@@ -116,7 +122,7 @@ def _chain(root: ElementTree.Element, tool: str | None) -> Chain:
         raise _fault("there is not one root", "one link that hangs on no joint", ", ".join(first[:5]) or "none")
     tip = tool or _only_end(links, joints)
     if tip not in links:
-        raise _fault("no such link", f"one of {', '.join(links)}", tip)
+        raise _no_link("no such link", links, tip)
     way, name = list[Joint](), tip
     while name in held and len(way) <= len(joints):
         way.insert(0, held[name])
@@ -172,8 +178,13 @@ def _weigh(link: ElementTree.Element, solid: Solid, pose: Pose) -> None:
         _number(where, tensor.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if value < 0.0 or np.linalg.eigvalsh(inertia).min() < -ROUND * np.abs(inertia).max():
+    moments = np.linalg.eigvalsh(inertia)
+    if value < 0.0 or moments.min() < -ROUND * np.abs(inertia).max():
         raise _fault(f"{where} has a negative mass or inertia", "none", f"{value:g} kg")
+    if moments[2] > moments[0] + moments[1] + FEW_DIGITS * moments[2]:
+        expected = "no principal moment above the sum of the other two"
+        received = f"{', '.join(f'{moment:.4g}' for moment in moments)} kg m2"
+        raise _fault(f"{where} has an inertia that no body can have", expected, received)
     solid.add(value, _pose(where, inertial.find("origin")).after(pose), inertia)
 
 
@@ -188,6 +199,8 @@ def _parsed(file: Path) -> ElementTree.Element:
     try:
         with file.open("rb") as stream:
             text = stream.read(MOST_BYTES + 1)
+    except FileNotFoundError:
+        raise _fault("no such file", "a URDF file") from None
     except OSError as error:
         raise _fault("cannot be read", "a file", error.strerror or "") from None
     if len(text) > MOST_BYTES:
@@ -209,7 +222,7 @@ def _joint(joint: ElementTree.Element, links: Mapping[str, ElementTree.Element])
     parent, child = (_of(joint, end, "link") for end in ("parent", "child"))
     for end in (parent, child):
         if end not in links:
-            raise _fault(f"{where} joins a link that is not there", f"one of {', '.join(links)}", str(end))
+            raise _no_link(f"{where} joins a link that is not there", links, end)
     if kind not in (*MOVABLE, "fixed"):
         raise _fault(f"{where} is of a kind that drives do not move", f"{', '.join(MOVABLE)} or fixed", kind)
     if joint.find("mimic") is not None:
@@ -218,7 +231,15 @@ def _joint(joint: ElementTree.Element, links: Mapping[str, ElementTree.Element])
     if not axis.any():
         raise _fault(f"{where} has an axis without direction", "three numbers, not all zero", "0 0 0")
     speed = _number(where, _of(joint, "limit", "velocity") or "0")
-    return Joint(name, kind, parent, child, _pose(where, joint.find("origin")), axis, speed)
+    return Joint(name, kind, parent, child, _pose(where, joint.find("origin")), axis, speed, _ends(where, joint))
+
+
+def _ends(where: str, joint: ElementTree.Element) -> tuple[float, float] | None:
+    """Between which values (rad or m) a joint goes; None where the file does not tell."""
+    lower, upper = (_of(joint, "limit", key) for key in ("lower", "upper"))
+    if joint.get("type") == "continuous" or not lower + upper:
+        return None
+    return _number(where, lower or "0"), _number(where, upper or "0")
 
 
 def _of(element: ElementTree.Element, tag: str, key: str) -> str:
@@ -257,6 +278,11 @@ def _fault(what: str, expected: str, received: str = "") -> BadInput:
     return BadInput(what, expected=expected, received=received)
 
 
+def _no_link(what: str, links: Mapping[str, ElementTree.Element], name: str) -> BadInput:
+    expected = f"one of {', '.join(links)}"
+    return BadInput(what, expected=expected, received=name, remedy=nearest(name, list(links)))
+
+
 def _lines(chain: Chain, name: str, turn: Array, source: str) -> Iterator[str]:
     """The lines of the table. turn: of the root on the carriage, whose axes are those of the rails."""
     carriage, *links = chain.solids
@@ -267,6 +293,8 @@ def _lines(chain: Chain, name: str, turn: Array, source: str) -> Iterator[str]:
     yield f"[arm.{name}]"
     if carriage.mass == 0.0:
         yield "# the file tells no mass of its root: replace this one by that of the carriage"
+    else:
+        yield f"# of {chain.root} alone: add the carriage that rides on the rails, here and in centre and inertia"
     yield f"mass = {_plain(carriage.mass or 1.0)}"
     yield f"centre = {_row(turn @ carriage.centre)}"
     tensor = turn @ carriage.about_centre @ turn.T
@@ -280,6 +308,7 @@ def _lines(chain: Chain, name: str, turn: Array, source: str) -> Iterator[str]:
     for joint, solid, pose, before, own in zip(chain.joints, links, chain.poses, axes[:-1], axes[1:], strict=True):
         yield ""
         yield f"[[arm.{name}.links]] # {joint.child}, by {joint.name}"
+        yield from _remarks(joint, solid)
         yield f'kind = "{MOVABLE[joint.kind]}"'
         yield f"axis = {_row(own.T @ joint.axis)}"
         yield f"place = {_row(before.T @ pose.place)}"
@@ -288,6 +317,18 @@ def _lines(chain: Chain, name: str, turn: Array, source: str) -> Iterator[str]:
         yield f"centre = {_row(own.T @ solid.centre)}"
         yield f"inertia = {_row(np.maximum(np.diag(own.T @ solid.about_centre @ own), 0.0))}"
         yield _drive(joint.speed or PLAIN_SPEED).replace(", ", "\n")
+
+
+def _remarks(joint: Joint, solid: Solid) -> Iterator[str]:
+    """Comments on what the file does not tell of a link, and on what studies do not heed."""
+    if joint.ends is not None:
+        unit = "m" if joint.kind == "prismatic" else "rad"
+        lower, upper = map(_plain, joint.ends)
+        yield f"# the file limits it to {lower} to {upper} {unit}; plans are not checked against that"
+    if solid.mass == 0.0:
+        yield "# the file tells no mass of it"
+    if joint.speed == 0.0:
+        yield f"# the file tells no speed of {joint.name}: the one here is a guess"
 
 
 def _drive(speed: float) -> str:
@@ -319,4 +360,4 @@ def _row(vector: Array) -> str:
 
 
 def _plain(number: float) -> str:
-    return f"{number:.16g}"
+    return f"{number:.{DIGITS}g}"
