@@ -9,7 +9,7 @@ import numpy as np
 
 from results_schema.arrays import Array, Counts, Mask
 from studies.results.findings_common import in_words, told_statuses
-from studies.results.formatting import listed, percent, quantity, scientific
+from studies.results.formatting import listed, percent, quantity, scientific, spanned
 from studies.results.results import extreme
 
 if TYPE_CHECKING:
@@ -58,15 +58,18 @@ def of_front(results: Results) -> Counts:
 def _errors(results: Results) -> Iterator[str]:
     for name in results.study.robot:
         part = results.dataset.sel(robot=name)
-        index = extreme(part["error_moving"])
-        if index is None:
+        off = {"in moves": part["error_moving"].values, "at work": part["error_working"].values}
+        places = {words: place for words, values in off.items() if (place := extreme(values)) is not None}
+        if not places:
             continue
-        said = f"The tool of {name} is off by up to {quantity(float(part['error_moving'].values[index]), 'm')} in moves"
-        work = extreme(part["error_working"])
-        if work is not None:
-            said += f" and {quantity(float(part['error_working'].values[work]), 'm')} at work"
-        dynamic = float(np.nanmax(part["beyond_rest_moving"].values))
-        yield f"{said}{in_words(results, index)}; from where it would rest by up to {quantity(dynamic, 'm')} in moves."
+        told = {words: f"{quantity(float(off[words][place]), 'm')} {words}" for words, place in places.items()}
+        where = {words: in_words(results, place) for words, place in places.items()}
+        if len(set(where.values())) == 1:
+            said = f"{' and '.join(told.values())}{next(iter(where.values()))}"
+        else:
+            said = ", and ".join(f"{told[words]}{where[words]}" for words in told)
+        dynamic = quantity(float(np.nanmax(part["beyond_rest_moving"].values)), "m")
+        yield f"The tool of {name} is off by up to {said}; from where it would rest by up to {dynamic} in moves."
 
 
 def _statics(results: Results) -> Iterator[str]:
@@ -77,12 +80,12 @@ def _statics(results: Results) -> Iterator[str]:
     known = np.isfinite(dataset["at_rest"].values) & (largest > 0.0)
     if not known.any():
         return
-    least, most = (percent(float(bound(dataset["at_rest"].values[known]))) for bound in (np.min, np.max))
+    times = spanned(dataset["at_rest"].values[known], percent)
     off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in words}
     told = listed([f"{percent(float(off[name]))} {words[name]}" for name in words])
     limit = scientific(results.study.solver.tolerance)
     yield (
-        f"Statics alone would have told tools to {limit} of their largest errors for {least} to {most} of the time; "
+        f"Statics alone would have told tools to {limit} of their largest errors for {times} of the time; "
         f"else it is off by up to {told}."
     )
 
@@ -138,5 +141,5 @@ def _front(results: Results) -> Iterator[str]:
         index = tuple(int(i) for i in np.unravel_index(number, results.shape))
         off = quantity(float(error.reshape(-1)[number]), "m")
         told.append(f"{quantity(float(cycle[number]), 's', 4)} for {off} ({results.at(index)})")
-    best = f"{chosen.size} of {results.size} variants are best"
+    best = f"{chosen.size} of {results.size} variants {'is' if chosen.size == 1 else 'are'} best"
     yield f"Of cycle time against what tools are off from rest {words}, {best}: {'; '.join(told)}."

@@ -107,6 +107,20 @@ def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
     assert [figure.name for figure in figures] == ["front", "over-time", "rails", "worst-move"]
 
 
+def test_every_number_is_told_with_the_variant_that_it_belongs_to(found: Any) -> None:
+    own = found.copy(deep=True)
+    own["at_rest"][:] = 0.8
+    own["error_moving"].loc[{"robot": "portal", "acceleration": 3.0, "payload": 2.0}] = 2.0
+    own["error_working"].loc[{"robot": "portal", "acceleration": 0.5, "payload": 0.0}] = 1.0
+    own["beyond_rest_working"].loc[{"acceleration": 3.0, "payload": 0.0}] = 0.0
+    answer = " ".join(kind_of(swept()).findings(Results.of(own)))
+    assert "2 m in moves at acceleration 3, payload 2, and 1 m at work at acceleration 0.5, payload 0; from" in answer
+    assert "largest errors for 80 % of the time" in answer and "1 of 6 variants is best" in answer
+    own["error_working"].loc[{"robot": "portal", "acceleration": 3.0, "payload": 2.0}] = 1.5
+    answer = " ".join(kind_of(swept()).findings(Results.of(own)))
+    assert "2 m in moves and 1.5 m at work at acceleration 3, payload 2; from" in answer
+
+
 def test_the_worst_move_is_played_as_exaggerated_as_its_caption_says(found: Any) -> None:
     """Rails in the SVG element, at the station where a rail is down the most, against the dataset."""
     results = Results.of(found)
