@@ -59,15 +59,16 @@ LOST = GRAVEST[:3]
 
 
 class Fidelity(IntEnum):
-    """The model a variant was computed with, cheapest first."""
+    """The model a variant was computed with; of bodies that stand cheapest first. Numbers are those of archives that
+    were written before, so that further ones come last."""
 
     STATIC = 0
     FORCE = 1
     MASS_WITHOUT_CONVECTIVE = 2
     MASS = 3
     TIED = 4
-    GIVEN_FRAME = 5
-    FRAME = 6
+    FRAME = 5
+    GIVEN_FRAME = 6
 
 
 class SchemeUsed(IntEnum):
@@ -97,7 +98,7 @@ def flag_meanings(flags: type[IntEnum]) -> str:
     """The CF attribute `flag_meanings`: one word each, in the order of `flag_values`.
 
     >>> flag_meanings(Fidelity)
-    'static force mass_without_convective mass tied given_frame frame'
+    'static force mass_without_convective mass tied frame given_frame'
     """
     return " ".join(flags(value).name.lower() for value in flag_values(flags))
 

@@ -63,9 +63,12 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
     if len(rows) > len(results.dims):
         like = like.expand_dims({along: dataset[along]}).transpose(*rows)
     columns, left_out, swept = {}, [], {axis.name: axis for axis in results.axes}
+    declared = results.study.results(results.study.kind)
+    of_none = {name for name, variable in declared.items() if variable.lead == "none"} | set(dataset.coords)
     for name, array in [*((n, dataset[n]) for n in (*dataset.coords, "status")), *dataset.data_vars.items()]:
         own = tuple(dim for dim in array.dims if dim not in rows)
-        if prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS or (own and not set(array.dims) & set(rows)):
+        nowhere = own and (not set(array.dims) & set(rows) if rows else name in of_none)
+        if prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS or nowhere:
             left_out += [str(name)] if name in dataset.data_vars else []
             continue
         parts = [_as_typed(swept[str(name)], array)] if name in swept else _columns(str(name), array, own)

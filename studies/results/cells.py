@@ -38,8 +38,8 @@ class CellRange(NamedTuple):
 
 
 def single_numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, xr.DataArray]]:
-    """The results of a march that are one number per variant, or one per variant and sensor or place: name, sensor or
-    "", and values."""
+    """The results of a march that are one number per variant, or one per variant and sensor, robot, body or place:
+    name, the name of the sensor or another one or "", and values."""
     grid = dataset["status"].dims
     for name, array in dataset.data_vars.items():
         if array.dtype.kind != "f" or str(name).endswith(_BESIDE):
@@ -47,9 +47,10 @@ def single_numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, xr.DataArray
         of_places = len(array.dims) == len(grid) + 1 and str(array.dims[-1]).endswith("_place")
         if array.dims == grid or of_places:
             yield str(name), "", array
-        elif array.dims == (*grid, "sensor"):
-            for place, sensor in enumerate(dataset["sensor"].values):
-                yield str(name), str(sensor), array.isel(sensor=place)
+        elif len(array.dims) == len(grid) + 1 and array.dims[:-1] == grid and array.dims[-1] != "result":
+            named = dataset.coords.get(array.dims[-1])
+            for place, word in enumerate([] if named is None or named.dtype.kind not in "UO" else named.values):
+                yield str(name), str(word), array.isel({array.dims[-1]: place})
 
 
 def counts_of(dataset: xr.Dataset) -> dict[Status, int]:

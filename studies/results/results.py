@@ -305,8 +305,10 @@ class Results:
         return self.study.without_sweep().with_values(whole).carriage[self.carriage_name]
 
     def of_sensor(self, variable: str, sensor: str) -> xr.DataArray:
-        """A result over sensors for one of them."""
-        return self.dataset[variable].sel(sensor=sensor)
+        """A result over sensors, or robots or bodies, for one of them."""
+        array = self.dataset[variable]
+        (dim,) = (dim for dim in array.dims if dim not in self.dims)
+        return array.sel({dim: sensor})
 
     def numbers(self, variable: str, sensor: str) -> Array:
         """The same as plain numbers."""

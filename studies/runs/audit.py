@@ -14,7 +14,7 @@ from engine.accuracy.jobs import Crashed, Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.late import xr
-from results_schema.status import Status
+from results_schema.status import Fidelity, Status
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
 from studies.findings.amplification import derived_from
@@ -234,7 +234,7 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     """In one sentence what was asked, estimated and observed of all that is held."""
     if not results.study.output.keeps_variants and group is not None:
         tolerances = known(group["tolerance"])
-        return f"{_span(tolerances)} was asked; {_compared(group)}" if tolerances.size else ""
+        return f"{_span(tolerances)} was asked; {_compared(group, results)}" if tolerances.size else ""
     if not is_marched(results.dataset) or "tolerance" not in results.dataset:
         return ""
     fine = results.dataset["status"].values == int(Status.OK)
@@ -242,24 +242,33 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     if not estimates.size or not tolerances.size:
         return ""
     said = f"estimated errors at most {scientific(float(estimates.max()))} where {_span(tolerances)} was asked"
-    return f"{said}; {'no variant was audited.' if group is None else _compared(group)}"
+    return f"{said}; {'no variant was audited.' if group is None else _compared(group, results)}"
 
 
 def _span(tolerances: Array) -> str:
     return " to ".join(scientific(float(end)) for end in sorted({tolerances.min(), tolerances.max()}))
 
 
-def _compared(group: xr.Dataset) -> str:
+def _compared(group: xr.Dataset, results: Results) -> str:
     """In words what the group says of variants that the archive calls ok."""
     verdict = Verdict.of(group)
     if not verdict.count:
         return "no variant was audited."
-    audit = f"{counted(verdict.count, 'variant')} computed again with more of everything"
+    audit = f"{counted(verdict.count, 'variant')} computed again with {_more(results)}"
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
         return f"but of {audit}, {beyond} did not hold it."
     differ = "differ" if verdict.count > 1 else "differs"
     return f"{audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
+
+
+def _more(results: Results) -> str:
+    """What audits have more of. Where frames or robots move, modes that the study fixes stay as they are."""
+    keeps = np.isin(results.dataset["fidelity_used"].values, [int(Fidelity.FRAME), int(Fidelity.GIVEN_FRAME)]).any()
+    fixed = [name for name, body in results.study.body.items() if body.modes != "auto"]
+    if not (keeps and fixed):
+        return "more of everything"
+    return f"more steps (modes of {listed(fixed[:3])} are fixed: what they leave out is in no estimate)"
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:

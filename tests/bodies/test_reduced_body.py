@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import engine
+from engine.batch.plan import make_plan
 from engine.bodies.modal.modal_body import ModalBody
 from engine.bodies.reduced.body import load_body, save_body
 from engine.scene.study import load
@@ -118,6 +119,22 @@ def test_a_study_with_a_reduced_body(tmp_path: Path) -> None:
     far = base | {"body": {"bridge": reduced}, "sensor": {"far": {"body": "bridge", "at": LENGTH}}}
     with pytest.raises(BadInput, match="off its body"):
         load(write_document(far))
+
+
+def test_a_study_that_names_a_damaged_body_is_bad_input(tmp_path: Path) -> None:
+    """Wherever a byte of the file is another one; what is not noticed changes nothing."""
+    path = tmp_path / "bridge.nc"
+    save_body(body(STUDY["body"]["bridge"]), path)
+    whole, refused = path.read_bytes(), list[str]()
+    base = {key: part for key, part in STUDY.items() if key != "sweep"}
+    text = write_document(base | {"body": {"bridge": {"kind": "reduced", "file": str(path)}}})
+    for place in np.random.default_rng(2).integers(0, len(whole), 60).tolist():
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 16]) + whole[place + 1 :])
+        try:
+            make_plan(load(text))
+        except BadInput as error:
+            refused.append(error.where)
+    assert len(refused) > 10 and all(where.endswith("body.bridge.file") for where in refused)
 
 
 def test_parts_belong_to_the_content_of_the_file(tmp_path: Path) -> None:

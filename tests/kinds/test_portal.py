@@ -18,6 +18,9 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.pictures.portal import pictures
 from studies.protocol.study import kind_of
+from studies.reporting.comparison import compare
+from studies.reporting.summary import asked
+from studies.reporting.tabulated import table_of
 from studies.results.results import Results
 from studies.robots.findings import front, of_front
 from tests.robots.scenes import GANTRY, rail, scene
@@ -222,3 +225,19 @@ def test_what_cannot_be_marched_is_refused(make: Callable[[], Study], where: str
         study = make()
         kind_of(study).parts(study)
     assert caught.value.where.endswith(where)
+
+
+def test_results_of_robots_and_rails_are_in_tables_and_compared(found: Any) -> None:
+    """Every robot has its row or column; archives that differ in nothing else are told apart."""
+    results = Results.of(found)
+    rows = {f"{one.name} {one.sensor}": one for one in asked(results)}
+    assert {"error_moving portal", "error_working portal", "deflection_largest left"} <= set(rows)
+    assert rows["error_moving portal"].largest.value == found["error_moving"].sel(robot="portal").values.max()
+    table, _ = table_of(results, ["error_moving"])
+    wanted = found["error_moving"].sel(robot="hanging").values.ravel()
+    np.testing.assert_array_equal(table["error_moving hanging (m)"], wanted)
+    other = found.copy(deep=True)
+    other["error_moving"] = 1.5 * other["error_moving"]
+    told = compare(results, Results.of(other))
+    assert not told.agree and compare(results, results).agree
+    assert {one.name for one in told.differences if one.beyond} == {"error_moving portal", "error_moving hanging"}

@@ -12,7 +12,7 @@ from engine.scene.study import Study
 from results_schema.store.archive import open_archive
 from studies.reporting.summary import exit_code
 from studies.results.results import Results
-from studies.runs.audit import GROUP, Verdict, told_audit
+from studies.runs.audit import GROUP, Verdict, told_accuracy, told_audit
 from tests.floating.scenes import sliding_mass
 from tests.robots.scenes import scene
 from tests.studies.audits import group_of, outcome
@@ -40,6 +40,9 @@ def test_what_holds_is_said_to_hold(study: Any, tmp_path: Path) -> None:
     known = np.isfinite(group["observed_error"].values) & np.isfinite(group["estimated_error"].values)
     assert known.any() and (group["observed_error"].values[known] <= group["estimated_error"].values[known]).all()
     assert "audit of 2 variants found at most" in told_audit(found.audit, Results.of(found.results))[0]
+    # both fix the modes of their bodies, which stay as they are
+    said = told_accuracy(found.audit, Results.of(found.results))
+    assert "with more steps (modes of " in said and "more of everything" not in said
     archived = open_archive(tmp_path / "found.nc").groups[GROUP]
     np.testing.assert_array_equal(archived["observed_error"].values, group["observed_error"].values)
 

@@ -24,7 +24,8 @@ def test_status_and_fidelity_are_the_contract():
         (7, "beyond-theory"),
     ]
     assert [s for s in Status if s.values_kept] == [*list(Status)[:4], Status.BEYOND_THEORY]
-    assert [label(f) for f in Fidelity] == ["static", "force", "mass-without-convective", "mass", "tied", "frame"]
+    models = ["static", "force", "mass-without-convective", "mass", "tied", "frame", "given-frame"]
+    assert [label(f) for f in Fidelity] == models
     assert len({s.message for s in Status}) == len(Status)
 
 

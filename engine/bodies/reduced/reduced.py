@@ -58,6 +58,7 @@ class Reduced(Body):
         if self.take(info.context):
             return self
         try:
+            read_body(self.file)  # as a whole, so that it is refused here where it is damaged
             if not self.length > 0.0:
                 refuse(("file",), "this body has no track", received=shortened(self.file))
         except (WanderlastError, OSError) as error:
