@@ -210,14 +210,27 @@ def _contact(results: Results, carriage: str) -> list[str]:
         return []
     opened = known & (force < 0.0)
     if not opened.any():
-        least = extreme(-force)
-        assert least is not None
-        return [
-            f"{carriage} keeps its contact everywhere; the smallest contact force is "
-            f"{quantity(float(force[least]), 'N')}{uncertainty(results, f'{carriage}_contact_force_min', least)}"
-            f"{in_words(results, least)}."
-        ]
+        return [_closed(results, carriage, force)]
     return [_onset(results, carriage, opened, known)]
+
+
+def _closed(results: Results, carriage: str, force: Array) -> str:
+    """The smallest of contact forces that are all positive, and whether that is certain."""
+    least, name = extreme(-force), f"{carriage}_contact_force_min"
+    assert least is not None
+    smallest = f"the smallest contact force is {quantity(float(force[least]), 'N')}"
+    error, weighs = results.estimated_error(name), results.study.carriage[carriage].moving_mass > 0.0
+    off = float((results.everywhere(_weight(results, carriage)) * error)[least]) if weighs else np.nan
+    if off > force[least]:
+        known = f"with an estimated error of {quantity(off, 'N')}"
+        return f"Whether {carriage} keeps its contact is not certain: {smallest}, {known}{in_words(results, least)}."
+    loosely = uncertainty(results, name, least)
+    return f"{carriage} keeps its contact everywhere; {smallest}{loosely}{in_words(results, least)}."
+
+
+def _weight(results: Results, carriage: str) -> xr.DataArray | float:
+    """Of the mass that a carriage is or carries on its spring, N."""
+    return results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
 
 
 def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
@@ -243,8 +256,7 @@ def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
 
 def _worst(results: Results, carriage: str, opened: Mask) -> str:
     """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
-    weight = results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
-    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight)
+    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / _weight(results, carriage))
     place = extreme(-np.where(opened, ratio, np.nan))
     assert place is not None
     return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"

@@ -47,7 +47,7 @@ def labelled(pieces: Sequence[xr.Dataset], told: Told) -> xr.Dataset:
     held = np.isfinite(told.tolerance)
     worst = rows["estimated_error"][:, held].max(axis=1) if held.any() else np.full(cases.size, np.nan)
     dataset["error_estimate"] = declared["error_estimate"].holding(worst.reshape(cases.shape), cases.dims)
-    for name in list(rows):
+    for name in sorted(rows, key=list(declared).index):  # what matters most is declared first
         inner = ("result",) if name == "estimated_error" else declared[name].dims
         values = rows.pop(name)
         shape = (*cases.shape, *values.shape[1:])
