@@ -307,8 +307,8 @@ class Results:
     def of_sensor(self, variable: str, sensor: str) -> xr.DataArray:
         """A result over sensors, or robots or bodies, for one of them."""
         array = self.dataset[variable]
-        (dim,) = (dim for dim in array.dims if dim not in self.dims)
-        return array.sel({dim: sensor})
+        others = [dim for dim in array.dims if dim not in self.dims]
+        return array.sel({"sensor" if "sensor" in others else others[0]: sensor})
 
     def numbers(self, variable: str, sensor: str) -> Array:
         """The same as plain numbers."""
