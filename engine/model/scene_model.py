@@ -266,10 +266,13 @@ def check_moves(study: Study) -> None:
 
 
 def _in_use(study: Study, body: str) -> bool:
-    """Whether a body carries a carriage, a robot, a sensor or an envelope, or its frame moves or holds another one."""
+    """Whether a body carries a carriage, a robot, a sensor, an envelope, a load or a spring, or its frame moves or
+    holds another one."""
     moving = [name for carriage in study.carriage.values() for name in carriage.bodies]
     moving += [name for robot in study.robot.values() for name in robot.rails]
     moving += [*study.frame, *(frame.on for frame in study.frame.values())]
+    moving += [load.on for load in study.load.values()]
+    moving += [end.on for spring in study.spring.values() for end in spring.ends]
     read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
     return body in (*moving, *read)
 

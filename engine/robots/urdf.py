@@ -112,6 +112,8 @@ def table_of(file: Path, tool: str | None, name: str, turned: Array) -> str:
 
 
 def _chain(root: ElementTree.Element, tool: str | None) -> Chain:
+    for kind in ("link", "joint"):
+        _check_names(kind, [str(one.get("name")) for one in root.findall(kind)])
     links = {str(link.get("name")): link for link in root.findall("link")}
     joints = [_joint(joint, links) for joint in root.findall("joint")]
     held = {joint.child: joint for joint in joints}
@@ -135,6 +137,15 @@ def _chain(root: ElementTree.Element, tool: str | None) -> Chain:
     solids, places = _solids(links, joints, moving)
     poses = [joint.pose.after(places[joint.parent][1]) for joint in moving]
     return Chain(first[0], tip, moving, solids, poses, places[tip][1].place)
+
+
+def _check_names(kind: str, names: list[str]) -> None:
+    """Names are told in comments, each on one line, and tell what is meant."""
+    for place, name in enumerate(names):
+        if not name.isprintable():
+            raise _fault(f"a {kind} has a name with line breaks or the like", "printable letters", repr(name)[:40])
+        if name in names[:place]:
+            raise _fault(f"two {kind}s have the same name", "a name of its own for each", name)
 
 
 def _solids(
@@ -231,6 +242,8 @@ def _joint(joint: ElementTree.Element, links: Mapping[str, ElementTree.Element])
     if not axis.any():
         raise _fault(f"{where} has an axis without direction", "three numbers, not all zero", "0 0 0")
     speed = _number(where, _of(joint, "limit", "velocity") or "0")
+    if speed < 0.0:
+        raise _fault(f"{where} has a negative velocity", "a limit above 0", f"{speed:g}")
     return Joint(name, kind, parent, child, _pose(where, joint.find("origin")), axis, speed, _ends(where, joint))
 
 

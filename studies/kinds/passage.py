@@ -229,8 +229,9 @@ def _closed(results: Results, carriage: str, force: Array) -> str:
 
 
 def _weight(results: Results, carriage: str) -> xr.DataArray | float:
-    """Of the mass that a carriage is or carries on its spring, N."""
-    return results.parameter(f"carriage.{carriage}.mass") * results.parameter("gravity")
+    """Of all masses of a carriage, N."""
+    masses = [results.parameter(f"carriage.{carriage}.{key}") for key in results.study.carriage[carriage].masses]
+    return sum(masses) * results.parameter("gravity")
 
 
 def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:

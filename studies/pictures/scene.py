@@ -115,11 +115,12 @@ def _picture(scene: Layout, view: Array) -> Figure:
         (above if label.above or is_high else below).append(label)
     rows = _in_rows(above, ends), _in_rows(below, ends)
     top, bottom = (max((one.row + 1.3 for one in found), default=0.3) * step for found in rows)
+    study = scene.model.study
     caption = (
         "To scale, in metres; symbols are not. Carriages (red) stand where they start, those that follow as far behind "
         "as they trail; arrows along their ways; green: sensors; dashed: a track beside what carries it. What rides is "
         "drawn a little above its track."
-        f"{IN_MOTION * bool(scene.model.study.frame or scene.model.study.robot)}"
+        f"{IN_MOTION * any((study.frame, study.load, study.spring, study.robot))}"
     )
 
     def fill(drawing: Drawing) -> None:

@@ -175,7 +175,7 @@ def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:
     """The scene with its carriages at some positions."""
     carriages = model.study.carriage
     parts = {part.name: (part, model.study.body[part.name].outline(part.modal)) for part in model.bodies}
-    if model.study.frame:
+    if model.study.frame or model.study.load or model.study.spring:
         return Layout(model, {name: _hung(model.study, *part) for name, part in parts.items()}, positions, {})
     gap = GAP * max(float(np.ptp(np.concatenate(_points(outline)), axis=0).max()) for _, outline in parts.values())
     placed, contacts = dict[str, Placed](), dict[str, tuple[Standing, ...]]()

@@ -19,8 +19,9 @@ from studies.kinds.asymmetry import AsymmetryReduction
 from studies.protocol import study as running
 from studies.protocol.study import kind_of
 from studies.reporting import answers
+from studies.results.formatting import quantity
 from studies.results.results import Results
-from tests.engine.build import beam, force, shuttle, study, under
+from tests.engine.build import beam, cruise, force, oscillator, shuttle, study, under
 from tests.studies import scenes
 
 KINDS = tuple(scenes.MOTIONS)
@@ -303,6 +304,17 @@ def test_what_a_tolerance_of_its_sensor_would_hold_is_told_with_it() -> None:
     held = scenes.with_errors(dataset, 0.4, of_moment)
     held["tolerance"].values[...] = 0.1
     assert "N m (estimated to within 40 %) with" in answers.answer(held)[1]
+
+
+def test_errors_of_contact_forces_are_parts_of_the_whole_weight() -> None:
+    """Of a sprung mass with that of its wheel, all of which presses."""
+    wheel = oscillator(1.0, 300.0, cruise(0.0, 1.0, 0.2), wheel_mass=4.0)
+    dataset = studies.run(study(beam(), wheel, solver={"tolerance": 1e-2}))
+    force = float(dataset["car_contact_force_min"])
+    assert 0.0 < force < 0.98 * 5.0 * 9.81
+    error = 0.999
+    told = "\n".join(answers.answer(scenes.with_errors(dataset, error, "car_contact_force_min")))
+    assert f"with an estimated error of {quantity(error * 5.0 * 9.81, 'N')}" in told
 
 
 def test_an_envelope_that_is_known_loosely_says_so() -> None:

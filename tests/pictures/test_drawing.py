@@ -245,3 +245,16 @@ def test_robots_stand_where_their_plans_begin() -> None:
     for place, line in enumerate(placed.robots.values()):
         np.testing.assert_allclose(line[-1], record.robots[0, place, :3], atol=1e-9)
     assert [len(placed.feet(name)) for name in placed.robots] == [2, 1]
+
+
+def test_a_body_with_nothing_but_a_load_or_a_spring_is_drawn(tmp_path: Path) -> None:
+    """Fixed to the ground, as it has no frame of its own."""
+    bodies = {name: ARM | {"own_weight": True} for name in ("pushed", "tied")}
+    push = {"on": "pushed", "force": [0, 0, 5.0]}
+    cable = {"ends": [{"on": "tied"}, {"position": [10, 0, 3]}], "stiffness": 5.0, "length": 1.0}
+    more = {"load": {"push": push}, "spring": {"cable": cable}, "question": {"duration": 1.0}}
+    scene = Study(kind="moving-frames", gravity=9.81, body=bodies, **more)
+    placed = laid_out(scene)
+    np.testing.assert_allclose(placed.loaded("push"), [[10, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(placed.springs["cable"], [[10, 0, 0], [10, 0, -3]], atol=1e-12)
+    assert "their springs and loads" in write_drawing(scene, tmp_path / "drawing").read_text(encoding="utf-8")

@@ -164,6 +164,9 @@ def test_the_command_prints_a_table(file: Path, capsys: pytest.CaptureFixture[st
 
 BRANCH = (*JOINTS, joint("wiper", "revolute", "upper", "blade", "0 0 0", "0 0 0"))
 FAULTS = {
+    urdf(LINKS | {"a&#10;b": ""}): "line breaks",
+    urdf(joints=(*JOINTS[:-1], JOINTS[-1].replace("flange", "reach"))): "two joints have the same name",
+    urdf(joints=tuple(one.replace('velocity="2"', 'velocity="-2"') for one in JOINTS)): "negative velocity",
     "<robot": "no XML",
     "<sdf/>": "no URDF file",
     "<!DOCTYPE robot [<!ENTITY a 'b'>]><robot/>": "entities",
