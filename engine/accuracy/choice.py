@@ -19,7 +19,7 @@ from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
 from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
-from engine.kernels.nearest_pilots import cheapest, nearest
+from engine.kernels.nearest_pilots import cheapest, held_errors, nearest, told_errors
 from engine.march.outcome import Asked
 from engine.scene.sweep import Cases
 from engine.scene.variants import VariantValues, axes_of_scene, cases_tolerance
@@ -35,7 +35,7 @@ TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 so
 
 @dataclass(frozen=True, eq=False)
 class NeighbourErrors:
-    """What pilots tell their neighbours. error (M, R) told by each of their marches; held (2, columns x cuts, P): the
+    """What pilots tell their neighbours. error (M, R) told by each of their marches; held (P, 2, columns x cuts): the
     errors that are held over their tolerances, of those that follow the study's and of those that have their own;
     wanted: the same by which it is decided."""
 
@@ -43,16 +43,19 @@ class NeighbourErrors:
     held: Array
     wanted: Array
 
-    def errors(self, marches: Numbers) -> Array:
-        """(R, V) estimated errors by the marches (V, k) of neighbours; NaN where no estimate exists."""
-        error = worst_but_one(self.error[marches], axis=1)  # of (V, k, R)
-        return np.where(np.isfinite(error), error, np.nan).T
+    def errors(self, march: Numbers, rung: Numbers, neighbours: Numbers) -> Array:
+        """(R, V) estimated errors by the marches (columns x cuts, P) of neighbours (V, k) that tell of a variant's
+        rung; NaN where no estimate exists."""
+        found = np.empty((self.error.shape[1], rung.size))
+        told_errors(self.error, march, rung, neighbours, found)
+        return found
 
-    def worst(self, rung: Numbers, neighbours: NDArray[np.integer[Any]], tighter: Array) -> Array:
+    def worst(self, rung: Numbers, neighbours: Numbers, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        follows, own = self.held[:, rung[:, None], neighbours]
-        return worst_but_one(np.maximum(follows / tighter[:, None], own), axis=1)
+        found = np.empty(rung.size)
+        held_errors(self.held, rung, neighbours, tighter, found)
+        return found
 
 
 def neighbour_errors_of(
@@ -99,9 +102,10 @@ def nearest_others(pilots: Array, count: int) -> Numbers:
 
 
 def _by_rung(held: Sequence[Array]) -> Array:
-    """(2, columns x cuts, P) both parts of what is held; pilots without a truth say nothing."""
+    """(P, 2, columns x cuts) both parts of what is held; pilots without a truth say nothing."""
     found = np.stack(held)
-    return np.where(found > 0.0, found, 0.0).reshape(2, -1, found.shape[-1])
+    found = np.where(found > 0.0, found, 0.0).reshape(2, -1, found.shape[-1])
+    return np.ascontiguousarray(np.moveaxis(found, -1, 0))
 
 
 def _margins(measured: Measured, others: Numbers, results: int, telling: tuple[float, float]) -> tuple[Array, float]:
@@ -154,12 +158,16 @@ class Choice:
 
     def errors(self, variants: Counts) -> Array:
         """(R, V) estimated errors for some variants; NaN where no estimate exists."""
-        return self.neighbour_errors.errors(self._march[self.rung[variants, None], self.neighbours[variants]])
+        return self.neighbour_errors.errors(self._march, self.rung[variants], self._near(variants))
 
     def held(self, variants: Counts, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        return self.neighbour_errors.worst(self.rung[variants], self.neighbours[variants], tighter)
+        return self.neighbour_errors.worst(self.rung[variants], self._near(variants), tighter)
+
+    def _near(self, variants: Counts) -> Numbers:
+        """(V, k) numbers of pilots, as kernels take them."""
+        return self.neighbours[variants].astype(np.int32)
 
     @cached_property
     def _march(self) -> NDArray[np.int32]:
@@ -256,8 +264,8 @@ class _Neighbours(NamedTuple):
         nearest(coordinates(self.cases, part) * self.weights, self.pilots, neighbours)
         inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
         neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
-        cheapest(self.wanted, self.ranked, self.worth, neighbours, tighter, rung)
-        return part, neighbours.astype(_number_type(self.order.size)), rung
+        cheapest(self.wanted, self.worth, neighbours, tighter, rung)
+        return part, neighbours.astype(_number_type(self.order.size)), self.ranked[rung]
 
 
 def choose(of: Pilots, found: Found, share: Share) -> Choice:
@@ -274,7 +282,8 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     rung = np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=_number_type(order.size))
     rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
-    subject = _Neighbours(asked, cases, order, weights, pilots, errors.wanted, ranked, worth)
+    wanted = np.ascontiguousarray(errors.wanted[:, :, ranked])
+    subject = _Neighbours(asked, cases, order, weights, pilots, wanted, ranked, worth)
     for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
         neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
     return Choice(of.ladder(scene), results_of(asked), order, measured, neighbours, rung, errors)

@@ -77,7 +77,7 @@ class SceneGrid:
         """Whether the study says how many steps."""
         return self.values.has_fixed_steps
 
-    @property
+    @cached_property
     def _free_unit(self) -> int:
         """Steps of the grid per first period of free vibration: as in the mean passage."""
         scale = self.values.scene_time_scale

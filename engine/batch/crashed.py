@@ -22,8 +22,10 @@ def crashed_chunks(plan: Plan, crashed: Sequence[Counts], share: Share) -> Itera
     """The chunks of such variants: as of another variant, whose results say what there would be, emptied. Raises
     WorkersGaveUp where there is no other."""
     variants = np.unique(np.concatenate([NOBODY, *crashed]))
+    if not variants.size:
+        return
     others = np.setdiff1d(np.arange(plan.size), variants)
-    if variants.size and not others.size:
+    if not others.size:
         raise WorkersGaveUp("every variant ends the process that computes it", remedy="try the study without workers")
     shown = np.isin(variants, plan.shown)
     of_shown = np.intersect1d(others, plan.shown)
