@@ -14,7 +14,9 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
     from engine.scene.frames import Frame
+    from results_schema.quantities import Quantity
 
 #: Cells of the tables along a track: polynomials of degree 5 are off by (k h)^6/720 of a shape of wave number k, 1e-12
 #: of the tenth mode of a beam.
@@ -37,7 +39,8 @@ class ElasticBody:
     mass kg, length m; omega (N,) rad/s. places (G, 3) m and weights (G,) kg; shapes (G, 3, N) there, kg^(-1/2).
     own_inertia (3,): kg m2 that the places do not have. along: what moves along the track. slender: whether all of its
     mass lies there. rolls: whether its rotation about the track is known. bent (S,) -> (S, N, N): v_i' v_j' + w_i' w_j'
-    along the track, and its derivative, where the track grows shorter as it bends.
+    along the track, and its derivative, where the track grows shorter as it bends. modal: the body at rest, which knows
+    its section; None of what does not bend.
     """
 
     length: float
@@ -49,12 +52,22 @@ class ElasticBody:
     own_inertia: Array
     along: Along
     stiffens: bool
+    modal: ModalBody | None
     slender: bool = True
     rolls: bool = True
 
     def fields(self, x: Array, orders: Sequence[int]) -> Array:
         """(orders, S, 6, N) derivatives by x of displacements and rotations of every mode at places (S,) m."""
         return self.along.fields(x, orders)
+
+    def reading(self, quantity: Quantity, x: float) -> Array:
+        """(N,) what a sensor at a place of the track reads of every mode."""
+        if self.modal is None:
+            return np.zeros(0)
+        if quantity.of_section and self.modal.sections is not None:
+            return np.asarray(self.modal.sections.rows(quantity.name, [x])[0])
+        fields = self.fields(np.array([x]), (quantity.derivative,))[0, 0, Z]
+        return np.asarray(quantity.factor(self.modal) * fields)
 
     def track(self) -> Array:
         """(cells, 6, 6, N): fields as polynomials, see `engine.kernels.floating.layout`."""

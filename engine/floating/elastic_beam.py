@@ -144,6 +144,7 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str) -> Ela
         np.array([turning if whirls else 0.0, 0.0, 0.0]),
         Parts(tuple(parts)),
         frame.stiffening,
+        body.build(),
     )
     return _with_shapes(found)
 
@@ -174,5 +175,14 @@ def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str) -> Elas
     centre = np.array([[body.centre_of_mass, 0.0, 0.0]])
     none = np.zeros((1, 3, 0))
     return ElasticBody(
-        body.length, body.mass, np.zeros(0), centre, np.array([body.mass]), none, np.array(inertia), Parts(()), False
+        body.length,
+        body.mass,
+        np.zeros(0),
+        centre,
+        np.array([body.mass]),
+        none,
+        np.array(inertia),
+        Parts(()),
+        False,
+        None,
     )

@@ -87,17 +87,19 @@ def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str) 
     track, points = line_of(own, assembly.mesh, line.members, line.direction, np.array(own.track.offset))
     nodal = motion.reshape(-1, motion.shape[2])
     start = assembly.mesh.points[points.points[0]] + points.arms[0] + own.track.offset
+    modal = own.build()
     particles = _together([*_of_members(own, assembly, nodal, axes), *_of_masses(own, assembly, motion, axes)])
     return ElasticBody(
         length=own.length,
         mass=assembly.total_mass,
-        omega=np.asarray(own.build().omega),
+        omega=np.asarray(modal.omega),
         places=particles.places - axes @ start,
         weights=particles.masses,
         shapes=particles.shapes,
         own_inertia=np.zeros(3),
         along=Line(track, _ends(points, nodal, np.array(own.track.offset)), axes),
         stiffens=False,
+        modal=modal,
         slender=False,
     )
 

@@ -65,17 +65,19 @@ def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str
     start = held.file.places[track[0]] * own.length_unit
     places = (held.file.places * own.length_unit - start) @ axes.T
     shapes = np.einsum("ab,pbn->pan", axes, motion)
+    modal = own.build()
     weights, points, moved = particles(mass, places, shapes)
     return ElasticBody(
         length=own.length,
         mass=float(weights.sum()),
-        omega=np.asarray(own.build().omega),
+        omega=np.asarray(modal.omega),
         places=points,
         weights=weights,
         shapes=moved,
         own_inertia=np.zeros(3),
         along=NodeLine(tuple(_component(line.places, shapes[track, axis]) for axis in range(3))),
         stiffens=False,
+        modal=modal,
         slender=False,
         rolls=False,
     )

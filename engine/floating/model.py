@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -308,13 +308,13 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
         if sensor.under is not None:
             under.append((carriages.index(sensor.under), Z, 0))
             continue
+        assert sensor.at is not None
         name = str(sensor.body)
         body, quantity = model.bodies[name], sensor.reads
         under.append((-1, Z, quantity.rate))
         if body.omega.size:
-            fields = body.fields(np.array([sensor.at]), (quantity.derivative,))[0, 0, Z]
             first = model.first[name]
-            row[first : first + body.omega.size] = quantity.factor(_section(model.study.body[name])) * fields
+            row[first : first + body.omega.size] = body.reading(quantity, sensor.at)
     depths = _depths(model)
     under += [(-1, Z, 0)] * len(depths)
     return np.concatenate([rows, depths]), np.array(under, dtype=np.int64).reshape(-1, 3)
@@ -329,8 +329,3 @@ def _depths(model: FloatingModel) -> Array:
             first = model.first[name]
             own[:, first : first + body.omega.size] = fields.reshape(OF_DEPTH, -1)
     return rows.reshape(-1, model.size)
-
-
-def _section(body: Any) -> Any:
-    """The section of a beam, as quantities ask for it."""
-    return body.build()

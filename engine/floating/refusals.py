@@ -59,15 +59,11 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     if sensor.under is not None and sensor.quantity != "displacement":
         what = "under a carriage only the displacement is read here"
         raise fault(f"{here}.quantity", what, expected="displacement")
-    if sensor.quantity == "axial_force":
-        what = "axial_force is not available here"
-        raise fault(f"{here}.quantity", what, expected="displacement, bending_moment, …")
 
 
 def refuse_model(model: FloatingModel) -> None:
-    """Raise BadInput for a body that its joints cannot hold, or that does not tell what is asked of it."""
+    """Raise BadInput for a body that its joints cannot hold, or on which nothing can turn."""
     _check_held(model)
-    _check_readings(model)
     _check_rolling(model)
 
 
@@ -90,15 +86,6 @@ def _check_held(model: FloatingModel) -> None:
             what = "a joint that is driven or controlled holds the track's direction: shapes must not turn there"
             remedy = "a rigid body on the joint that carries this one, for a beam in a cradle"
             raise fault(here, what, expected="clamped at its beginning", remedy=remedy)
-
-
-def _check_readings(model: FloatingModel) -> None:
-    """Forces and stresses are read of single beams alone."""
-    for name, sensor in model.study.sensor.items():
-        if sensor.under is None and not model.bodies[str(sensor.body)].slender and sensor.reads.derivative:
-            what = "this quantity is read of single beams alone in frames that move"
-            here, expected = f"sensor.{name}.quantity", "displacement, velocity or acceleration"
-            raise model.study.source.fault(here, what, expected=expected, received=sensor.quantity)
 
 
 def _check_rolling(model: FloatingModel) -> None:

@@ -63,20 +63,24 @@ def test_integrals_are_those_of_the_finite_elements() -> None:
     assert body.weights.sum() == pytest.approx(assembly.total_mass, rel=1e-12)
 
 
-def test_one_member_is_a_beam() -> None:
-    """A clamped arm that is swung, and turned by its weight: as the beam it is made of."""
-    section = {key: ARM[key] for key in ("area", "second_moment", "youngs_modulus", "density")}
-    member = {"nodes": ["root", "tip"], "section": "all", "elements": 32}
-    frame = {
+def arm(modes: int, **section: float) -> dict:
+    """The arm as a frame of one member that hardly bends across and hardly twists."""
+    own = {key: ARM[key] for key in ("area", "second_moment", "youngs_modulus", "density")}
+    stiff = {"second_moment_lateral": 1e-3, "shear_modulus": 1e13, "torsion_constant": 1e-3}
+    return {
         "kind": "frame",
         "node": {"root": [1, 2, 5], "tip": [11, 2, 5]},
-        "section": {"all": section | {"second_moment_lateral": 1e-3, "shear_modulus": 1e13, "torsion_constant": 1e-3}},
-        "member": {"all": member},
+        "section": {"all": own | stiff | section},
+        "member": {"all": {"nodes": ["root", "tip"], "section": "all", "elements": 32}},
         "supports": {"root": "clamped"},
         "track": {"members": ["all"]},
-        "modes": 2,
+        "modes": modes,
         "own_weight": True,
     }
+
+
+def test_one_member_is_a_beam() -> None:
+    """A clamped arm that is swung, and turned by its weight: as the beam it is made of, with its section forces."""
     swing = {
         "joints": [{"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.5, "time": 2.0}}]
     }
@@ -86,11 +90,37 @@ def test_one_member_is_a_beam() -> None:
         "mass": 1.0,
         "motion": {"kind": "cruise", "start": 0.0, "end": 9.0, "speed": 3.0},
     }
-    found = []
-    for body in (frame, ARM | {"modes": 2, "own_weight": True}):
-        model, marched = steps(study(body, swing, carriage={"load": load}), 4.0, 4000, 40, FOX_GOODWIN)
-        found.append(history(model, marched, "ends", 0, 3))
-    assert found[0] == pytest.approx(found[1], abs=2e-5)
+    read = ("displacement", "acceleration", "bending_moment", "shear_force", "stress", "strain")
+    sensor = {name: {"body": "portal", "at": 2.2, "quantity": name} for name in read}
+    far, forces = [], []
+    beam = ARM | {"modes": 2, "own_weight": True, "fibre_distance": 0.04}
+    for body in (arm(2, fibre_distance=0.04, fibre_distance_lateral=0.04), beam):
+        scene = study(body, swing, carriage={"load": load}, sensor=sensor)
+        model, marched = steps(scene, 4.0, 4000, 40, FOX_GOODWIN)
+        far.append(history(model, marched, "ends", 0, 3))
+        forces.append(history(model, marched, "sensors", 0, len(read)))
+    assert far[0] == pytest.approx(far[1], abs=2e-5)
+    largest = np.abs(forces[1]).max(axis=0)
+    assert np.all(largest > 0.0)
+    assert forces[0] / largest == pytest.approx(forces[1] / largest, abs=2e-5)
+
+
+def test_a_turning_arm_pulls_at_its_root() -> None:
+    """The axial force of two axial modes under a steady rate, beside its closed form, as they vibrate about it."""
+    stiff = arm(2, second_moment=1e-1, second_moment_lateral=1e-1, torsion_constant=1e2)
+    turn = {"joints": [{"kind": "revolute", "axis": [0, 0, 1], "motion": {"kind": "steady", "rate": 3.0}}]}
+    sensor = {"pull": {"body": "portal", "at": 1.3, "quantity": "axial_force"}}
+    model, marched = steps(study(stiff, turn, sensor=sensor, gravity=0.0), 0.05, 4000, 40, FOX_GOODWIN)
+    k = (np.arange(2) + 0.5) * np.pi / 10.0
+    omega = k * np.sqrt(ARM["youngs_modulus"] / ARM["density"])
+    assert np.asarray(model.bodies["portal"].omega) == pytest.approx(omega, rel=2e-3)
+    times = marched.times[0][:, None]
+    # rho A rate^2 x = sum of rho A c_k sin k x: q'' + omega^2 q = c_k; the axes turn, so that omega^2 loses rate^2
+    c = 9.0 * 2.0 / 10.0 * np.sin(10.0 * k) / k**2
+    free = np.sqrt(omega**2 - 9.0)
+    pulled = ARM["youngs_modulus"] * ARM["area"] * k * np.cos(1.3 * k) * c / free**2 * (1.0 - np.cos(free * times))
+    wanted = pulled.sum(axis=1)
+    assert history(model, marched, "sensors")[:, 0] == pytest.approx(wanted, abs=5e-3 * np.abs(wanted).max())
 
 
 def test_a_shaken_base() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import straight
 from tests.bodies.models import Files
-from tests.floating.scenes import largest_drift
+from tests.floating.scenes import history, largest_drift, steps
 
 LENGTH, WIDTH, HEIGHT, CELLS = 4.0, 0.5, 0.4, 8
 DENSITY, BAR = 700.0, 2e6  # kg/m3; E A of the bars, N
@@ -93,6 +93,33 @@ def test_a_free_block_keeps_its_momentum(block: tuple[dict, np.ndarray, csc_arra
     drifts = [largest_drift(flying, count) for count in (2000, 4000)]
     assert drifts[0] < 1e-4
     assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_what_a_recovery_matrix_tells_of_a_block(block: tuple[dict, np.ndarray, csc_array], tmp_path: Path) -> None:
+    """Rises of the track from node to node, as rows of a matrix: those that sensors of its displacements see."""
+    table, nodes, _ = block
+    track = np.array(table["track"]["nodes"]) - 1
+    gap = LENGTH / CELLS
+    rows = np.zeros((CELLS + 1, nodes.size))
+    for number, (one, other) in enumerate(pairwise(track)):
+        rows[number, 3 * one + 2], rows[number, 3 * other + 2] = 1.0 / gap, -1.0 / gap  # z points up in the file
+    rows[-1] = rows[-2]
+    mmwrite(tmp_path / "recovery.mtx", csc_array(rows))
+    told = {"recovery": str(tmp_path / "recovery.mtx"), "strain_rows": [[n + 1] for n in range(CELLS + 1)]}
+    held = {"supports": {"1-4": "clamped"}}
+    places = {"left": 3 * gap, "right": 4 * gap}
+    sensor = {name: {"body": "block", "at": at} for name, at in places.items()}
+    sensor["rise"] = {"body": "block", "at": 3 * gap, "quantity": "strain"}
+    sensor["between"] = {"body": "block", "at": 3.5 * gap, "quantity": "strain"}
+    sensor["next"] = {"body": "block", "at": 4 * gap, "quantity": "strain"}
+    turn = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 1.0, "time": 0.5}}
+    model, marched = steps(scene(table | told | held, turn, sensor=sensor, gravity=9.81), 0.5, 500, 50)
+    left, right, rise, between, following = history(model, marched, "sensors", 0, 5).T
+    assert np.abs(rise).max() > 1e-5
+    assert rise == pytest.approx((right - left) / gap, abs=1e-12)
+    assert between == pytest.approx(0.5 * (rise + following), abs=1e-12)
+    with pytest.raises(BadInput, match=r"sensor\.rise\.quantity: .*strain is not available"):
+        scene(table | held, turn, sensor=sensor)
 
 
 def test_what_is_not_known_of_a_block_is_refused(block: tuple[dict, np.ndarray, csc_array], tmp_path: Path) -> None:
