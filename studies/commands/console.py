@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80  # of output that no terminal shows
 LONGEST_CELL = 400
+GAP = 2  # between the columns of a table
 SECONDS_PER_LINE = 30.0  # of what a run tells where no terminal shows a bar: ten lines in a log of five minutes
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
@@ -93,18 +94,40 @@ def paragraphs(*texts: str) -> None:
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table of text; columns of numbers stand to the right."""
     cells = [[printable(cell, LONGEST_CELL) for cell in row] for row in rows]
-    shown = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for place, heading in enumerate(headings):
+    shown = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
+    console = _output()
+    widths = _widths([headings, *cells], console.width)
+    for place, (heading, width) in enumerate(zip(headings, widths, strict=True)):
         numeric = all(_NUMBER.fullmatch(row[place]) for row in cells)
         side: JustifyMethod = "right" if numeric else "left"
-        shown.add_column(Text(heading, "dim"), justify=side, overflow="fold", no_wrap=place == 0)
+        shown.add_column(Text(heading, "dim"), justify=side, overflow="fold", no_wrap=place == 0, width=width)
     for row in cells:
         shown.add_row(*map(Text, row))
-    console = _output()
     if title:
         console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
     console.print(shown)
     console.line()
+
+
+def _widths(rows: Sequence[Sequence[str]], screen: int) -> list[int | None]:
+    """Widths of columns that wrap between words alone, the first one not at all; None where rich finds them by itself:
+    all fit as they are, or not even their longest words.
+
+    >>> _widths([("variants", "scheme", "steps"), ("5", "average-acceleration", "800 to 118,400")], 42)
+    [8, 20, 10]
+    """
+    columns = list(zip(*rows, strict=True))
+    whole = [max(map(len, column)) for column in columns]
+    least = [max(len(word) for cell in column for word in [*cell.split(), ""]) for column in columns]
+    least[0] = whole[0]
+    left = screen - GAP * (len(columns) - 1) - sum(least)
+    if left < 0 or sum(whole) - sum(least) <= left:
+        return [None] * len(columns)
+    while left:  # for the column whose longest cell takes the most lines
+        place = max(range(len(columns)), key=lambda n: whole[n] / least[n])
+        least[place] += 1
+        left -= 1
+    return list(least)
 
 
 def _heading(title: str) -> None:

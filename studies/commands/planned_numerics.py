@@ -14,20 +14,10 @@ from engine.march.outcome import Flat, used
 from results_schema.arrays import Array
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.findings.numerics_used import NAMES
-from studies.results.formatting import number, percent, scientific, spanned
+from studies.results.formatting import number, scientific, spanned
 from studies.results.results import spread
 
-HEADINGS = (
-    "variants",
-    "share",
-    "model",
-    "modes",
-    "scheme",
-    "steps",
-    "modes x steps",
-    "estimated error",
-    "of tolerance",
-)
+HEADINGS = ("variants", "model", "modes", "scheme", "steps", "estimated error", "of tolerance")
 MOST_LOOKED_AT = 4096  # variants of a group whose errors are looked at
 
 
@@ -68,32 +58,26 @@ def _largest(plan: Plan, error: Array) -> Array:
 
 
 def rows(parts: Sequence[Part]) -> list[tuple[str, ...]]:
-    """One row per model, number of modes and scheme, cheapest first: variants and their share, steps and modes x steps
-    over one passage or cycle, the largest error that is estimated for what is held, and over its tolerance."""
+    """One row per model, number of modes and scheme, cheapest first: variants, steps over one
+    passage or cycle, the largest error that is estimated for what is held, and over its tolerance."""
     kinds: dict[tuple[int, int, int], list[Part]] = {}
     for part in parts:
         kind = tuple(int(part.used[f"{name}_used"][0]) for name in ("fidelity", "modes", "scheme"))
         kinds.setdefault(kind, []).append(part)  # type: ignore[arg-type]
-    total = sum(part.size for part in parts)
-    return [
-        _row(Fidelity(model), modes, scheme, kinds[model, modes, scheme], total)
-        for model, modes, scheme in sorted(kinds)
-    ]
+    return [_row(Fidelity(model), modes, scheme, kinds[model, modes, scheme]) for model, modes, scheme in sorted(kinds)]
 
 
-def _row(model: Fidelity, modes: int, scheme: int, parts: Sequence[Part], total: int) -> tuple[str, ...]:
+def _row(model: Fidelity, modes: int, scheme: int, parts: Sequence[Part]) -> tuple[str, ...]:
     size = sum(part.size for part in parts)
     held = np.concatenate([part.held for part in parts])
     of_tolerance = number(float(held.max()), 2) if np.isfinite(held).all() else ""
     marched = model is not Fidelity.STATIC
     return (
         f"{size:,}",
-        percent(size / total),
         NAMES[model],
         str(modes) if marched else "none",
         label(SchemeUsed(scheme)) if marched else "",
         spanned([part.used["steps_used"][0] for part in parts], "{:,.0f}".format) if marched else "none",
-        spanned([part.used["work"][0] for part in parts], "{:,.0f}".format) if marched else "none",
         _error(np.concatenate([part.error for part in parts])),
         of_tolerance,
     )
