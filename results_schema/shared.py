@@ -86,9 +86,9 @@ MARCH = outputs("""
     {sensor}_rms | | {sensor} | optional | root mean square of {sensor}
         averaged over the recorded time; of sensors under a carriage, over the time that it is on the body
     {carriage}_contact_force_max | | N | nan | largest contact force of {carriage}
-        over 0-98 % of the span; NaN where the carriage is never there
+        over its way, without the last 2 % of the track towards a held end; NaN where the carriage is never there
     {carriage}_contact_force_min | | N | nan | smallest contact force of {carriage}
-        over 0-98 % of the span; NaN where the carriage is never there
+        over its way, without the last 2 % of the track towards a held end; NaN where the carriage is never there
     {carriage}_contact_force_min_position | | m | nan | position of {carriage} at its smallest contact force
         of its reference; NaN where that is off the body, or it never touches it
     {carriage}_separation_position | | m | optional nan | first position of {carriage} with a negative contact force

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 _MESSAGES = (
     "fine",
-    "the contact force is negative somewhere on 0-98 % of the span: the carriage would lift off there; values kept",
+    "the contact force is negative before the last 2 % of the way: the carriage would lift off there; values kept",
     "the error could not be estimated; values kept",
     "the estimated error is larger than the tolerance; values kept",
     "an eigenvalue, tie or Newton solution did not converge; no values",

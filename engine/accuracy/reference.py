@@ -141,6 +141,7 @@ def converge(
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, Marches(grid, values, levels), share)
+    pushes_along = any(carriage.pushes_along for carriage in asked.study.carriage.values())
     now, spent = march(np.arange(values.size), 0)
     found = Converged(
         now,
@@ -160,6 +161,8 @@ def converge(
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
         remaining = left_over(apart, change[:, active])
+        if pushes_along:
+            remaining = np.maximum(remaining, uncorrected(apart, change[:, active]))
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)
@@ -188,6 +191,13 @@ def left_over(change: Array, before: Array) -> Array:
     foretold = np.clip(np.maximum(foretold, np.minimum(CAUTION * foretold, 1.0)), LEAST_LEFT, MOST_LEFT)
     known = np.where(np.isfinite(ratio), foretold, FIRST_LEFT)
     return np.where(np.isinf(change), np.nan, change * known)
+
+
+def uncorrected(change: Array, before: Array) -> Array:
+    """(R, V) what is left of forces along a track, of which no exact static response is added: with twice the modes
+    half of their error stays, so that as much as the change is left; half of the one before it where a level happened
+    to bring none of the modes that matter."""
+    return np.where(np.isinf(change), np.nan, np.fmax(change, 0.5 * before))
 
 
 def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: Array) -> Converged:

@@ -23,6 +23,7 @@ from results_schema.status import Status, label
 from studies.commands.error_exit import drop_stdout
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.reporting.answers import answer_of
+from studies.results.findings_common import missed_most
 from studies.results.formatting import counted, duration, number, quantity
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy, told_audit
@@ -279,8 +280,7 @@ def show_outcome(outcome: Outcome) -> None:
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         _ranges(summary.in_tables(results), results.percentiles)
     accuracy = told_accuracy(outcome.audit, results)
-    statuses = _about_statuses(summary.counts(outcome.results), summary.noun(outcome.results), results.study.expected)
-    paragraphs(*statuses, *([f"Accuracy: {accuracy}"] if accuracy else []))
+    paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
     paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
 
 
@@ -370,11 +370,16 @@ def show_throughput(found: Throughput) -> None:
     )
 
 
-def _about_statuses(counts: Mapping[str, int], noun: str, expected: Sequence[str]) -> Iterator[str]:
+def _about_statuses(results: Results) -> Iterator[str]:
+    from studies.reporting import summary
+
+    counts, noun = summary.counts(results.dataset), summary.noun(results.dataset)
+    expected = results.study.expected
     for status in Status:
         if (count := counts.get(label(status), 0)) and status != Status.OK:
             part = "as the study expects, " if label(status) in expected else ""
-            yield f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}: {part}{status.message}."
+            most = missed_most(results) if status is Status.TOLERANCE_MISSED else ""
+            yield f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}: {part}{status.message}{most}."
 
 
 def _about_work(outcome: Outcome) -> str:

@@ -54,8 +54,9 @@ def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
 def derived_from(study: Study) -> Mapping[str, tuple[str, ...]]:
     """The results whose errors the amplifications have: that of the larger extreme, as both are over the static
-    value."""
-    return {f"dynamic_amplification {sensor}": (f"{sensor}_max", f"{sensor}_min") for sensor in study.sensor}
+    value; rates have none."""
+    steady = [name for name, sensor in study.sensor.items() if not sensor.reads.rate]
+    return {f"dynamic_amplification {name}": (f"{name}_max", f"{name}_min") for name in steady}
 
 
 def with_derived_errors(dataset: xr.Dataset, derived: Mapping[str, tuple[str, ...]]) -> xr.Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated
 
@@ -69,8 +70,10 @@ class Passage(Kind):
     def findings(self, results: Results) -> list[str]:
         told = (_largest, _amplified, _limited)
         said = ["".join(tell(results, sensor) for tell in told) for sensor in _told(results)]
-        said += [text for carriage in results.study.carriage for text in _contact(results, carriage)]
-        return [*said, *told_statuses(results)]
+        opened = _opened(results)
+        lifted = [_lifted(results, opened)] if opened else []
+        kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
+        return [*said[:1], *lifted, *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variants with the largest value and the largest amplification."""
@@ -97,7 +100,8 @@ def _largest(results: Results, sensor: str) -> str:
     gain, (top, best) = results.numbers("dynamic_amplification", sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
-    shown = "while the contact holds, " if not results.held.all() and results.held.any() else ""
+    opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
+    shown = "" if results.held[results.kept.values].all() else opened
     said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
     if best is None:
@@ -200,18 +204,30 @@ def _value(results: Results, sensor: str, place: Index) -> str:
     return f"{quantity(sides[side], results.sensors[sensor])}{loosely}{then}"
 
 
-def _contact(results: Results, carriage: str) -> list[str]:
-    """Where the contact force turns negative first, for each mass."""
-    if f"{carriage}_contact_force_min" not in results.dataset:
-        return []
-    force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
-    known = np.isfinite(force)
-    if not known.any() or not results.study.carriage[carriage].inertial:
-        return []
-    opened = known & (force < 0.0)
-    if not opened.any():
-        return [_closed(results, carriage, force)]
-    return [_onset(results, carriage, opened, known)]
+def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:
+    """Carriages with their smallest contact forces, where these are known and tell of lifting off."""
+    for carriage, spec in results.study.carriage.items():
+        if f"{carriage}_contact_force_min" in results.dataset and spec.inertial:
+            force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
+            if np.isfinite(force).any():
+                yield carriage, force
+
+
+def _opened(results: Results) -> dict[str, tuple[Mask, Mask]]:
+    """Where contact forces turn negative and where they are known, by carriage: most variants first."""
+    masks = {name: (np.isfinite(force) & (force < 0.0), np.isfinite(force)) for name, force in _contact_forces(results)}
+    found = [(name, both) for name, both in masks.items() if both[0].any()]
+    return dict(sorted(found, key=lambda one: -np.count_nonzero(one[1][0])))
+
+
+def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
+    """Which carriages would lift off, and where the first of them begins to."""
+    (first, masks), *others = opened.items()
+    more = [f"{name} in {int(np.count_nonzero(mask)):,}" for name, (mask, _) in others[:MOST_TOLD]]
+    if left := others[MOST_TOLD:]:
+        more.append(f"{len(left)} more")
+    also = f" So would {listed(more)}." if more else ""
+    return f"{_onset(results, first, *masks)}{also} {BEYOND}"
 
 
 def _closed(results: Results, carriage: str, force: Array) -> str:
@@ -239,11 +255,11 @@ def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
     shown = f"{carriage} would lift off in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
     speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
     if speed is None:
-        return f"{shown}. {BEYOND}"
+        return f"{shown}."
     if VARIANT in (speed.dim, speed.dim if group is None else group.dim):
-        return f"{shown}; {_worst(results, carriage, opened)}. {BEYOND}"
+        return f"{shown}; {_worst(results, carriage, opened)}."
     if group is None:
-        return f"{shown}, {_first_speed(results, speed, opened)}. {BEYOND}"
+        return f"{shown}, {_first_speed(results, speed, opened)}."
     along = results.everywhere(results.dataset[group.name])
     opening = sorted(set(along[opened].tolist()))
     told = [
@@ -252,7 +268,7 @@ def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
     ]
     calm = group.values[group.values < opening[0]]
     below = f"; up to {group.in_words(float(calm.max()))} never" if calm.size else ""
-    return f"{shown}: {', '.join(told)}{below}. {BEYOND}"
+    return f"{shown}: {', '.join(told)}{below}."
 
 
 def _worst(results: Results, carriage: str, opened: Mask) -> str:

@@ -158,13 +158,15 @@ def _contact(seen: View, carriage: str) -> Figure:
     force = _relative_force(seen, carriage)
     line = "; the line is where that begins" if _has_line(seen, force) else ""
     caption = seen.caption(
-        "Smallest contact force on 0-98 % of the span over the weight.",
+        "Smallest contact force over the weight, without the last 2 % of a way towards a held end.",
         f"Below zero the carriage would lift off{line}.",
     )
     least = float(np.nanmin(seen.plane(force)))
     title = f"{carriage} keeps its contact, with at least {number(least, 2)} of its weight"
     if least < 0.0:
         title = f"{carriage} would lift off{_from(seen, force)}"
+    elif float(np.nanmin(force)) < 0.0:
+        title = f"{carriage} keeps its contact in this part of the sweep, and would lift off in another"
     height = 3.4 if seen.y is not None else 2.8
     return draw(f"contact-{carriage}", title, caption, height, partial(_draw_contact, seen, carriage))
 

@@ -9,7 +9,7 @@ from engine.scene.study import Study
 from engine.scene.trains import Train
 from results_schema.arrays import Array
 from results_schema.status import Status
-from studies.results.formatting import counted, percent, quantity
+from studies.results.formatting import counted, percent, quantity, scientific
 from studies.results.results import Index, Results, extreme, statuses
 
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
@@ -71,7 +71,9 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
         return ""
     sensor = next((name for name in results.sensors if result in (f"{name}_max", f"{name}_min")), "")
     free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
-    remedy = f"; a `tolerance` of its own on sensor {sensor} holds it" if free else ""
+    remedy = f"; a `tolerance` of its own on sensor {sensor} asks for more" if free else ""
+    if sensor and results.study.sensor[sensor].reads.rate == 2:
+        remedy = "; where loads arrive at once it grows with every mode: `modes` says up to which frequency it counts"
     return f" (estimated to within {percent(error)}{remedy})"
 
 
@@ -111,6 +113,21 @@ def told_envelopes(results: Results) -> list[str]:
             f"{f' ({which})' if (which := results.at(place[:-1])) else ''}."
         )
     return said
+
+
+def missed_most(results: Results) -> str:
+    """Which result misses its tolerance by most among the variants that say so, as the end of a sentence."""
+    if "tolerance" not in results.dataset:
+        return ""
+    missed = results.dataset["status"] == int(Status.TOLERANCE_MISSED)
+    over = (results.dataset["estimated_error"] / results.dataset["tolerance"]).where(missed)
+    largest = over.max([dim for dim in over.dims if dim != "result"])
+    if largest.dims != ("result",) or not np.isfinite(largest).any():
+        return ""
+    place = int(np.nanargmax(largest.values))
+    name, asked = str(results.dataset["result"].values[place]), float(results.dataset["tolerance"].values[place])
+    error = float(largest.values[place]) * asked
+    return f" (most of all for {name}: {scientific(error)} where {scientific(asked)} was asked)"
 
 
 def told_statuses(results: Results) -> list[str]:

@@ -36,7 +36,8 @@ GROUP = "/audit"
 Errors = tuple[Array, Array]  # observed and told (R,)
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
 NONE_AUDITED = (
-    "no variant was audited: it would have taken too long; set audit = 20, say, to force an audit of 20 variants"
+    "no variant was audited: it would have taken too long (audit = 20, say, audits 20 variants all the same), or "
+    "nothing finer than what variants were computed with is left to compare them with"
 )
 
 

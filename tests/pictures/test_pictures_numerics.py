@@ -145,7 +145,7 @@ def test_errors_stand_beside_their_tolerances_the_nearest_first(plane: xr.Datase
     tolerances = {"a": 1e-3, "b": 1e-2, "unknown": 1e-3, "told": np.nan}
     dataset = put_errors(plane, tolerances, np.stack([errors, errors], axis=1))
     figure = drawn(dataset)["estimates"]
-    assert figure.title == "All estimated errors are within their tolerances; a comes nearest, at 90 %"
+    assert figure.title == "All errors that are held are estimated within their tolerances; a comes nearest, at 90 %"
     found = rows_of(figure)
     assert list(found) == ["a", "b", "told"]
     np.testing.assert_allclose(found["a"][1], [1e-4, 2e-4, 9e-4], rtol=1e-6)

@@ -48,7 +48,7 @@ def _title(name: str, error: Array, tolerance: float) -> str:
         return "No result is held to a tolerance"
     if error.max() <= tolerance:
         nearest = percent(error.max() / tolerance)
-        return f"All estimated errors are within their tolerances; {name} comes nearest, at {nearest}"
+        return f"All errors that are held are estimated within their tolerances; {name} comes nearest, at {nearest}"
     share = percent(float(np.mean(error > tolerance)))
     return (
         f"{name} may miss its tolerance in {share} of the variants, {number(error.max() / tolerance, 2)} times at most"
