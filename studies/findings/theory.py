@@ -16,6 +16,8 @@ CYCLE_POINTS = 720
 ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 ONE_PEAK = 1 / 8
 NEARLY = 0.01  # of the length: what counts as the middle
+PLACES = 65  # of the track, where shapes are looked at
+UNFELT, MOSTLY = 1e-6, 0.5  # of a motion, and of a deflection
 LONG_SWING = 0.45  # of the length: an amplitude that reaches the ends
 _PLACES = ("centre", "amplitude")
 
@@ -60,12 +62,29 @@ def lag(results: Results, sensor: str) -> Any:
     odd part -(2 zeta v/omega_1) phi phi' q_0 is half as much of dw_s/ds.
     """
     speed = results.parameter(f"carriage.{results.carriage_name}.motion.speed")
-    return -lag_factor(results, sensor) * damping_ratio(results) * speed / first_omega(results)
+    told = -lag_factor(results, sensor) * damping_ratio(results) * speed / first_omega(results)
+    return told if first_mode_bears(results) else np.nan * told
+
+
+def first_mode_bears(results: Results) -> bool:
+    """Whether the first elastic mode bears most of what the first carriage's weight deflects under it, without sweep:
+    the first of a frame may be a sway that hardly moves its track."""
+    recorded = results.recorded(results.carriage.on)
+    if recorded is not None:
+        omega, shapes = 2.0 * np.pi * recorded["frequency"].values, recorded["mode_shape"].values.T
+    else:
+        modal = _model(results, {}).leading_body.modal
+        omega, shapes = modal.omega, modal.shape(np.linspace(0.0, modal.length, PLACES))
+    elastic = omega > 0.0
+    borne = np.mean(shapes[:, elastic] ** 2, axis=0) / omega[elastic] ** 2
+    felt = np.flatnonzero(borne > UNFELT**2 * borne.max())
+    return bool(borne[felt[0]] > MOSTLY * borne.sum())
 
 
 def lag_factor(results: Results, sensor: str) -> int:
     """2 for a sensor at a fixed place, 1 under or on a carriage."""
-    return 2 if results.study.sensor[sensor].rides is None else 1
+    spec, riding = results.study.sensor[sensor], {other.riding_body for other in results.study.carriage.values()}
+    return 2 if spec.rides is None and spec.body not in riding else 1
 
 
 def lag_formula(results: Results, sensor: str) -> str:

@@ -196,7 +196,7 @@ def _lag(results: Results, sensor: str) -> str:
     if not np.isfinite(lag).any():
         return f"{sensor}: no lag is defined, as its static response does not vary or no variant has values."
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = np.where(expected != 0.0, np.abs(lag / expected - 1.0), np.nan)
+        apart = np.where(expected != 0.0, np.abs(lag / expected - 1.0), np.nan)  # nothing is expected: NaN
     known, formula = np.isfinite(apart), theory.lag_formula(results, sensor)
     axis = results.axis(".motion.speed")
     if axis is None or not known.any():
@@ -223,7 +223,8 @@ def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
     assert place is not None
     way = "trails" if lag[place] < 0.0 else "runs ahead"
     said = f"the response {way} by {quantity(abs(float(lag[place])), 'm')}{in_words(results, place)}"
-    return f"{said} (theory: {quantity(abs(float(expected[place])), 'm')})" if expected[place] else said
+    known = abs(float(np.nan_to_num(expected[place])))
+    return f"{said} (theory: {quantity(known, 'm')})" if known else said
 
 
 def _first_beyond(results: Results, sensor: str, settled: Mask) -> str:

@@ -127,9 +127,10 @@ def _lag(seen: View, sensors: list[str], more: str) -> Figure:
     results = seen.results
     cut = any(_lag_limit(seen, sensor) < _largest(_lags(seen, sensor)) for sensor in sensors)
     halves = any(theory.lag_factor(results, sensor) == 1 for sensor in sensors)
+    half = ", half as much under the carriage, where the place of reading moves too" if halves else ""
     caption = seen.caption(
-        "Lag of the response at equal position; negative: it trails. Dashed: what damping alone gives at low speed"
-        + (", half as much under the carriage, where the place of reading moves too." if halves else "."),
+        "Lag of the response at equal position; negative: it trails.",
+        f"Dashed: what damping alone gives at low speed{half}." if theory.first_mode_bears(results) else "",
         f"Lags beyond {LAGS_SHOWN:g} times that are cut off: there vibration left over from the turns decides."
         if cut
         else "",
@@ -181,7 +182,7 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
         axes.set_ylabel(f"lag of {seen.results.noun(sensor)}\n{seen.results.place(sensor)} ({scale.unit})")
         if axes is not rows[0] and axes.get_legend() is not None:
             axes.get_legend().remove()
-        if colours and axes is rows[0]:
+        if colours and axes is rows[0] and theory.first_mode_bears(seen.results):
             _name_theory(axes, theory.lag_formula(seen.results, sensor), seen)
     assert seen.x is not None
     rows[-1].set_xlabel(seen.x.title)

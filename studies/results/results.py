@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
+from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
 from studies.results.cells import counts_of
@@ -91,6 +92,20 @@ class Axis:
         return any(f".{path}".endswith(ending) for path in self.paths for ending in endings)
 
 
+def _check_whole(dataset: xr.Dataset, study: Study) -> None:
+    """Raise BadInput for some of a study's variants, or what was made of them: what is said is of all."""
+    swept = study.sweep.axes if study.output.keeps_variants else {}
+    sizes = {name: (axis.size, dataset[name].size) for name, axis in swept.items() if name in dataset}
+    cut = [name for name, (whole, there) in sizes.items() if whole != there or not dataset[name].ndim]
+    if cut or dataset["status"].dtype.kind != "i":
+        raise BadInput(
+            "this dataset holds a part of its study's results, or what was computed from them",
+            where=cut[0] if cut else "status",
+            expected="the dataset of a whole study",
+            remedy="select from what xarray has, or run a study of these variants alone",
+        )
+
+
 class Trace(NamedTuple):
     """History of one sensor in one variant: values (T,) over `along` (T,), whose name is `over`; elapsed s or None."""
 
@@ -120,11 +135,14 @@ class Results:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Results:
-        """The results of a dataset that carries its study's text. Raises BadInput where the text is no study."""
+        """The results of a dataset that carries its study's text. Raises BadInput where the text is no study, or the
+        dataset a part of its results."""
         import engine
 
         text = str(dataset.attrs["study"])
-        return cls(dataset, engine.load(text if "\n" in text else f"{text}\n"))
+        study = engine.load(text if "\n" in text else f"{text}\n")
+        _check_whole(dataset, study)
+        return cls(dataset, study)
 
     @cached_property
     def dims(self) -> tuple[str, ...]:

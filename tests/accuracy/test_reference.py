@@ -10,7 +10,17 @@ import pytest
 
 import studies
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.reference import DEAR, Beyond, Converged, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.reference import (
+    DEAR,
+    Beyond,
+    Converged,
+    as_fixed,
+    converge,
+    in_full,
+    is_free,
+    level_work,
+    uncorrected,
+)
 from engine.accuracy.results import differences, results_of
 from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import outcome
@@ -188,3 +198,16 @@ def test_a_train_is_told_about_what_it_is_off_by() -> None:
     numbers = [number for number, result in enumerate(results_of(grid.asked)) if result.name.endswith("_rms")]
     ratios = found.error[numbers, 0] / off[numbers, 0]
     assert ratios.size == 3 and ratios.min() >= 1.0 and ratios.max() <= 10.0, ratios
+
+
+def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_missing_from_a_level() -> None:
+    """A tail of terms 1/k^2, of which a level brings all that it should or none."""
+    terms = 1.0 / np.arange(1, 200_001) ** 2
+    for missing in (slice(0, 0), slice(16, 32)):
+        own = terms.copy()
+        own[missing] = 0.0
+        left = [float(own[modes:].sum()) for modes in (8, 16, 32)]
+        change, before = np.array([[left[1] - left[2]]]), np.array([[left[0] - left[1]]])
+        assert 0.9 * left[2] < uncorrected(change, before).item() < 3.0 * left[2]
+    assert np.isnan(uncorrected(np.array([np.inf]), np.array([1.0]))).all()
+    assert uncorrected(np.array([0.2]), np.array([np.nan])).item() == 0.2

@@ -227,25 +227,10 @@ def test_sentences_of_readings_follow_the_data() -> None:
 
 def test_shapes_across_the_loads_are_drawn_at_rest() -> None:
     """A girder on two columns, whose lowest mode sways out of its plane."""
-    section = {"area": 0.02, "second_moment": 6e-4, "second_moment_lateral": 5e-4, "torsion_constant": 9e-4}
-    nodes = {"foot": [0, 0, 0], "left": [0, 0, 2], "right": [4, 0, 2], "end": [4, 0, 0]}
-    member = {
-        "column": {"nodes": ["foot", "left"], "section": "box", "up": [1, 0, 0], "elements": 2},
-        "girder": {"nodes": ["left", "right"], "section": "box", "elements": 4},
-        "other": {"nodes": ["right", "end"], "section": "box", "up": [1, 0, 0], "elements": 2},
-    }
-    frame = {
-        "kind": "frame",
-        "node": nodes,
-        "section": {"box": section | {"youngs_modulus": 2.1e11, "shear_modulus": 8.1e10, "density": 7850.0}},
-        "member": member,
-        "supports": {"foot": "clamped", "end": "clamped"},
-        "track": {"members": ["girder"]},
-    }
     way = {"kind": "cruise", "start": 1.0, "end": 3.0, "speed": 1.0}
     car = {"on": "portal", "kind": "mass", "mass": 100.0, "motion": way}
     study = engine.Study(
-        kind="eigenfrequencies", body={"portal": frame}, carriage={"car": car}, question={"positions": 3}
+        kind="eigenfrequencies", body={"portal": small.PORTAL}, carriage={"car": car}, question={"positions": 3}
     )
     found = studies.run(study)
     moved = np.abs(found.mode_shape.isel(on_body=0, position=1)).max("body_place").values

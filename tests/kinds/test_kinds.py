@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.special import j0
 
+import engine
 import studies
 from engine.batch.execution import run
 from engine.observation.cycle_reduction import Compared
@@ -22,9 +24,18 @@ from studies.reporting import answers
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, force, oscillator, shuttle, study, under
-from tests.studies import scenes
+from tests.studies import at_rest, scenes
 
 KINDS = tuple(scenes.MOTIONS)
+MASSES = 'mass = { of = "carriage.table.mass", values = [600, 700] }'
+FOLLOWER = f"""\
+[carriage.second]
+on = "bed"
+kind = "mass"
+mass = 300.0
+headway = 1.0
+motion = {{ {scenes.MOTIONS["passage"].replace(chr(10), ", ")} }}
+"""
 
 
 MEASURING = (
@@ -210,6 +221,42 @@ def test_findings_of_a_passage_tell_where_the_contact_opens() -> None:
     assert opened.any() and not opened.all()
     assert f"first at {float(dataset.pace.values[opened.values][0]):.3g} m/s" in text
     assert "while the contact holds" in text and "; up to 10 kg never" in text
+
+
+def test_all_axles_that_lift_off_are_told_before_other_sensors() -> None:
+    dataset = scenes.run("passage", f"{scenes.pace('passage', 2, 40, 8)}\n{MASSES}", extra=FOLLOWER)
+    said = answers.answer(dataset)
+    assert "would lift off" in said[1]
+    counts = {name: int((dataset[f"{name}_contact_force_min"] < 0).sum()) for name in ("table", "second")}
+    assert min(counts.values()) > 0
+    first, other = sorted(counts, key=lambda name: -counts[name])
+    assert said[1].startswith(f"{first} would lift off in {counts[first]} of 16 variants")
+    assert f" So would {other} in {counts[other]}. The equations assume contact" in said[1]
+    heavy = scenes.run("passage", f"{scenes.pace('passage', 20, 30, 3)}\n{MASSES}")
+    assert "with a contact that opens in every variant, the largest" in answers.answer(heavy)[0]
+
+
+@pytest.mark.parametrize("part", [{"pace": 0}, {"pace": slice(0, 2)}])
+def test_a_part_of_a_dataset_gives_no_answer(part: dict[str, Any]) -> None:
+    dataset = scenes.run("passage", scenes.pace("passage"))
+    with pytest.raises(BadInput, match="pace: this dataset holds a part of its study's results"):
+        studies.answer(dataset.isel(part))
+    with pytest.raises(BadInput, match="status: this dataset holds a part"):
+        studies.figures(dataset.mean("pace", keep_attrs=True).drop_vars("pace", errors="ignore"))
+
+
+def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> None:
+    """A girder on two columns, whose first mode in its plane hardly moves the girder along the loads."""
+    way = {"kind": "out-and-back", "start": 0.6, "end": 3.6, "speed": 1.0, "turn": 0.06, "cycles": 2}
+    car = {"on": "portal", "kind": "mass", "mass": 100.0, "motion": way}
+    sensor = {"middle": {"body": "portal", "at": 2.0}}
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.5, 1.0]}}
+    portal = {"body": {"portal": at_rest.PORTAL | {"damping_ratio": 0.02}}, "carriage": {"car": car}}
+    dataset = studies.run(engine.Study(kind="asymmetry", sensor=sensor, sweep=speeds, **portal))
+    told = "\n".join(answers.answer(dataset))
+    assert "middle: the response trails by" in told and "theory" not in told
+    assert not theory.first_mode_bears(Results.of(dataset))
+    assert theory.first_mode_bears(Results.of(scenes.run("asymmetry", scenes.pace("asymmetry"))))
 
 
 @pytest.mark.parametrize(

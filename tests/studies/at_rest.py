@@ -38,6 +38,30 @@ kind = "mass"
 mass = 40.0
 """
 
+#: A girder on two columns; its lowest mode sways out of its plane, the next one in it.
+PORTAL = {
+    "kind": "frame",
+    "node": {"foot": [0, 0, 0], "left": [0, 0, 2], "right": [4, 0, 2], "end": [4, 0, 0]},
+    "section": {
+        "box": {
+            "area": 0.02,
+            "second_moment": 6e-4,
+            "second_moment_lateral": 5e-4,
+            "torsion_constant": 9e-4,
+            "youngs_modulus": 2.1e11,
+            "shear_modulus": 8.1e10,
+            "density": 7850.0,
+        }
+    },
+    "member": {
+        "column": {"nodes": ["foot", "left"], "section": "box", "up": [1, 0, 0], "elements": 2},
+        "girder": {"nodes": ["left", "right"], "section": "box", "elements": 4},
+        "other": {"nodes": ["right", "end"], "section": "box", "up": [1, 0, 0], "elements": 2},
+    },
+    "supports": {"foot": "clamped", "end": "clamped"},
+    "track": {"members": ["girder"]},
+}
+
 
 def text_of(kind: str, question: str = "positions = 5", sweep: str = "", carriage: str = CAR) -> str:
     """A study file of a pinned beam of 4 m; question, sweep: lines of their tables."""
