@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from studies.results.formatting import listed, percent
 from studies.results.results import Results
 
 FREQUENCY_WANTED = 0.002  # relative error of frequencies for which the sentences name a number of modes
 READING_WANTED = 1e-4  # the same of readings, over the largest reading
+STILL = 1e-6  # of the largest motion of all modes
 ROUNDING = 1e-9  # of the largest: what differs by less is the same
 
 
@@ -53,6 +54,13 @@ def enough_modes(results: Results, error: Array, wanted: float, what: str, again
         f"Of {counts[0]} to {counts[-1]} modes of every body, {what} within {percent(wanted)} of {against}: "
         f"{listed(texts)}."
     )
+
+
+def moves_no_track(results: Results) -> Mask:
+    """(positions, modes) which modes of the scene without sweep move no track along its loads: others sway or twist."""
+    shapes = results.dataset["mode_shape"].transpose("position", "mode", "on_body", "body_place").values
+    sizes = np.nanmax(np.abs(shapes), axis=(2, 3))
+    return np.asarray(~(sizes > STILL * np.nanmax(sizes)))
 
 
 def contacts_vary(results: Results) -> bool:

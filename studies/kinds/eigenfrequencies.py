@@ -17,7 +17,7 @@ from results_schema.arrays import Array
 from results_schema.variable import outputs
 from results_schema.variables import declare
 from studies.at_rest.at_rest import AtRestKind
-from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors
+from studies.at_rest.findings import FREQUENCY_WANTED, enough_modes, frequency_errors, moves_no_track
 from studies.at_rest.labelling import BODY_PLACES, COORDINATES
 from studies.at_rest.positions import Asked, all_positions
 from studies.protocol.study import question_of
@@ -102,11 +102,24 @@ class Eigenfrequencies(AtRestKind):
         return {"frequency": mode, "base_frequency": mode, "mode_shape": mode}
 
     def findings(self, results: Results) -> list[str]:
-        said = [_along(results), *_together(results), *_sweep(results)]
+        said = [_along(results), *_across(results), *_together(results), *_sweep(results)]
         return [*said, *_unreduced(results), *_mode_counts(results)]
 
 
 KIND = Eigenfrequencies()
+
+
+def _across(results: Results) -> list[str]:
+    """Which modes do not feel what rides; none where all do."""
+    still = np.flatnonzero(moves_no_track(results).all(axis=0)) + 1
+    if not still.size:
+        return []
+    modes = f"mode{'s' * (still.size > 1)} {listed([str(number) for number in still])}"
+    verb, feel = ("move", "do not feel") if still.size > 1 else ("moves", "does not feel")
+    return [
+        f"{modes[0].upper()}{modes[1:]} {verb} no track along its loads and {feel} {results.carriage_name}, which "
+        "presses along the loads alone: its mass across them is in no frequency."
+    ]
 
 
 def _count(study: Study) -> int:

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
-from results_schema.late import xr
-from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors
+from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors, moves_no_track
 from studies.pictures import at_rest
 from studies.pictures.common.figures import ALIKE, HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
@@ -18,7 +17,6 @@ from studies.results.results import Results
 
 SWEPT_MODES = 3  # with a panel over the sweep
 SHAPES = 4  # modes whose shapes are drawn
-STILL = 1e-6  # of the largest motion of all modes: below it a mode does not move the tracks along their loads
 GAP = 1.3  # of the largest amplitude, between a body that rides and what it rides
 
 
@@ -126,14 +124,13 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
     size = base.sizes["position"]
     columns = sorted({0, size // 2, size - 1})
     grid = drawing.subplots(count, len(columns), squeeze=False, sharex=True, sharey=True)
-    bodies = at_rest.places(results)
+    bodies, still = at_rest.places(results), moves_no_track(results)
     riding = {carriage.riding_body for carriage in results.study.carriage.values()}
     for mode in range(count):
-        first = np.asarray(shape.isel(position=0, mode=mode).values)
         for column, place in enumerate(columns):
             axes, position = grid[mode, column], float(base["position"][place])
             lines = np.asarray(shape.isel(position=place, mode=mode).values)
-            scale = _scale(lines, shape) * (-1.0 if np.nansum(lines * first) < 0.0 else 1.0)
+            scale = 0.0 if still[place, mode] else 1.0 / float(np.nanmax(np.abs(lines)))
             for body, line, colour in zip(bodies, lines, shades(len(bodies)), strict=True):
                 x, level = body.at(position), -GAP if body.name in riding else 0.0
                 axes.plot(x, np.full_like(x, level), color=HAIR, linewidth=1.0, zorder=1.5)
@@ -158,9 +155,3 @@ def _draw_shapes(results: Results, count: int, drawing: Drawing) -> None:
         axes.set_xlabel(at_rest.way_title(results))
     if len(bodies) > 1:
         legend_of_all(drawing, grid[0, 0])
-
-
-def _scale(lines: Array, shapes: xr.DataArray) -> float:
-    """What a mode's motions are drawn by; 0 where it does not move the tracks along their loads."""
-    largest = float(np.nanmax(np.abs(lines)))
-    return 1.0 / largest if largest > STILL * float(np.nanmax(np.abs(shapes.values))) else 0.0

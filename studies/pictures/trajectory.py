@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import sizes
+from studies.findings.theory import first_omega
 from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades
 from studies.pictures.common.sweep_view import Curve, coincide
 from studies.pictures.common.traces import picked
@@ -15,6 +16,7 @@ from studies.results.formatting import quantity, scale_for
 from studies.results.results import Index, Results, chosen
 
 MOST_ROWS = 4
+PER_PERIOD = 6  # instants: fewer draw another vibration than there is
 MOST_CURVES = 5
 MOST_ALIKE = 3.0  # longest over shortest history that can share an axis of seconds
 
@@ -32,13 +34,27 @@ def pictures(results: Results) -> list[Figure]:
     units = {name: results.sensors[name] for name in sensors}
     hang = " Displacements point down, as the body hangs." if "m" in units.values() else ""
     title = ranging(results, sensors[0], units[sensors[0]], shown)
-    found = [histories(results, "sensors", title, f"{many}{more}{hang}", units, shown)]
+    coarse = _coarse(results, sensors[0], shown[0])
+    found = [histories(results, "sensors", title, f"{many}{more}{hang}{coarse}", units, shown)]
     ways = _carriage_rows(results)
     if not ways:
         return found
     name = next(iter(ways))
     title = ranging(results, name, ways[name], shown)
     return [*found, histories(results, "carriages", title, many, ways, shown)]
+
+
+def _coarse(results: Results, sensor: str, index: Index) -> str:
+    """That instants are too few to draw the first vibration of the body by; "" where they are enough."""
+    times = results.trace(sensor, index).times
+    each = (times.size - 1) / float(times[-1] - times[0])
+    first = float(np.max(first_omega(results))) / (2.0 * np.pi)
+    if each >= PER_PERIOD * first:
+        return ""
+    return (
+        f" The histories have {quantity(each, 'Hz')} of instants and the body vibrates at {quantity(first, 'Hz')} and "
+        'more: between two of them it does what is not drawn; [output] histories = "all" keeps every step.'
+    )
 
 
 def ranging(results: Results, name: str, unit: str, shown: list[Index]) -> str:

@@ -182,3 +182,10 @@ def test_no_text_is_mathematics() -> None:
     assert len(figures.png(figure)) > 1000
     for label in figure.drawing.axes[0].get_yticklabels():
         assert "$" not in label.get_text()
+
+
+@pytest.mark.parametrize(("times", "coarse"), [("[0, 1, 3]", False), ("[0, 100, 300]", True)])
+def test_histories_with_too_few_instants_for_the_vibration_say_so(times: str, coarse: bool) -> None:
+    text = scenes.text_of("trajectory").replace("times = [0, 1, 3]", f"times = {times}")
+    sensors, *_ = answers.figures(studies.run(engine.load(text)))
+    assert ("between two of them it does what is not drawn" in sensors.caption) == coarse
