@@ -193,7 +193,7 @@ def progress_line(label: str, seconds: float, *, words: str, resumed: int | None
     """
     doing = f"{label}: {words}; " if words else f"{label}: "
     done = finished - (resumed or 0)
-    left = f", about {duration(seconds * (total - finished) / done)} left" if done else ""
+    left = f", about {duration(seconds * (total - finished) / done)} left" if done and finished < total else ""
     return f"{doing}{finished:,} of {total:,} after {duration(seconds)}{left}"
 
 

@@ -200,12 +200,8 @@ def _in_step(plan: Plan) -> Iterator[Table]:
     """Swept speeds at which the axles of a train come once in a first period."""
     frequency, study = plan.base.first_omega / (2.0 * np.pi), plan.study
     for name, train in study.train.items():
-        place = list(study.carriage).index(axle_name(name, 0))
-        speeds = [
-            grid.scene.carriages[place].rider.top_speed / grid.values.time_scale(axle_name(name, 0))
-            for grid in plan.grids
-        ]
-        lowest, highest = float(np.min(np.concatenate(speeds))), float(np.max(np.concatenate(speeds)))
+        speeds = np.concatenate([grid.values.speed(axle_name(name, 0)) for grid in plan.grids])
+        lowest, highest = float(speeds.min()), float(speeds.max())
         typed = next(
             (typed_unit(study, axis.name) for axis in plan.cases.axes if f"train.{name}.motion.speed" in axis.of), None
         )

@@ -245,3 +245,13 @@ def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
     tables = preview(kind_of(whole).parts(whole), 1).tables
     (table,) = [table for table in tables if "in step" in table.title]
     assert len(table.rows) > 1 and table.headings == ("speed", "way in a period", "part of its load")
+
+
+def test_equal_trains_push_in_step_at_equal_speeds() -> None:
+    """The second one sets off further back, so that its way is longer."""
+    second = TEXT.replace("train.tram", "train.other").split("[train.other]")[1].split("[sensor")[0]
+    speeds = 'speed = { of = ["train.tram.motion.speed", "train.other.motion.speed"], values = [1, 60] }'
+    text = TEXT.replace("[sensor", f"[train.other]{second.replace('start = 0', 'start = -12')}[sensor")
+    both = load(text.replace('speed = { of = "train.tram.motion.speed", values = [5, 10] }', speeds))
+    first, other = (t for t in preview(kind_of(both).parts(both), 1).tables if "in step" in t.title)
+    assert first.rows and first.rows == other.rows
