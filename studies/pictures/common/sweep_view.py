@@ -185,7 +185,9 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
         _draw_points(axes, seen, curves[0])
         return
     if seen.y is not None and coincide(curves):
-        axes.set_title(f"the same for {seen.y.noun} {seen.y.span}", loc="right", color=look.MUTED)
+        # Beside a title it would lie on it in narrow panels.
+        note = f"the same for {seen.y.noun} {seen.y.span}"
+        axes.text(0.99, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", color=look.MUTED, fontsize=8.0)
         curves = [curves[-1]._replace(label="")]
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
         _draw_curve(axes, curve, colour)
