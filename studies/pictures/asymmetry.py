@@ -79,7 +79,7 @@ def _response(results: Results, sensor: str) -> list[Figure]:
         f"{which} Above: the last cycle over the position of the carriage; below: half the difference of forward and "
         "backward at equal position. Grey: the turns, which no index counts."
     ).strip()
-    if results.sensors[sensor] == "m":
+    if results.hangs(sensor):
         caption += " Above, displacements point down, as the body hangs."
     title = (
         f"{results.noun(sensor).capitalize()} {results.place(sensor)}: the two ways differ by "
@@ -116,7 +116,7 @@ def _draw_ways(results: Results, sensor: str, index: Index, axes: Sequence[Axes]
         for edge, inner in ((way.start, way.start + depth), (way.end, way.end - depth)):
             ax.axvspan(edge, inner, color=look.HAIR, alpha=0.45, linewidth=0.0, zorder=0.5)
         ax.set_xlim(min(way.start, way.end), max(way.start, way.end))
-    if units == "m":
+    if results.hangs(sensor):
         axes[0].invert_yaxis()
     axes[0].set_ylabel(results.label(sensor, scale.unit))
     axes[1].set_ylabel(f"odd part ({small.unit})" if small.unit else "odd part")

@@ -152,7 +152,7 @@ def _draw_one_cycle(axes: Axes, results: Results, sensor: str, index: Index) -> 
         for end in (0.25, 0.75):
             axes.axvline(end, color=look.MUTED, linewidth=0.7, zorder=1)
     axes.set_xlim(0.0, 1.0)
-    if results.sensors[sensor] == "m":
+    if results.hangs(sensor):
         axes.invert_yaxis()
     axes.set_ylabel(scale.unit)
 

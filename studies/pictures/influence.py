@@ -74,7 +74,7 @@ def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:
         widen(axes, [curve.y * scale.factor for curve in curves])
         axes.set_ylabel(results.label(name, scale.unit))
         axes.set_title(name.replace("_", " "))
-        if results.sensors[name] == "m":
+        if results.hangs(name):
             axes.invert_yaxis()
     rows[-1].set_xlabel(at_rest.position_title(results))
     drawing.align_ylabels()

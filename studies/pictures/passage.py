@@ -84,7 +84,7 @@ def _largest(seen: View, sensors: list[str], top: Index) -> Figure:
     amplified = any(np.isfinite(seen.plane(_gain(results, sensor))).any() for sensor in sensors)
     value = quantity(float(sizes(results, first)[top]), results.sensors[first])
     title = f"The largest {results.noun(first)} {results.place(first)} is {value},{in_words(results, top)}"
-    hang = " Displacements point down." if "m" in map(results.sensors.get, sensors) else ""
+    hang = " Displacements point down." if any(map(results.hangs, sensors)) else ""
     held = " While the contact holds the answer counts; lines go on beyond." if not results.held.all() else ""
     loose = [sensor.replace("_", " ") for sensor in sensors if _is_loose(seen, sensor)]
     dashed = f" Dashed: {listed(loose)} estimated to within more than {percent(LOOSE)}." if loose else ""
@@ -119,7 +119,7 @@ def _draw_largest(seen: View, sensors: list[str], columns: int, drawing: Drawing
         row[0].set_ylabel(results.label(sensor, scale.unit, "largest"))
         row[0].set_title(sensor.replace("_", " "))
         row[0].set_ylim(0.0, None)
-        if units == "m":
+        if results.hangs(sensor):
             row[0].invert_yaxis()
         if columns == 1:
             continue
@@ -226,7 +226,7 @@ def _response(results: Results, sensors: list[str], shown: list[Index], top: Ind
     whose = "the variant of the answer" if own == top else "the kept history with the largest value"
     errors = {sensor: float(results.estimated_error(sensor)[own]) for sensor in sensors}
     loose = [f" {name.replace('_', ' ')}: estimated to within {percent(e)}." for name, e in errors.items() if e > LOOSE]
-    hang = f" {DOWN}" if "m" in map(results.sensors.get, sensors) else ""
+    hang = f" {DOWN}" if any(map(results.hangs, sensors)) else ""
     caption = (
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")
         + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
@@ -248,7 +248,7 @@ def _draw_response(results: Results, sensors: list[str], shown: list[Index], dra
             )
         zero_line(axes)
         _shade_left(axes, results, shown[-1], max(float(way.position.max(initial=0.0)) for way in ways))
-        if results.sensors[sensor] == "m":
+        if results.hangs(sensor):
             axes.invert_yaxis()
         axes.set_ylabel(results.label(sensor, scale.unit))
         axes.set_title(sensor.replace("_", " "))

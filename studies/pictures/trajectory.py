@@ -32,7 +32,7 @@ def pictures(results: Results) -> list[Figure]:
     more = f" {left_out} more sensors are in the archive." if left_out else ""
     many = f"{len(shown)} of {len(results.traced())} kept histories." if len(results.traced()) > len(shown) else ""
     units = {name: results.sensors[name] for name in sensors}
-    hang = " Displacements point down, as the body hangs." if "m" in units.values() else ""
+    hang = " Displacements point down, as the body hangs." if any(map(results.hangs, sensors)) else ""
     title = ranging(results, sensors[0], units[sensors[0]], shown)
     coarse = _coarse(results, sensors[0], shown[0])
     found = [histories(results, "sensors", title, f"{many}{more}{hang}{coarse}", units, shown)]
@@ -99,7 +99,7 @@ def _draw(results: Results, units: dict[str, str], shown: list[Index], drawing: 
             continue
         axes.set_ylabel(results.label(name, scale.unit))
         axes.set_title(words)
-        if unit == "m":
+        if results.hangs(name):
             axes.invert_yaxis()
     rows[-1].set_xlabel("time over the duration of the motion" if relative else "time (s)")
     drawing.align_ylabels()

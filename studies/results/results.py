@@ -215,6 +215,10 @@ class Results:
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)
         return f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
 
+    def hangs(self, sensor: str) -> bool:
+        """Whether it reads a displacement along the loads, which points down as the body hangs."""
+        return self.sensors[sensor] == "m" and self.study.sensor[sensor].direction is None
+
     def label(self, sensor: str, unit: str, of: str = "") -> str:
         """Quantity, place and unit of a sensor as on a figure's axis."""
         words = f"{of} {self.noun(sensor)}".strip()
