@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
-from engine.robots.results import beyond_rest, differences, outcome, results_of, without_values
+from engine.robots.results import differences, outcome, results_of, without_values
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -50,10 +51,11 @@ class Rung(NamedTuple):
 
 
 class Level(NamedTuple):
-    """A model, and the stretches of its march."""
+    """A model, the stretches of its march, and where all would rest at its stations."""
 
     model: RobotModel
     times: Stretch
+    resting: Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,12 @@ class Ladder:
         model, every = self.coarsest, 2**rung.steps
         if rung.modes:
             model = build(with_open_modes(self.study, rung.modes))
-        return Level(model, stretches(model, self.duration, self.step / every, every))
+        return Level(model, stretches(model, self.duration, self.step / every, every), self.resting[0])
+
+    @cached_property
+    def resting(self) -> tuple[Record, Status]:
+        """Where all would rest, at the stations of all levels: of the coarsest model, as what modes miss at rest is added."""
+        return rest(self.coarsest, stretches(self.coarsest, self.duration, self.step, 1))
 
     def finer(self, rung: Rung, told: tuple[float, float]) -> Rung | None:
         """The next rung by the errors told of modes and of steps: the larger one is refined where it can be, else the
@@ -151,34 +158,30 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     """March rung by rung until what is held stays. Raises Halted."""
     rung, tolerance = Rung(0, 0), ladder.study.solver.tolerance
     level = ladder.level(rung)
-    record, now = marched(level, zero)
+    now = marched(level, zero)
     unknown = np.full(len(results_of(level.model)), np.nan)
     least = LEFT_BY_MODES, LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
     change, told = [unknown, unknown], [unknown if ladder.most.modes else np.zeros(unknown.size), unknown]
-    while not (told[0] + told[1]).max() <= tolerance:
-        by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in told)
+    while not (told[0] + told[1] + now.missed).max() <= tolerance:
+        by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in (told[0], told[1] + now.missed))
         finer = ladder.finer(rung, (by_modes if now.status.values_kept else 0.0, by_steps))
         if finer is None:
             break
         if halted():
             raise Halted
         axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
-        record, now = marched(level, zero)
+        now = marched(level, zero)
         apart = differences(level.model, before, now)
         apart = np.maximum(apart, ALIKE * apart.max())
         told[axis] = left(apart, change[axis], least[axis])
         rung, change[axis] = finer, apart
-    error = told[0] + told[1]
+    error = told[0] + told[1] + now.missed
     judged = Status.UNRESOLVED
     if np.isfinite(error).all():
         judged = Status.OK if error.max() <= tolerance else Status.TOLERANCE_MISSED
-    resting, status = rest(ladder.coarsest, ladder.level(Rung(0, 0)).times)
-    whole = Status(int(gravest(Status(int(gravest(judged, now.status))), status)))
-    steps = int(level.times.steps.sum())
-    reported = beyond_rest(now, record, resting, tolerance)
-    if not whole.values_kept:
-        reported = without_values(reported)
-    return Converged(level.model, reported, error, steps, rung, whole)
+    whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
+    reported = now if whole.values_kept else without_values(now)
+    return Converged(level.model, reported, error, int(level.times.steps.sum()), rung, whole)
 
 
 def left(change: Array, before: Array, least: float) -> Array:
@@ -188,11 +191,11 @@ def left(change: Array, before: Array, least: float) -> Array:
     return np.where(np.isinf(change), np.nan, change * np.maximum(least, ratio / (1.0 - ratio)))
 
 
-def marched(level: Level, zero: str) -> tuple[Record, Outcome]:
+def marched(level: Level, zero: str) -> Outcome:
     """The march of a level."""
     scheme = scheme_of(level.model.study)
     record, status = march(level.model, level.times, Newmark(scheme.beta, scheme.gamma))
-    return record, outcome(level.model, record, status, zero)
+    return outcome(level.model, level.times, record, level.resting, status, zero)
 
 
 def observed(
@@ -205,5 +208,5 @@ def observed(
     if not found.status.values_kept:
         return None
     beyond = ladder.level(Rung(found.rung.modes + ladder.most.modes, found.rung.steps + 1))
-    apart = differences(found.model, found.outcome, marched(beyond, zero)[1])
+    apart = differences(found.model, found.outcome, marched(beyond, zero))
     return (apart, found.error) if np.isfinite(apart).all() else None

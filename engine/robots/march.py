@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.kernels.layout import SOUND, Newmark
-from engine.kernels.robots.layout import OBSERVED, OF_GRIP, START, WHOLE, Record, Stretch
+from engine.kernels.robots.layout import OBSERVED, OF_GRIP, PASSED, START, WHOLE, Record, Stretch
 from engine.kernels.robots.march import march as march_kernel
 from engine.kernels.robots.march import rest as rest_kernel
 from results_schema.status import Status
@@ -31,18 +31,18 @@ def stretches(model: RobotModel, duration: float, step: float, every: int) -> St
 
 def march(model: RobotModel, times: Stretch, scheme: Newmark) -> tuple[Record, Status]:
     """What robots and rails do over all stretches of time."""
-    record = _empty(model, times)
+    record = _empty(model, times, int(np.sum(1 + times.steps)))
     return record, _status(march_kernel(model.system, times, scheme, record))
 
 
 def rest(model: RobotModel, times: Stretch) -> tuple[Record, Status]:
     """Where robots and rails would rest at the same stations, with joints held where they are told to be then."""
-    record, counts = _empty(model, times), model.system.counts.copy()
+    record, counts = _empty(model, times, 0), model.system.counts.copy()
     counts[:, WHOLE] = 0
     return record, _status(rest_kernel(model.system._replace(counts=counts), times, record))
 
 
-def _empty(model: RobotModel, times: Stretch) -> Record:
+def _empty(model: RobotModel, times: Stretch, passed: int) -> Record:
     S = int(np.sum(1 + times.steps // times.every))
     (R, J), N = model.system.coordinate.shape, len(model.system.springs)
     return Record(
@@ -50,6 +50,7 @@ def _empty(model: RobotModel, times: Stretch) -> Record:
         np.full((S, R, OBSERVED), math.nan),
         np.zeros((S, R, J)),
         np.zeros((S, R, 2, OF_GRIP)),
+        np.full((passed, R, PASSED), math.nan),
     )
 
 

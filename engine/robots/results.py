@@ -14,34 +14,41 @@ from engine.kernels.robots.layout import (
     HOLDS,
     MODES,
     MOVES,
+    OFF,
+    PASSED_PHASE,
+    PASSED_SUNK,
+    PRESSED,
     SEEN_ACTUAL,
-    SEEN_PHASE,
     SEEN_PLANNED,
     START,
     STEADY,
     SUNK,
     UP,
+    VERTICAL,
     WORKS,
 )
+from engine.robots.peaks import Steps, peaks
 from engine.robots.stress import is_told, largest_stress
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
-    from engine.kernels.robots.layout import Record
+    from engine.kernels.robots.layout import Record, Stretch
     from engine.robots.model import RobotModel
 
-VERTICAL = 2  # of a wrench and of a motion: its part along z
 DOING = {"moving": MOVES, "working": WORKS, "holding": HOLDS}
+OF_TOOLS = [f"{what}_{doing}" for what in ("error", "beyond_rest") for doing in DOING]
 KEPT = 800  # stations of a history
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a variant reports by one march: numbers by name, over robots (R,), components (R, 3) or rails (B,); at all
-    S stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2)."""
+    """What a variant reports by one march: numbers by name, over robots (R,), components (R, 3) or rails (B,); missed
+    (results,): by how much what each error is told of may be larger between steps, over the largest; at all S
+    stations: times (S,), planned tool centre points and their errors (S, R, 3), rails under robots (S, R, 2)."""
 
     numbers: dict[str, Array]
+    missed: Array
     times: Array
     planned: Array
     error: Array
@@ -50,51 +57,79 @@ class Outcome:
     status: Status
 
 
-def outcome(model: RobotModel, record: Record, status: Status, zero: str) -> Outcome:
-    """The numbers of a march; zero: what errors count from, "start" (what they are at time 0) or "unloaded" rails."""
-    seen, bodies = record.robots, model.system.body
-    planned = seen[:, :, SEEN_PLANNED : SEEN_PLANNED + 3]
-    error = seen[:, :, SEEN_ACTUAL : SEEN_ACTUAL + 3] - planned
-    at_start = error[0].copy()
-    if zero == "start":
-        error = error - at_start
-    phase, size = seen[:, :, SEEN_PHASE], np.linalg.norm(error, axis=2)
-    times, sunk = record.coordinates[:, 0, 3], record.grips[:, :, :, SUNK]
-    numbers = {
-        "cycle_time": model.done.max(),
-        "error_at_start": at_start,
-        "error_largest": np.abs(error).max(axis=0),
-        "error_largest_time": times[np.argmax(size, axis=0)],
-        "deflection_largest": np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))]),
-        "stress_largest": largest_stress(model, record).max(axis=0),
-        "rail_force_largest": record.grips[:, :, :, VERTICAL].max(axis=(0, 2)),
+def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, status: Status, zero: str) -> Outcome:
+    """The numbers of a march; resting: at the same stations, where all would rest; zero: what errors count from,
+    "start" (what they are at time 0) or "unloaded" rails."""
+    steps, at_start = Steps.of(cut), _off(record)[0].copy()
+    zero_at = at_start if zero == "start" else np.zeros_like(at_start)
+    tools, of_tools = _tools(record, resting, steps, zero_at, model.study.solver.tolerance)
+    rails, of_rails = _rails(model, cut, steps, record)
+    pressed = peaks(record.passed[:, :, PRESSED:], steps.stretch).value.max(axis=1)
+    numbers = {"cycle_time": model.done.max(), "error_at_start": at_start, "rail_force_largest": pressed}
+    return Outcome(
+        numbers | tools | rails,
+        np.concatenate([of_tools, of_rails]),
+        record.coordinates[:, 0, 3],
+        record.robots[:, :, SEEN_PLANNED : SEEN_PLANNED + 3],
+        _off(record) - zero_at,
+        record.grips[:, :, :, SUNK],
+        record.coordinates[:, : model.modes, 0],
+        status,
+    )
+
+
+def _off(record: Record) -> Array:
+    """(S, R, 3) actual less planned tool centre points at stations."""
+    actual, planned = (record.robots[:, :, first : first + 3] for first in (SEEN_ACTUAL, SEEN_PLANNED))
+    return np.asarray(actual - planned)
+
+
+def _tools(
+    record: Record, resting: Record, steps: Steps, zero_at: Array, tolerance: float
+) -> tuple[dict[str, Array], Array]:
+    """The numbers of tools, and what is missed of them (R,) over the longest error: what they are off, what they are
+    off from where they would rest, and for which part of the time that is within a tolerance of the longest error."""
+    off = record.passed[:, :, OFF : OFF + 3]
+    sizes = {
+        "error": np.linalg.norm(off - zero_at, axis=2),
+        "beyond_rest": np.linalg.norm(off - steps.between_stations(_off(resting)), axis=2),
     }
-    numbers |= {f"error_{name}": largest(np.where(phase == doing, size, np.nan)) for name, doing in DOING.items()}
-    return Outcome(numbers, times, planned, error, sunk, record.coordinates[:, : model.modes, 0], status)
+    found = {
+        f"{name}_{doing}": peaks(size, steps.stretch, record.passed[:, :, PASSED_PHASE] == phase)
+        for name, size in sizes.items()
+        for doing, phase in DOING.items()
+    }
+    longest = sizes["error"].max(axis=0)
+    close = sizes["beyond_rest"] <= tolerance * longest
+    numbers = {name: one.value for name, one in found.items()} | {
+        "error_largest": peaks(np.abs(off - zero_at), steps.stretch).value,
+        "error_largest_time": steps.times[np.argmax(sizes["error"], axis=0)],
+        "at_rest": np.diff(steps.times) @ close[1:] / np.ptp(steps.times),
+    }
+    return numbers, over(np.max([one.missed for one in found.values()], axis=0), longest)
 
 
-def beyond_rest(found: Outcome, record: Record, resting: Record, tolerance: float) -> Outcome:
-    """The same with the largest lengths of what tools are off from where they would rest, and for which part of the
-    time that is within a tolerance of the largest error."""
-    own, other = (one.robots[:, :, SEEN_ACTUAL : SEEN_ACTUAL + 3] for one in (record, resting))
-    size, phase = np.linalg.norm(own - other, axis=2), record.robots[:, :, SEEN_PHASE]
-    more = {f"beyond_rest_{name}": largest(np.where(phase == k, size, np.nan)) for name, k in DOING.items()}
-    close = size <= tolerance * np.linalg.norm(found.error, axis=2).max(axis=0)
-    more["at_rest"] = np.diff(found.times) @ close[1:] / np.ptp(found.times)
-    return replace(found, numbers=found.numbers | more)
+def _rails(model: RobotModel, cut: Stretch, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
+    """Deflections and stresses of rails (B,), and what is missed of deflections and of stresses that are told, over
+    them. Stresses are known at stations."""
+    sunk, bodies = peaks(record.passed[:, :, PASSED_SUNK:PRESSED], steps.stretch), model.system.body
+    down, missed = (np.array([part[bodies == b].max() for b in range(len(model.rails))]) for part in sunk)
+    stress = peaks(largest_stress(model, record), np.repeat(np.arange(cut.steps.size), cut.steps // cut.every + 1))
+    told = np.array([is_told(rail.bending) for rail in model.rails.values()])
+    numbers = {"deflection_largest": down, "stress_largest": stress.value}
+    return numbers, np.concatenate([over(missed, down), over(stress.missed, stress.value)[told]])
+
+
+def over(part: Array, whole: Array) -> Array:
+    """A part of a whole; infinite, or 0 with the part, where that is nothing."""
+    return np.divide(part, whole, out=np.where(part > 0.0, np.inf, 0.0), where=whole > 0.0)
 
 
 def without_values(found: Outcome) -> Outcome:
     """The same of a variant that has no values, histories too."""
-    fields = ("planned", "error", "sunk", "coordinates")
+    fields = ("missed", "planned", "error", "sunk", "coordinates")
     nothing = {name: np.full_like(getattr(found, name), np.nan) for name in fields}
     return replace(found, numbers={name: np.full_like(n, np.nan) for name, n in found.numbers.items()}, **nothing)
-
-
-def largest(sizes: Array) -> Array:
-    """(R,) over stations, NaN where there are none."""
-    most = np.max(np.nan_to_num(sizes, nan=-1.0), axis=0)
-    return np.asarray(np.where(most < 0.0, np.nan, most), dtype=np.float64)
 
 
 def results_of(model: RobotModel) -> list[str]:
@@ -104,22 +139,24 @@ def results_of(model: RobotModel) -> list[str]:
 
 
 def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
-    """(results,) how far two marches are apart at any station, over the largest length of each robot's error or the
-    largest deflection, and of stresses the largest, which alone are reported; NaN where ``other`` has none, infinite
-    where ``one`` has none."""
+    """(results,) how far two marches are apart at any station and in the largest values that are reported, over the
+    largest length of each robot's error or the largest deflection, and of stresses the largest, which alone are
+    reported; NaN where ``other`` has none, infinite where ``one`` has none."""
     count = len(results_of(model))
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(count, np.inf if other.status.values_kept else np.nan)
     apart = np.linalg.norm(one.error - other.error, axis=2).max(axis=0)
+    tools = [abs(one.numbers[name] - other.numbers[name]) for name in OF_TOOLS]
+    apart = np.fmax(apart, np.fmax.reduce(tools))  # what a robot never does has no number
     size = np.linalg.norm(other.error, axis=2).max(axis=0)
     sunk, bodies = np.abs(one.sunk - other.sunk), model.system.body
-    gaps = [sunk[:, bodies == b].max() for b in range(len(model.rails))]
+    gaps = np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))])
+    gaps = np.maximum(gaps, abs(one.numbers["deflection_largest"] - other.numbers["deflection_largest"]))
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
     largest_one, largest_other = (each.numbers["stress_largest"][told] for each in (one, other))
     apart = np.concatenate([apart, gaps, np.abs(largest_one - largest_other)])
     size = np.concatenate([size, other.numbers["deflection_largest"], largest_other])
-    found: Array = np.divide(apart, size, out=np.where(apart > 0.0, np.inf, 0.0), where=size > 0.0)
-    return found
+    return over(apart, size)
 
 
 def stations(found: Outcome) -> Counts:

@@ -124,10 +124,13 @@ def _traces(converged: Converged) -> dict[str, NDArray[Any]]:
 
 def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
     """Errors of all robots while one of them stands still where it starts."""
+    from engine.robots.results import DOING
+
     rows = []
     for name in study.robot:
         alone = _converged(study.with_values({f"robot.{name}.moves": []}), question, work)
-        rows.append(np.linalg.norm(alone.outcome.error, axis=2).max(axis=0))
+        largest = [alone.outcome.numbers[f"error_{doing}"] for doing in DOING]
+        rows.append(np.fmax.reduce(largest))
     return unlabelled({"error_without": np.stack(rows)})
 
 

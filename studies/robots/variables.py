@@ -7,7 +7,7 @@ from results_schema.variable import outputs
 RESULTS = outputs("""
     estimated_error | result | | optional nan float32 | estimated error of every result
         largest at any time, over the largest length of a robot's error or the largest deflection of a rail; of steps,
-        and of modes where their number is open
+        of what may be larger between these, and of modes where their number is open
     steps_used | | | int32 | number of steps used
         over the whole time
     cycle_time | | s | | time at which all robots have done what they are told

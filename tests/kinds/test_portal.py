@@ -82,10 +82,10 @@ def test_estimated_errors_are_no_smaller_than_true_ones(modes: int | str) -> Non
         found = converge(own, None, 0.5, "start")
         whole = own.with_values({f"body.{name}.modes": 6 if modes == 6 else 64 for name in study.body})
         finest = Ladder.of(whole, None, 0.5).level(Rung(0, found.rung.steps + 3))
-        true = differences(found.model, found.outcome, marched(finest, "start")[1])
+        true = differences(found.model, found.outcome, marched(finest, "start"))
         assert (true <= found.error).all() and found.error.max() <= 1e-2 and (true > 1e-5).all()
         many = own.with_values({f"body.{name}.modes": 20 for name in own.body})
-        fuller = marched(Ladder.of(many, None, 0.5).level(Rung(0, found.rung.steps + 3)), "start")[1]
+        fuller = marched(Ladder.of(many, None, 0.5).level(Rung(0, found.rung.steps + 3)), "start")
         assert (differences(found.model, found.outcome, fuller)[:2] < 2e-2).all()
 
 

@@ -22,11 +22,15 @@ from engine.kernels.robots.layout import (
     MISSED_THERE,
     MISSING,
     MOMENTUM,
+    OFF,
+    PASSED_PHASE,
+    PASSED_SUNK,
     PAYLOAD,
     PHASE,
     PLACE,
     PLANNED,
     PLANNED_TOOL,
+    PRESSED,
     PUSH,
     RATE,
     SEEN_ACTUAL,
@@ -38,6 +42,7 @@ from engine.kernels.robots.layout import (
     SUNK,
     UP_THERE,
     VALUE,
+    VERTICAL,
     WRENCH,
     Pace,
 )
@@ -61,7 +66,7 @@ def march(system, stretches, newmark, record):
     state, left = np.zeros((N, 3)), np.zeros(N)
     load_at(system, stretches.start[0], work)
     plan_at(system, stretches.start[0], work)
-    code, station = np.int64(settle(system, RESTING, state, work, left)), np.int64(0)
+    code, station, passed = np.int64(settle(system, RESTING, state, work, left)), np.int64(0), np.int64(0)
     energy = elastic_energy(system, state)
     for p in range(stretches.start.shape[0]):
         start, h = stretches.start[p], stretches.step[p]
@@ -77,8 +82,10 @@ def march(system, stretches, newmark, record):
                     code = np.int64(NOT_CONVERGED)
                 if not np.isfinite(energy):
                     return np.int64(NOT_CONVERGED)
-            if n % stretches.every == 0:
-                observe(system, start + n * h, state, work, left, record, station)
+            observe(system, start + n * h, state, work, left, record, station)
+            pass_by(record, station, passed)
+            passed += 1
+            if n % stretches.every == 0:  # what is no station is written over
                 station += 1
     return code
 
@@ -341,6 +348,18 @@ def observe(system, t, state, work, left, record, station):
             seen[SEEN_ACTUAL + k] = robot[ACTUAL_TOOL + k] + beyond[k]
         for k in range(work.six.shape[1]):
             seen[SEEN_WRENCH + k] = robot[WRENCH + k]
+
+
+@called
+def pass_by(record, station, passed):
+    """What is kept of every step, out of what is observed."""
+    for r in range(record.passed.shape[1]):
+        own, seen, grips = record.passed[passed, r], record.robots[station, r], record.grips[station, r]
+        for k in range(3):
+            own[OFF + k] = seen[SEEN_ACTUAL + k] - seen[SEEN_PLANNED + k]
+        own[PASSED_PHASE] = seen[SEEN_PHASE]
+        for g in range(2):
+            own[PASSED_SUNK + g], own[PRESSED + g] = grips[g, SUNK], grips[g, VERTICAL]
 
 
 @called
