@@ -91,7 +91,8 @@ class Ladder:
 
     @cached_property
     def resting(self) -> tuple[Record, Status]:
-        """Where all would rest, at the stations of all levels: of the coarsest model, as what modes miss at rest is added."""
+        """Where all would rest, at the stations of all levels, by the coarsest model: what modes miss at rest is
+        added."""
         return rest(self.coarsest, stretches(self.coarsest, self.duration, self.step, 1))
 
     def finer(self, rung: Rung, told: tuple[float, float]) -> Rung | None:

@@ -1,4 +1,5 @@
-"""Figures of robots on rails: cycle time against accuracy, places and errors of their tools, the rails bent."""
+"""Figures of robots on rails: cycle time against accuracy, errors of tools over what is swept and over time, the rails
+bent."""
 
 from __future__ import annotations
 
@@ -21,20 +22,24 @@ from studies.pictures.common.figures import (
     draw,
     legend_of_all,
 )
+from studies.pictures.common.sweep_view import View, along_axis
 from studies.pictures.moving_shapes import played
 from studies.results.formatting import listed, quantity, scale_for
-from studies.results.results import Index, Results
+from studies.results.results import Index, Results, extreme
 from studies.robots.findings import accuracy, of_front
+from studies.robots.limits import Limit, limits, longest_axis, words_of
 
-MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES = 6, 4, 3, 40
+MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES, MOST_MARKED = 6, 4, 3, 40, 12
 SIZE = 0.4  # of the distance between rails as drawn: how large the largest deflection is drawn at most
 ROWS_APART = 0.07  # of the longest rail, between two as drawn
 ALIKE = 0.01  # of the longest: times that are one
 
 
 def pictures(results: Results) -> list[Figure]:
-    """The front of a sweep, one variant over time, its rails where errors are longest and in its worst move."""
+    """The front of a sweep and errors along it, one variant over time, its rails where errors are longest and in its
+    worst move."""
     found = [_front_of(results)] if results.size > 1 and of_front(results).size else []
+    found += _along_sweep(results)
     traced = results.traced()
     if not traced:
         return found
@@ -76,6 +81,48 @@ def _draw_front(results: Results, words: str, error: Array, cycle: Array, drawin
     axes.set_xlabel("cycle time (s)")
     axes.set_ylabel(f"off from rest {words} ({scale.unit})")
     axes.set_ylim(bottom=0.0)
+
+
+def _along_sweep(results: Results) -> list[Figure]:
+    """What tools are off their plan over the swept number with the most values, with limits; [] without a sweep."""
+    axis, limited = longest_axis(results), {limit.name: limit for limit in limits(results)}
+    asked = dict.fromkeys(("error_moving", "error_working", *limited))
+    rows = {name: limited.get(name) for name in asked if np.isfinite(results.dataset[name]).any()}
+    if axis is None or not rows:
+        return []
+    off = {name: results.dataset[name].max("robot") for name in rows}
+    top = extreme(off[next(iter(rows))].transpose(*results.dims))
+    assert top is not None
+    held = {dim: place for dim, place in zip(results.dims, top, strict=True) if dim != axis.dim}
+    told = [f"{quantity(float(off[name].max()), 'm')} {words_of(name)}" for name in rows if name.startswith("error")]
+    names = [f"{limit.say(limit.value, 6)} {limit.words}" for limit in limited.values()]
+    dashed = f"Dashed: the limit{'s' if len(names) > 1 else ''} of {listed(names)}." if names else ""
+    seen = View(results, axis, None, held)
+    caption = seen.caption("Every tool at its worst.", *([dashed] if dashed else []))
+    title = f"Tools are off their plan by up to {listed(told)}"
+    return [draw("errors", title, caption, 0.8 + 1.8 * len(rows), partial(_draw_along, seen, rows))]
+
+
+def _draw_along(seen: View, rows: Mapping[str, Limit | None], drawing: Drawing) -> None:
+    assert seen.x is not None
+    dataset, every = seen.results.dataset, drawing.subplots(len(rows), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, (name, limit) in zip(every, rows.items(), strict=True):
+        most = max(float(seen.cut(dataset[name]).max()), limit.value if limit else 0.0)
+        scale = scale_for(most, "m") if limit is None or limit.typed is None else limit.typed
+        for r, robot in enumerate(list(seen.results.study.robot)[:MOST_ROBOTS]):
+            values, colour = seen.plane(dataset[name].sel(robot=robot)), DISTINCT[r % len(DISTINCT)]
+            line = "" if seen.is_sampled else "-"
+            marker = "o" if seen.is_sampled or len(values) <= MOST_MARKED else ""
+            axes.plot(
+                seen.along(seen.x), values * scale.factor, line, marker=marker, markersize=3, color=colour, label=robot
+            )
+        if limit is not None:
+            axes.axhline(limit.value * scale.factor, color=MUTED, linestyle="--", linewidth=1.0)
+        axes.set_ylabel(f"off {'plan' if name.startswith('error') else 'rest'} {words_of(name)}\n({scale.unit})")
+        axes.set_ylim(0.0, None)
+    along_axis(every[-1], seen)
+    drawing.align_ylabels()
+    legend_of_all(drawing, every[0])
 
 
 def _strip(results: Results, index: Index) -> Figure:

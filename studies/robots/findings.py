@@ -11,6 +11,7 @@ from results_schema.arrays import Array, Counts, Mask
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, scientific, spanned
 from studies.results.results import extreme
+from studies.robots.limits import DOING, told_limits
 
 if TYPE_CHECKING:
     from studies.results.results import Results
@@ -19,8 +20,9 @@ MOST_NAMED = 4
 
 
 def answer(results: Results) -> list[str]:
-    """The front, errors, deflections, what causes errors, statuses."""
+    """Where limits hold, the front, errors, deflections, what causes errors, statuses."""
     return [
+        *told_limits(results),
         *_front(results),
         *_errors(results),
         *_statics(results),
@@ -74,15 +76,15 @@ def _errors(results: Results) -> Iterator[str]:
 
 def _statics(results: Results) -> Iterator[str]:
     """How often an answer by statics alone would have done, and where not."""
-    dataset, words = results.dataset, {"moving": "in moves", "working": "at work", "holding": "while they hold"}
-    doing = {name: dataset[f"error_{name}"].values for name in words}
+    dataset = results.dataset
+    doing = {name: dataset[f"error_{name}"].values for name in DOING}
     largest = np.nanmax(np.nan_to_num(list(doing.values()), nan=-1.0), axis=0)
     known = np.isfinite(dataset["at_rest"].values) & (largest > 0.0)
     if not known.any():
         return
     times = spanned(dataset["at_rest"].values[known], percent)
-    off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in words}
-    told = listed([f"{percent(float(off[name]))} {words[name]}" for name in words])
+    off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in DOING}
+    told = listed([f"{percent(float(off[name]))} {words}" for name, words in DOING.items()])
     limit = scientific(results.study.solver.tolerance)
     yield (
         f"Statics alone would have told tools to {limit} of their largest errors for {times} of the time; "

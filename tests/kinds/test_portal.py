@@ -107,7 +107,7 @@ def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
         and "Statics alone would" in answer
     )
     figures = pictures(results)
-    assert [figure.name for figure in figures] == ["front", "over-time", "rails", "worst-move"]
+    assert [figure.name for figure in figures] == ["front", "errors", "over-time", "rails", "worst-move"]
 
 
 def test_every_number_is_told_with_the_variant_that_it_belongs_to(found: Any) -> None:
