@@ -15,7 +15,7 @@ from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
-from engine.robots.results import differences, outcome, results_of, without_values
+from engine.robots.results import differences, outcome, results_of, times_apart, without_values
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -112,11 +112,13 @@ class Ladder:
 
 @dataclass(frozen=True, eq=False)
 class Converged:
-    """What a variant reports: its outcome with the model, the error of every result, steps, its rung, status."""
+    """What a variant reports: its outcome with the model, the error of every result, and the time (s) at which that
+    changed the most by what the larger part of its error is told of; steps, its rung, status."""
 
     model: RobotModel
     outcome: Outcome
     error: Array
+    when: Array
     steps: int
     rung: Rung
     status: Status
@@ -162,7 +164,11 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     now = marched(level, zero)
     unknown = np.full(len(results_of(level.model)), np.nan)
     least = LEFT_BY_MODES, LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
-    change, told = [unknown, unknown], [unknown if ladder.most.modes else np.zeros(unknown.size), unknown]
+    when, change, told = (
+        [unknown, unknown],
+        [unknown, unknown],
+        [unknown if ladder.most.modes else np.zeros(unknown.size), unknown],
+    )
     while not (told[0] + told[1] + now.missed).max() <= tolerance:
         by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in (told[0], told[1] + now.missed))
         finer = ladder.finer(rung, (by_modes if now.status.values_kept else 0.0, by_steps))
@@ -175,14 +181,14 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         apart = differences(level.model, before, now)
         apart = np.maximum(apart, ALIKE * apart.max())
         told[axis] = left(apart, change[axis], least[axis])
-        rung, change[axis] = finer, apart
+        rung, change[axis], when[axis] = finer, apart, times_apart(level.model, before, now)
     error = told[0] + told[1] + now.missed
     judged = Status.UNRESOLVED
     if np.isfinite(error).all():
         judged = Status.OK if error.max() <= tolerance else Status.TOLERANCE_MISSED
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
-    reported = now if whole.values_kept else without_values(now)
-    return Converged(level.model, reported, error, int(level.times.steps.sum()), rung, whole)
+    reported, times = now if whole.values_kept else without_values(now), np.where(told[0] > told[1], *when)
+    return Converged(level.model, reported, error, times, int(level.times.steps.sum()), rung, whole)
 
 
 def left(change: Array, before: Array, least: float) -> Array:

@@ -159,6 +159,18 @@ def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     return over(apart, size)
 
 
+def times_apart(model: RobotModel, one: Outcome, other: Outcome) -> Array:
+    """(results,) s: when two marches are apart the most; NaN for stresses, of which the largest alone are compared."""
+    if not (one.status.values_kept and other.status.values_kept):
+        return np.full(len(results_of(model)), np.nan)
+    tools, sunk = np.linalg.norm(one.error - other.error, axis=2), np.abs(one.sunk - other.sunk)
+    rails = [sunk[:, model.system.body == b].max(axis=1) for b in range(len(model.rails))]
+    apart = np.concatenate([tools, np.stack(rails, axis=1)], axis=1)
+    found = np.full(len(results_of(model)), np.nan)
+    found[: apart.shape[1]] = one.times[np.argmax(apart, axis=0)]
+    return found
+
+
 def stations(found: Outcome) -> Counts:
     """Those of a history, as many of every variant; of a short one some more than once."""
     return np.linspace(0, found.times.size - 1, KEPT).round().astype(np.int64)

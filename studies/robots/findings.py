@@ -12,6 +12,7 @@ from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, scientific, spanned
 from studies.results.results import extreme
 from studies.robots.limits import DOING, told_limits
+from studies.robots.missed import told_missed
 
 if TYPE_CHECKING:
     from studies.results.results import Results
@@ -20,9 +21,10 @@ MOST_NAMED = 4
 
 
 def answer(results: Results) -> list[str]:
-    """Where limits hold, the front, errors, deflections, what causes errors, statuses."""
+    """Where limits hold, what missed its tolerance, the front, errors, deflections, what causes errors, statuses."""
     return [
         *told_limits(results),
+        *told_missed(results),
         *_front(results),
         *_errors(results),
         *_statics(results),

@@ -104,6 +104,7 @@ def _numbers(converged: Converged) -> dict[str, NDArray[Any]]:
         "steps_used": np.int32(converged.steps),
         "modes_used": np.int32(converged.model.modes),
         "estimated_error": converged.error.astype(np.float32),
+        "estimated_error_time": converged.when,
     }
     return {name: np.asarray(value) for name, value in numbers.items()}
 

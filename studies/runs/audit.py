@@ -22,7 +22,7 @@ from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
 from studies.protocol.stopping import AskedElsewhere
 from studies.results.cells import words_of
-from studies.results.formatting import counted, listed, percent, scientific
+from studies.results.formatting import counted, listed, number, percent, scientific
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -35,10 +35,12 @@ if TYPE_CHECKING:
 GROUP = "/audit"
 Errors = tuple[Array, Array]  # observed and told (R,)
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
-NONE_AUDITED = (
-    "no variant was audited: it would have taken too long (audit = 20, say, audits 20 variants all the same), or "
-    "nothing finer than what variants were computed with is left to compare them with"
+REASONS = (
+    "it would have taken too long (audit = 20, say, audits 20 variants all the same), or nothing finer than what "
+    "variants were computed with is left to compare them with"
 )
+NONE_AUDITED = f"no variant was audited: {REASONS}"
+NONE_COMPARED = f"no variant was audited: those drawn for it have no values, {REASONS}"
 
 
 def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
@@ -240,9 +242,10 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
         return ""
     fine = results.dataset["status"].values == int(Status.OK)
     estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
-    if not estimates.size or not tolerances.size:
+    if not tolerances.size or (group is None and not estimates.size):
         return ""
-    said = f"estimated errors at most {scientific(float(estimates.max()))} where {_span(tolerances)} was asked"
+    found = f"estimated errors at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"
+    said = f"{found} where {_span(tolerances)} was asked"
     return f"{said}; {'no variant was audited.' if group is None else _compared(group, results)}"
 
 
@@ -254,13 +257,22 @@ def _compared(group: xr.Dataset, results: Results) -> str:
     """In words what the group says of variants that the archive calls ok."""
     verdict = Verdict.of(group)
     if not verdict.count:
-        return "no variant was audited."
+        return f"{_of_marked(verdict, results)}." if verdict.marked else "no variant was audited."
     audit = f"{counted(verdict.count, 'variant')} computed again with {_more(results)}"
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
         return f"but of {audit}, {beyond} did not hold it."
     differ = "differ" if verdict.count > 1 else "differs"
     return f"{audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
+
+
+def _of_marked(verdict: Verdict, results: Results) -> str:
+    """In words what the group says of variants that promise nothing, as their status is not ok."""
+    audit = f"{counted(verdict.marked, 'variant')} whose status is not ok {'were' if verdict.marked > 1 else 'was'}"
+    said = f"{audit} computed again with {_more(results)}"
+    if not verdict.marked_worst >= 0.0:
+        return f"{said}: no number could be compared"
+    return f"{said}: the largest difference is {number(verdict.marked_worst, 2)} times the tolerance"
 
 
 def _more(results: Results) -> str:
@@ -276,7 +288,8 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
     if group is None:
         left_open = is_marched(results.dataset) and results.study.solver.audit == "auto"
-        return [NONE_AUDITED] if left_open and bool(results.kept.any()) else []
+        told = NONE_AUDITED if bool(results.kept.all()) else NONE_COMPARED
+        return [told] if left_open and bool(results.kept.any()) else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:
@@ -284,9 +297,7 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     if verdict.unknown:
         told.append(f"{counted(verdict.unknown, 'variant')} could not be compared, which counts as not held")
     if verdict.marked:
-        found = f"; there it found at most {verdict.marked_worst:.2g} of it" if verdict.marked_worst >= 0.0 else ""
-        also = "further " if verdict.count else ""
-        told.append(f"audit of {counted(verdict.marked, f'{also}variant')} that the archive marks itself{found}")
+        told.append(_of_marked(verdict, results))
     if verdict.left_out:
         told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit could not be compared")
     return told

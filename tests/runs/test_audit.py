@@ -19,14 +19,17 @@ from results_schema.variables import expand
 from studies.commands.cli import main
 from studies.protocol.parts import Work
 from studies.reporting.summary import exit_code
+from studies.results.formatting import number
 from studies.results.results import Results
 from studies.runs.audit import (
     GROUP,
     NONE_AUDITED,
+    NONE_COMPARED,
     Verdict,
     as_json,
     audit_group,
     relative_errors,
+    told_accuracy,
     told_audit,
 )
 from tests.engine.build import beam
@@ -132,6 +135,9 @@ def test_variants_without_values_are_left_out_and_counted() -> None:
     assert told[-1] == "1 further variant picked for the audit could not be compared"
     assert audit_group(plan, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
     assert told_audit(None, Results.of(dataset)) == []
+    auto = studies.run(crossing(RICH, {}))
+    auto["status"].values.reshape(-1)[0] = Status.DIVERGED
+    assert told_audit(None, Results.of(auto)) == [NONE_COMPARED]
 
 
 def test_what_the_archive_marks_itself_is_told_apart() -> None:
@@ -148,10 +154,13 @@ def test_what_the_archive_marks_itself_is_told_apart() -> None:
     assert verdict.place in (0, 3, 4) and list(group["variant_status"].values) == [0, 1, 2, 0, 0, 3]
     told = told_audit(group, Results.of(dataset))
     assert told[1] == "the tolerance was not held: 3 of 3 variants missed it"
-    assert told[2].startswith("audit of 3 further variants that the archive marks itself; there it found at most ")
+    of_them = f"the largest difference is {number(verdict.marked_worst, 2)} times the tolerance"
+    assert told[2] == f"3 variants whose status is not ok were computed again with more of everything: {of_them}"
     marked = group.assign(variant_status=xr.full_like(group["variant_status"], Status.SEPARATED))
     (told_alone,) = told_audit(marked, Results.of(dataset))
-    assert Verdict.of(marked).held and told_alone.startswith("audit of 6 variants that the archive marks itself")
+    assert Verdict.of(marked).held and told_alone.startswith("6 variants whose status is not ok were computed again")
+    none = dataset.assign(status=xr.full_like(status, Status.TOLERANCE_MISSED))
+    assert told_accuracy(marked, Results.of(none)) == f"no status is ok where 1e-9 was asked; {told_alone}."
     assert np.isnan(Verdict.of(marked).worst) and as_json(marked, Results.of(dataset))["marked"] == 6
 
 

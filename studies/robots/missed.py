@@ -1,0 +1,106 @@
+"""Variants of robots that missed their tolerance: which result, by how much, when, and what helps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from results_schema.status import Status
+from studies.results.findings_common import in_words
+from studies.results.formatting import counted, listed, percent, quantity
+from studies.results.results import Index, extreme
+
+if TYPE_CHECKING:
+    from engine.robots.model import RobotModel
+    from studies.results.results import Results
+
+MOST_NAMED = 3
+SOON = 10.0  # first periods of the rails after a payload is picked up, in which it may be what is seen
+
+
+class _Missed(NamedTuple):
+    """A result beyond its tolerance where it is the furthest: its error over its largest value, and when (s)."""
+
+    name: str
+    at: Index
+    error: float
+    time: float
+
+
+def told_missed(results: Results) -> Iterator[str]:
+    """Which results missed the tolerance in which variants, and what helps; nothing where none did."""
+    missed = results.dataset["status"].values == int(Status.TOLERANCE_MISSED)
+    found = list(_missed(results, missed))[:MOST_NAMED]
+    if not found:
+        return
+    asked, variants = percent(results.study.solver.tolerance), counted(results.size, "variant")
+    parts = listed([_in_words(results, one) for one in found])
+    struck = dict.fromkeys(text for one in found for text in _picked_up(_model(results, one.at), one.time))
+    fixed = [] if results.study.solver.steps == "auto" else ['What helps: more solver.steps, or "auto".']
+    helps = " ".join([*fixed, *struck]) or _refined(results, found[0].at)
+    yield f"In {int(missed.sum()):,} of {variants} the tolerance of {asked} is missed by {parts}. {helps}"
+
+
+def _missed(results: Results, among: np.ndarray) -> Iterator[_Missed]:
+    times = results.dataset["estimated_error_time"]
+    for name in map(str, results.dataset["result"].values):
+        error = np.where(among, results.estimated_error(name), np.nan)
+        at = extreme(error)
+        if at is not None and error[at] > results.study.solver.tolerance:
+            time = times.sel(result=name).transpose(*results.dims).values[at]
+            yield _Missed(name, at, float(error[at]), float(time))
+
+
+def _in_words(results: Results, one: _Missed) -> str:
+    """The result, how far it may be off, where, and when."""
+    kind, name = one.name.split(" of ", 1)
+    if kind == "error":
+        doings = (f"error_{doing}" for doing in ("moving", "working", "holding"))
+        largest = np.nanmax([results.dataset[doing].sel(robot=name).values[one.at] for doing in doings])
+        noun, units = f"the tool error of {name}", "m"
+    else:
+        largest = results.dataset[f"{kind}_largest"].sel(rail=name).values[one.at]
+        noun, units = f"the {kind} of {name}", "Pa" if kind == "stress" else "m"
+    off = quantity(one.error * float(largest), units, 2)
+    when = f", most in doubt at {quantity(one.time, 's')}" if np.isfinite(one.time) else ""
+    return f"{noun} (estimated to within {percent(one.error)}, {off},{in_words(results, one.at)}{when})"
+
+
+def _model(results: Results, at: Index) -> RobotModel:
+    """That of a variant."""
+    from engine.robots.converge import with_open_modes
+    from engine.robots.model import build
+    from engine.scene.sweep import expand
+
+    flat = int(np.ravel_multi_index(at, results.shape)) if at else 0
+    return build(with_open_modes(expand(results.study).study_of(results.study, flat)))
+
+
+def _refined(results: Results, at: Index) -> str:
+    """What helps where nothing else is known."""
+    modes, steps = (int(results.dataset[f"{name}_used"].values[at]) for name in ("modes", "steps"))
+    return (
+        f"No more than {modes} modes of all rails and {steps:,} steps are marched there. What helps: a larger "
+        "solver.tolerance, slower moves, or joints with a stiffness."
+    )
+
+
+def _picked_up(model: RobotModel, time: float) -> Iterator[str]:
+    """Robots whose rigid joints picked up a payload shortly before a time (s)."""
+    from engine.kernels.robots.layout import START
+
+    system, soon = model.system, SOON * 2.0 * np.pi / model.first_omega
+    for r, (name, robot) in enumerate(model.study.robot.items()):
+        drives = model.study.arm[robot.arm].drives
+        rigid = [f"link {j}" if j else "rail" for j, drive in enumerate(drives) if drive.is_rigid]
+        carried = system.stays[r, :, -2]
+        for m in range(len(robot.moves)):
+            since = time - system.moves[r, m, START]
+            if rigid and carried[m + 1] > carried[m] and 0.0 <= since <= soon:
+                at = quantity(float(system.moves[r, m, START]), "s")
+                yield (
+                    f"At {at} {name} picks up its payload by rigid joints ({listed(rigid)}), so that it strikes the "
+                    "rails. What helps: a stiffness of these joints, or a larger solver.tolerance."
+                )

@@ -1,0 +1,76 @@
+"""What studies of robots say of variants that missed their tolerance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import studies
+from engine.robots.converge import Ladder, Rung, marched
+from engine.scene.study import Study
+from engine.scene.sweep import expand
+from results_schema.status import Status
+from studies.protocol.study import kind_of
+from studies.results.results import Results
+from studies.robots.missed import told_missed
+from tests.robots.scenes import ARM, drive, scene
+
+LIFTS = [
+    {"to": [7.0, 0.6, 0.4], "after": 0.5, "payload": 900.0},
+    {"to": [5.0, 0.0, 0.0], "hold": 0.5},
+]
+
+
+def lifting(joint: dict[str, Any], modes: int | str, **solver: Any) -> Study:
+    """An arm that picks up a payload of some times its own mass, after half a second."""
+    arm = ARM | {"rail": joint}
+    robot = {"arm": "lifter", "rails": ["right"], "start": [6.0, 0.0, 0.0], "moves": LIFTS}
+    sweep = {"payload": {"of": "robot.lifter.payload_scale", "values": [0.0, 1.0]}}
+    more = {"arm": {"lifter": arm}, "robot": {"lifter": robot}, "solver": solver, "sweep": sweep}
+    return scene({"modes": modes}, **more)
+
+
+def told(study: Study) -> tuple[Any, list[str]]:
+    found = studies.run(study, threads=2)
+    results = Results.of(found)
+    sentences = list(told_missed(results))
+    assert all(text in kind_of(study).findings(results)[:2] for text in sentences)  # `run` tells no more than four
+    return found, sentences
+
+
+def test_a_payload_that_rigid_joints_pick_up_is_told_with_its_time() -> None:
+    found, (text,) = told(lifting(drive(), "auto", tolerance=1e-3))
+    assert (found["status"] == Status.TOLERANCE_MISSED).all()
+    error = float(found["estimated_error"].sel(result="error of lifter", payload=0.0))
+    time = float(found["estimated_error_time"].sel(result="error of lifter", payload=0.0))
+    assert text.startswith(
+        f"In 2 of 2 variants the tolerance of 0.1 % is missed by the tool error of lifter "
+        f"(estimated to within {100 * error:.2g} %, "
+    )
+    assert f"at payload 0, most in doubt at {time:.3g} s)" in text
+    assert "At 0.5 s lifter picks up its payload by rigid joints (rail), so that it strikes the rails." in text
+
+
+def test_joints_with_a_stiffness_are_not_blamed() -> None:
+    found, (text,) = told(lifting(drive(8e5, 4e3), "auto", tolerance=1e-3))
+    steps = int(found["steps_used"].max())
+    assert "rigid" not in text and f"No more than 48 modes of all rails and {steps:,} steps" in text
+
+
+def test_steps_that_a_study_fixes_are_told_and_when_they_do_the_most() -> None:
+    study = lifting(drive(), 6, tolerance=2e-3, steps=120)
+    found, (text,) = told(study)
+    assert 'What helps: more solver.steps, or "auto".' in text and "the deflection of right (" in text
+    own = expand(study).study_of(study, 1)
+    ladder = Ladder.of(own, None, 1.0)
+    coarse, fine = (marched(ladder.level(Rung(0, steps)), "start") for steps in (0, 1))
+    apart = np.linalg.norm(coarse.error - fine.error, axis=2)[:, 0]
+    times = found["estimated_error_time"].sel(payload=1.0)
+    assert float(times.sel(result="error of lifter")) == coarse.times[int(np.argmax(apart))]
+    assert 0.5 < float(times.sel(result="deflection of right")) < 1.0
+
+
+def test_nothing_is_told_where_nothing_is_missed() -> None:
+    found, sentences = told(lifting(drive(), 6, tolerance=1e-2))
+    assert (found["status"] == Status.OK).all() and sentences == []
