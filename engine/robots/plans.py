@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from engine.scene.robots import Arm, Robot
 
 
+ON_WAY = 9  # places of a move at which a reach is looked at
+
+
 def slowest(drives: Sequence[Drive], robot: Robot, way: Array) -> Profile:
     """A move of all joints together over their ways (J,), as fast as all of them may go."""
     faster = robot.acceleration_scale
@@ -24,6 +27,26 @@ def slowest(drives: Sequence[Drive], robot: Robot, way: Array) -> Profile:
         acceleration = np.min(np.array([drive.acceleration for drive in drives]) / np.abs(way)) * faster
         jerk = np.min(np.array([drive.jerk for drive in drives]) / np.abs(way)) * faster
     return profile(1.0, float(speed), float(acceleration), float(jerk))
+
+
+def reach(arm: Arm, robot: Robot) -> float:
+    """m, how far a tool comes from the base point of its robot at most, at rest and on its planned ways."""
+    from scipy.spatial.transform import Rotation
+
+    stays = np.array([robot.start, *(move.to for move in robot.moves)])
+    on_way = np.linspace(stays[:-1], stays[1:], ON_WAY).reshape(-1, stays.shape[1])
+    most = 0.0
+    for joints in np.concatenate([stays, on_way]):
+        turn, place = Rotation.identity(), np.zeros(3)
+        for link, value in zip(arm.links, joints[1:], strict=True):
+            place, turn = place + turn.apply(link.place), turn * Rotation.from_rotvec(link.turned)
+            along = value * np.array(link.axis) / np.linalg.norm(link.axis)
+            if link.slides:
+                place = place + turn.apply(along)
+            else:
+                turn = turn * Rotation.from_rotvec(along)
+        most = max(most, float(np.linalg.norm(place + turn.apply(arm.tool))))
+    return most
 
 
 class Plans(NamedTuple):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,27 +22,19 @@ from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
-from studies.commands.forecast import Forecast, forecast
-from studies.protocol.parts import Pieces, Variants
+from studies.commands.forecast import AROUND, Forecast, forecast
+from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
 from studies.results.findings_common import speeds_in_step, told_trains
 from studies.results.formatting import counted, duration, number, percent, quantity, spanned, typed_unit, unit_text
 
 FREQUENCIES_SHOWN = 6
 
 
-class Table(NamedTuple):
-    """A table for people: title, headings, rows of text."""
-
-    title: str
-    headings: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
 @dataclass(frozen=True)
 class Preview:
     """What `check` tells: tables, a line with the cost, and what is worth knowing beside it."""
 
-    tables: tuple[Table, ...]
+    tables: tuple[TextTable, ...]
     cost: str
     remarks: tuple[str, ...]
 
@@ -60,7 +53,7 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     tables = (
         *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.study, plan.cases), _ratios(plan)),
         *_in_step(plan),
-        Table(seen.title, chosen.HEADINGS, seen.rows),
+        TextTable(seen.title, chosen.HEADINGS, seen.rows),
     )
     room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
     cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}"
@@ -89,26 +82,43 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
     """That of pieces, one after another, and the time they take."""
     kind, study, pieces = parts.kind, parts.study, parts.pieces
     rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
-    cases = expand(study)
+    cases, around = expand(study), AROUND * time.process_time()
+    seen = kind.foreseen(study, threads, parts.audited)
     if kind.sweeps:
         rows.insert(1, ("variants", f"{cases.size:,}"))
         rows += told_trains(study)
-    work = [(piece.name, piece.words, duration(piece.seconds)) for piece in pieces]
     tables = (
-        Table(study.title or study.source.name, ("", ""), rows),
-        *(_of_scene(study, cases) if kind.sweeps else ()),
-        Table("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work),
+        TextTable(study.title or study.source.name, ("", ""), rows),
+        *(_of_scene(seen.study if seen else study, cases) if kind.sweeps else ()),
+        *kind.tables(study),
+        seen.table if seen else _work(parts),
     )
-    cost = (
-        f"About {duration(sum(piece.seconds for piece in pieces))} on two cores of an ordinary server, at most "
-        f"{size(parts.disk_bytes)} on the disk."
-    )
+    cost = _measured(seen, around, threads) if seen else _expected(parts)
     if kind.audit_seconds:
         cost += _audited(parts.audited, study.solver.audit)
-    return Preview(tuple(table for table in tables if table.rows), cost, tuple(parts.remarks))
+    remarks = [*parts.remarks, *([seen.remark] if seen and seen.remark else [])]
+    return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks))
 
 
-def _of_scene(study: Study, cases: Cases) -> Iterator[Table]:
+def _work(parts: Pieces) -> TextTable:
+    """Pieces with the time that each takes."""
+    work = [(piece.name, piece.words, duration(piece.seconds)) for piece in parts.pieces]
+    return TextTable("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work)
+
+
+def _expected(parts: Pieces) -> str:
+    seconds = sum(piece.seconds for piece in parts.pieces)
+    return (
+        f"About {duration(seconds)} on two cores of an ordinary server, at most {size(parts.disk_bytes)} on the disk."
+    )
+
+
+def _measured(seen: Foreseen, around: float, threads: int) -> str:
+    room = f"about {size(seen.bytes)} for the archive, and as much for its parts while it runs"
+    return f"About {duration(seen.seconds + around)} on {counted(threads, 'thread')}, {room}."
+
+
+def _of_scene(study: Study, cases: Cases) -> Iterator[TextTable]:
     """The scene of a study that is computed in pieces, as a march's preview shows it."""
     base = base_scene(study)
     yield _bodies(base)
@@ -130,7 +140,7 @@ def size(count: int) -> str:
     return f"{number(value)} {unit}"
 
 
-def _study(plan: Plan) -> Table:
+def _study(plan: Plan) -> TextTable:
     study = plan.study
     shape = " x ".join(f"{length} {dim}" for dim, length in zip(plan.cases.dims, plan.cases.shape, strict=True))
     variants = f"{plan.size:,} = {shape}" if len(plan.cases.dims) > 1 else f"{plan.size:,}"
@@ -139,13 +149,13 @@ def _study(plan: Plan) -> Table:
         cells = cells_of(study, plan.cases)
         rows.insert(2, ("kept", f"{study.output.keep} of {counted(cells.size, 'cell')}"))
     rows += told_trains(study)
-    return Table(study.title or study.source.name, ("", ""), rows)
+    return TextTable(study.title or study.source.name, ("", ""), rows)
 
 
 _START = {"rest": "undeformed, at rest", "equilibrium": "static equilibrium of the first position"}
 
 
-def _bodies(base: SceneModel) -> Table:
+def _bodies(base: SceneModel) -> TextTable:
     values, rows = VariantValues(base.study, {}, 1), []
     for part in base.bodies:
         omega = part.modal.omega
@@ -155,16 +165,16 @@ def _bodies(base: SceneModel) -> Table:
         shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
         more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
         rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, spanned(ratios)))
-    return Table("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
+    return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 
-def _checks(base: SceneModel) -> Iterator[Table]:
+def _checks(base: SceneModel) -> Iterator[TextTable]:
     """One table per body that was checked when it was imported."""
     for part in base.bodies:
-        yield Table(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
+        yield TextTable(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
 
 
-def _sweep(study: Study, cases: Cases) -> Table:
+def _sweep(study: Study, cases: Cases) -> TextTable:
     rows = [
         (
             axis.name,
@@ -174,7 +184,7 @@ def _sweep(study: Study, cases: Cases) -> Table:
         )
         for axis in cases.axes
     ]
-    return Table("Sweep", ("axis", "values", "range", "sets"), rows)
+    return TextTable("Sweep", ("axis", "values", "range", "sets"), rows)
 
 
 def _range(study: Study, axis: Axis) -> str:
@@ -185,7 +195,7 @@ def _range(study: Study, axis: Axis) -> str:
     return f"{spanned(axis.values * typed.factor)} {typed.unit}"
 
 
-def _ratios(plan: Plan) -> Table:
+def _ratios(plan: Plan) -> TextTable:
     """Ratios of the first carriage that decide how dynamic the scene is, over all variants."""
     name = plan.base.carriages[0].name
     found: dict[str, list[Array]] = {}
@@ -193,10 +203,10 @@ def _ratios(plan: Plan) -> Table:
         for ratio, values in _ratios_of(grid, name):
             found.setdefault(ratio, []).append(values)
     rows = [(ratio, spanned(np.concatenate(values))) for ratio, values in found.items()]
-    return Table(f"Ratios of {name}", ("ratio", "range"), rows)
+    return TextTable(f"Ratios of {name}", ("ratio", "range"), rows)
 
 
-def _in_step(plan: Plan) -> Iterator[Table]:
+def _in_step(plan: Plan) -> Iterator[TextTable]:
     """Swept speeds at which the axles of a train come once in a first period."""
     frequency, study = plan.base.first_omega / (2.0 * np.pi), plan.study
     for name, train in study.train.items():
@@ -214,7 +224,7 @@ def _in_step(plan: Plan) -> Iterator[Table]:
             for speed, share in (speeds_in_step(train, frequency, (lowest, highest)) if highest > lowest else [])
         ]
         heading = f"Speeds at which {name} pushes in step with the first frequency, {number(frequency)} Hz"
-        yield Table(heading, ("speed", "way in a period", "part of its load"), rows)
+        yield TextTable(heading, ("speed", "way in a period", "part of its load"), rows)
 
 
 def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from results_schema.variables import declare
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from engine.scene.study import Study
     from results_schema.arrays import Array, Counts
-    from studies.protocol.parts import Piece, Work
+    from studies.protocol.parts import Foreseen, Piece, TextTable, Work
     from studies.results.results import Results
 
 declare("portal", *RESULTS)
@@ -56,6 +56,16 @@ class Portal(PiecedKind):
         from studies.robots.parts import again
 
         return again(study, question_of(study, Question), variants, work)
+
+    def tables(self, study: Study) -> Iterable[TextTable]:
+        from studies.robots.preview import tables
+
+        return tables(study)
+
+    def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen:
+        from studies.robots.preview import foreseen
+
+        return foreseen(study, question_of(study, Question), threads, audited)
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         from studies.robots.parts import gather

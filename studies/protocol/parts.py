@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,6 +276,25 @@ class Piece:
     compute: Callable[[Work], xr.Dataset]
     seconds: float = 1.0
     size: int = 0
+
+
+class TextTable(NamedTuple):
+    """A table for people: title, headings, rows of text."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+class Foreseen(NamedTuple):
+    """What a run in pieces will take. study: with what it leaves open as it was found; table: what some variants were
+    computed with; seconds: of all pieces and the audit; bytes: of the archive. remark: what is not known, or ""."""
+
+    study: Study
+    table: TextTable
+    seconds: float
+    bytes: int
+    remark: str = ""
 
 
 class Pieces:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pkgutil
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
@@ -16,7 +16,7 @@ from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.pieces import Pieces, lacks, no_row_of
 from results_schema.validate import validate
-from studies.protocol.parts import Memory, Variants, Work
+from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -140,6 +140,15 @@ class PiecedKind(Kind, ABC):
     def remarks(self, study: Study) -> Sequence[str]:
         """What a user should know before believing the study."""
         return ()
+
+    def tables(self, study: Study) -> Iterable[TextTable]:
+        """What `check` shows of the scene beside its bodies and its sweep."""
+        return ()
+
+    def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen | None:
+        """What a run on so many threads will take, with an audit of some variants, as some seconds of it show; None
+        where its pieces tell that."""
+        return None
 
     def again(self, study: Study, variants: Counts, work: Work) -> Mapping[int, tuple[Array, Array] | None]:
         """Some variants computed again, with more of what the study leaves open: the error observed and that told of

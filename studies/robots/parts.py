@@ -13,6 +13,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.status import Fidelity
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Work, unlabelled
+from studies.results.formatting import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,11 +47,11 @@ def pieces(study: Study, question: Question) -> list[Piece]:
     for first in range(0, cases.size, size):
         own = np.arange(first, min(first + size, cases.size), dtype=np.int64)
         compute = partial(_march, study, question, cases, own)
-        words = f"{own.size:,} variants over {ladder.duration:.4g} s"
+        words = f"{counted(own.size, 'variant')} of {ladder.duration:.4g} s"
         found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     if question.one_at_a_time and len(study.robot) > 1:
         compute = partial(_without, base, question)
-        found.append(Piece(ONE_AT_A_TIME, "robots that stand still in turn", compute, each * len(study.robot)))
+        found.append(Piece(ONE_AT_A_TIME, "robots that stand still in turn", compute, 0.5 * each * len(study.robot)))
     return found
 
 
@@ -124,15 +125,18 @@ def _traces(converged: Converged) -> dict[str, NDArray[Any]]:
 
 
 def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
-    """Errors of all robots while one of them stands still where it starts."""
+    """Errors of all robots while one of them stands still where it starts, on threads."""
+    from engine.batch.places import run_jobs
     from engine.robots.results import DOING
 
-    rows = []
-    for name in study.robot:
+    rows = dict[str, Array]()
+
+    def job(name: str) -> None:
         alone = _converged(study.with_values({f"robot.{name}.moves": []}), question, work)
-        largest = [alone.outcome.numbers[f"error_{doing}"] for doing in DOING]
-        rows.append(np.fmax.reduce(largest))
-    return unlabelled({"error_without": np.stack(rows)})
+        rows[name] = np.fmax.reduce([alone.outcome.numbers[f"error_{doing}"] for doing in DOING])
+
+    run_jobs([partial(job, name) for name in study.robot], work.threads)
+    return unlabelled({"error_without": np.stack([rows[name] for name in study.robot])})
 
 
 def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
