@@ -4,12 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, Strict, model_validator
 
-from engine.study_file.spec import Noun, Spec
-from engine.study_file.units import Dimensionless, Inertia, Length, Mass, Time, fault
+from engine.study_file.spec import KindOf, Noun, Spec
+from engine.study_file.units import (
+    Acceleration,
+    AngularAcceleration,
+    AngularJerk,
+    AngularRate,
+    Damping,
+    Dimensionless,
+    Inertia,
+    Jerk,
+    Length,
+    Mass,
+    RotationalDamping,
+    RotationalStiffness,
+    Speed,
+    Stiffness,
+    Time,
+    fault,
+)
 
 MOST_LINKS, MOST_RAILS, MOST_MOVES = 7, 2, 64
 
@@ -21,15 +38,14 @@ Values = Annotated[tuple[Dimensionless, ...], Strict(False)]
 
 
 class Drive(Spec):
-    """What moves a joint: m or rad. speed, acceleration, jerk: its limits (m/s or rad/s, and so on). stiffness, damping
-    (N/m or N m/rad, ...): of the joint with its controller, PD towards the plan; without a stiffness it follows its
-    plan whatever force that takes."""
+    """What moves a joint. speed, acceleration, jerk: its limits. stiffness, damping: of the joint with its controller,
+    PD towards the plan; without a stiffness it follows its plan whatever force that takes."""
 
-    speed: Dimensionless = Field(gt=0)
-    acceleration: Dimensionless = Field(gt=0)
-    jerk: Dimensionless = Field(gt=0)
-    stiffness: Dimensionless | None = Field(default=None, gt=0)
-    damping: Dimensionless = Field(default=0.0, ge=0)
+    speed: float
+    acceleration: float
+    jerk: float
+    stiffness: float | None = None
+    damping: float = 0.0
 
     @property
     def is_rigid(self) -> bool:
@@ -51,22 +67,34 @@ class Solid(Spec):
     inertia: Principal = (0.0, 0.0, 0.0)
 
 
-class Link(Solid, Drive):
-    """A rigid link and the joint that moves it.
+class Sliding(Drive):
+    """Of a joint that slides: m, N."""
 
-    kind: of the joint, which turns about or slides along axis. place: m, of the joint in the axes of the link before.
-    turned: rotation vector (rad) of the link's axes before the joint moves.
-    """
+    speed: Speed = Field(gt=0)
+    acceleration: Acceleration = Field(gt=0)
+    jerk: Jerk = Field(gt=0)
+    stiffness: Stiffness | None = Field(default=None, gt=0)
+    damping: Damping = Field(default=0.0, ge=0)
 
-    kind: Literal["revolute", "prismatic"]
+
+class Turning(Drive):
+    """Of a joint that turns: rad, N m."""
+
+    speed: AngularRate = Field(gt=0)
+    acceleration: AngularAcceleration = Field(gt=0)
+    jerk: AngularJerk = Field(gt=0)
+    stiffness: RotationalStiffness | None = Field(default=None, gt=0)
+    damping: RotationalDamping = Field(default=0.0, ge=0)
+
+
+class Link(Solid):
+    """A rigid link and the joint that moves it, which turns about or slides along axis. place: m, of the joint in the
+    axes of the link before. turned: rotation vector (rad) of the link's axes before the joint moves."""
+
+    slides: ClassVar[bool]
     axis: Vector
     place: Place = (0.0, 0.0, 0.0)
     turned: Vector = (0.0, 0.0, 0.0)
-
-    @property
-    def slides(self) -> bool:
-        """Whether its joint slides, in place of turning."""
-        return self.kind == "prismatic"
 
     @model_validator(mode="after")
     def _has_axis(self) -> Link:
@@ -75,13 +103,30 @@ class Link(Solid, Drive):
         return self
 
 
+class Prismatic(Sliding, Link):
+    """A link that slides."""
+
+    slides: ClassVar[bool] = True
+    kind: Literal["prismatic"]
+
+
+class Revolute(Turning, Link):
+    """A link that turns."""
+
+    slides: ClassVar[bool] = False
+    kind: Literal["revolute"]
+
+
+AnyLink = Annotated[Revolute | Prismatic, KindOf("link", {"revolute": Revolute, "prismatic": Prismatic})]
+
+
 class Arm(Solid):
     """A sort of robot: the carriage on the rails (mass, centre, inertia, from its base point) with its drive along
     them, the links on it, and the tool centre point (m, in the axes of the last link)."""
 
     mass: Mass = Field(gt=0)
-    rail: Drive
-    links: Annotated[tuple[Link, ...], Strict(False), Field(min_length=1, max_length=MOST_LINKS)]
+    rail: Sliding
+    links: Annotated[tuple[AnyLink, ...], Strict(False), Field(min_length=1, max_length=MOST_LINKS)]
     tool: Place = (0.0, 0.0, 0.0)
 
     @property

@@ -225,5 +225,8 @@ Rate = Annotated[float, Unit("rate", "s-1", (0, 0, -1))]
 Dimensionless = Annotated[float, Unit("plain number", "", (0, 0, 0))]
 Angle = Annotated[float, Unit("angle", "rad", (0, 0, 0), angle=1, turns=True)]
 AngularRate = Annotated[float, Unit("rate of turning", "rad s-1", (0, 0, -1), angle=1, turns=True)]
+AngularAcceleration = Annotated[float, Unit("angular acceleration", "rad s-2", (0, 0, -2), angle=1, turns=True)]
+Jerk = Annotated[float, Unit("jerk", "m s-3", (1, 0, -3))]
+AngularJerk = Annotated[float, Unit("angular jerk", "rad s-3", (0, 0, -3), angle=1, turns=True)]
 #: Every unit above.
 KNOWN = tuple(unit_of(one) for one in list(globals().values()) if get_origin(one) is Annotated)
