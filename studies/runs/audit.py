@@ -288,8 +288,8 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
     if group is None:
         left_open = is_marched(results.dataset) and results.study.solver.audit == "auto"
-        told = NONE_AUDITED if bool(results.kept.all()) else NONE_COMPARED
-        return [told] if left_open and bool(results.kept.any()) else []
+        reason = NONE_AUDITED if bool(results.kept.all()) else NONE_COMPARED
+        return [reason] if left_open and bool(results.kept.any()) else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:
