@@ -82,8 +82,8 @@ def _refined(results: Results, at: Index) -> str:
     """What helps where nothing else is known."""
     modes, steps = (int(results.dataset[f"{name}_used"].values[at]) for name in ("modes", "steps"))
     return (
-        f"What was marched there, {modes} modes of all rails and {steps:,} steps, is the most that is tried. What helps: "
-        "a larger solver.tolerance, slower moves, or smaller payloads."
+        f"What was marched there, {modes} modes of all rails and {steps:,} steps, is the most that is tried. "
+        "What helps: a larger solver.tolerance, slower moves, or smaller payloads."
     )
 
 
