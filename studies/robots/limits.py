@@ -108,7 +108,7 @@ class _Found:
         limit, most, least = self.limit, extreme(self.worst), extreme(self.worst, np.nanargmin)
         asked = f"{limit.say(limit.value, 6)} {limit.words}"
         if most is None or least is None:
-            return f"Whether tools stay within {asked} is not known: no variant has a number."
+            return f"Whether every tool stays within {asked} is not known: no variant has a number."
         if self.within[self.known].all():
             return (
                 f"Every tool stays within {asked}{self._all()}: at most {self.off(most)}{in_words(self.results, most)}."

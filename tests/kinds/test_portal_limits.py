@@ -72,7 +72,7 @@ def test_the_answer_tells_of_limits_that_hold_always_never_and_here_and_there(li
         "Beyond it: portal up to 0.6 mm."
     ]
     assert told(line, [np.nan] * 4, [np.nan] * 4) == [
-        "Whether tools stay within 0.5 mm of its plan in moves is not known: no variant has a number."
+        "Whether every tool stays within 0.5 mm of its plan in moves is not known: no variant has a number."
     ]
     assert "in all 3 variants with values" in told(line, [0.1, 0.1, 0.1, np.nan], [0.1, 0.1, 0.1, np.nan])[0]
     gone = [0.1, 0.1, np.nan, 0.7]
