@@ -9,7 +9,7 @@ import numpy as np
 
 from results_schema.arrays import Array, Counts, Mask
 from studies.results.findings_common import in_words, told_statuses
-from studies.results.formatting import listed, percent, quantity, scientific, spanned
+from studies.results.formatting import listed, percent, quantity, spanned
 from studies.results.results import extreme
 from studies.robots.limits import DOING, told_limits
 from studies.robots.missed import told_missed
@@ -87,10 +87,10 @@ def _statics(results: Results) -> Iterator[str]:
     times = spanned(dataset["at_rest"].values[known], percent)
     off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in DOING}
     told = listed([f"{percent(float(off[name]))} {words}" for name, words in DOING.items()])
-    limit = scientific(results.study.solver.tolerance)
+    limit = percent(results.study.solver.tolerance)
     yield (
-        f"Statics alone would have told tools to {limit} of their largest errors for {times} of the time; "
-        f"else it is off by up to {told}."
+        f"Statics alone would have told where tools are to {limit} of their largest errors for {times} of the time; at "
+        f"other times they are off, in parts of these, by up to {told}."
     )
 
 
@@ -106,8 +106,9 @@ def _causes(results: Results) -> Iterator[str]:
         for name in results.study.robot:
             time = float(dataset["error_largest_time"].sel(robot=name))
             if np.isfinite(time):
-                moving = " and ".join(moving_at(model, time)) or "nothing"
-                yield f"The error of {name} is longest at {quantity(time, 's')}, in which moves: {moving}."
+                moves = moving_at(model, time)
+                doing = f"during {listed(moves)}" if moves else "when nothing moves"
+                yield f"The error of {name} is longest at {quantity(time, 's')}, {doing}."
     if "error_without" in dataset:
         for still in results.study.robot:
             left = dataset["error_without"].sel(still=still)
@@ -144,6 +145,6 @@ def _front(results: Results) -> Iterator[str]:
     for number in named:
         index = tuple(int(i) for i in np.unravel_index(number, results.shape))
         off = quantity(float(error.reshape(-1)[number]), "m")
-        told.append(f"{quantity(float(cycle[number]), 's', 4)} for {off} ({results.at(index)})")
+        told.append(f"{off} in {quantity(float(cycle[number]), 's', 4)} ({results.at(index)})")
     best = f"{chosen.size} of {results.size} variants {'is' if chosen.size == 1 else 'are'} best"
-    yield f"Of cycle time against what tools are off from rest {words}, {best}: {'; '.join(told)}."
+    yield f"{best}, as none is both faster and nearer to rest {words}: {'; '.join(told)}."
