@@ -20,7 +20,6 @@ ASKED = {
     "engine.methods": "the same",
     "engine.floating": "sorts of bodies, joints and schemes that its kernels know: they do not answer for it yet",
     "engine.robots": "rails and schemes that its kernels know, likewise",
-    "engine.scene.robots": "which of two joints a link has",
     "studies.commands.planned_numerics": "which groups were chosen for before anything is marched",
     "studies.reporting.report": "what stands beside a table in a study's data",
 }
