@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, Strict, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
-from engine.bodies.modal.section_doubts import Doubt
+from engine.bodies.modal.section_doubts import Doubt, damping_doubt
 from engine.scene.carriages import AnyCarriage
 from engine.scene.frames import Frame
 from engine.scene.loads import Load, Spring
@@ -176,6 +176,8 @@ class Study(Scene):
         """Conditions that its numbers may break, but are hardly meant to."""
         for name, body in self.body.items():
             yield from body.doubts(f"body.{name}")
+            if isinstance(body.damping_ratio, float):
+                yield damping_doubt(f"body.{name}")
 
     def unit(self, path: str) -> Unit | None:
         """Dimension of the number at a dotted key; None for integers such as a number of modes."""

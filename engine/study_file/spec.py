@@ -285,10 +285,12 @@ def _misplaced(model: type[Spec], data: Any, keys: Keys) -> str:
 def _where_else(model: type[Spec], data: Any, around: FieldType | None, keys: Keys) -> str:
     """The table, or the kind of its own table, that has the key of this name, in words, or ""."""
     key, here = str(keys[-1]), list(keys[:-1])
-    if here and key in keys_at(model, data, ()):
-        return f"write {key} at the top of the file: a key belongs to the table whose [header] stands above it"
     notes = _notes(around.annotation, around.metadata) if around else ()
     tables_of_kinds = [note.table for note in notes if isinstance(note, KindOf)]
+    if tables_of_kinds and key == "kind":
+        return "is the package installed that brings this kind?"
+    if here and key in keys_at(model, data, ()):
+        return f"write {key} at the top of the file: a key belongs to the table whose [header] stands above it"
     fitting = [kind for table in tables_of_kinds for kind, cls in table.items() if _field_of(cls, key) is not None]
     if fitting:
         return f"{key} is a key of the kind {' and '.join(shortened(kind) for kind in fitting)}"

@@ -41,6 +41,10 @@ MISTAKES = {
     ),
     "half of supports": (SMALL.replace("pinned-pinned", "pinned"), 2, ['did you mean "pinned-pinned"']),
     "damping in per cent": (SMALL.replace("ratio = 0.02", "ratio = 2"), 2, ["damping_ratio", '0.02 or "2 %"']),
+    "damping of 70 %": (SMALL.replace("ratio = 0.02", "ratio = 0.7"), 0, ["damping_ratio = 0.7:", '"0.7 %"']),
+    "a kind that no package brings": (
+        SMALL.replace('kind = "cruise"', 'kind = "ramp"'), 2, ["unknown motion kind", "is the package installed"],
+    ),
     "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
     "a decimal comma": (SMALL.replace("length = 1.0", "length = 2,5"), 2, ["line 7", "decimal point: 2.5"]),
     "a thousands comma": (SMALL.replace("density = 1000.0", "density = 7,850"), 2, ["7850"]),

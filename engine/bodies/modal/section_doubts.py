@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.study_file.checks import Check
-from engine.study_file.units import Area, Density, Length, Pressure, SecondMoment, Unit, unit_of
+from engine.study_file.units import Area, Density, Dimensionless, Length, Pressure, SecondMoment, Unit, unit_of
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Doubt(Check):
 
     def amount(self, values: Mapping[str, Any]) -> str:
         """The number in doubt with its unit."""
-        return f"{values[self.needs[0]]:.6g} {self.unit.symbol}"
+        return f"{values[self.needs[0]]:.6g} {self.unit.symbol}".rstrip()
 
     def meant(self, values: Mapping[str, Any]) -> str:
         """The number with other units that make it likely, as a question, or ""."""
@@ -59,6 +59,13 @@ def section_doubts(here: str, length: str) -> list[Doubt]:
         doubt(SecondMoment, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",
               lambda size, across, along: size <= across * along**2 / 16),
     ]  # fmt: skip
+
+
+def damping_doubt(here: str) -> Doubt:
+    """Of one damping ratio for all modes of a body at the dotted key `here`."""
+    key = f"{here}.damping_ratio"
+    what, expected = "hardly any structure is damped so much", "at most 0.3, steel 0.005, concrete 0.02"
+    return Doubt(key, (key,), lambda ratio: ratio <= 0.3, what, expected, unit_of(Dimensionless), ("%",))
 
 
 def _modulus_of_matter(modulus: Any) -> Any:
