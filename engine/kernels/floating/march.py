@@ -74,6 +74,7 @@ SLOW = 0.1  # a correction over the one before it, from which on the tangent of 
 KEPT = 8
 MOST_ITERATIONS = 25
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
+STILL = 1e-9  # of a length within a step: what moves by less rests
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
 
@@ -132,12 +133,24 @@ def solve_accelerations(system, lane, who, state, solver):
 
 
 @called
+def least_scale(system, lane):
+    """The least that weighted accelerations are measured by: gravity's, and `STILL` of a length within a step. Forces
+    that are balanced leave accelerations that are rounding alone, and differences by parts of these no tangent."""
+    mass, length, g = 0.0, 0.0, three_at(lane.gravity, 0)
+    for b in range(system.bodies.shape[0]):
+        mass += system.bodies[b, MASS]
+        length = max(length, system.bodies[b, LENGTH])
+    h = lanes_at(lane.step, (0,))
+    weight, still = root(mass * dot(g, g)), np.sqrt(mass) * STILL * length / (h * h)
+    return choose(weight > still, weight, still)
+
+
+@called
 def factor_masses(system, lane, who, state, solver):
     """Factors of the mass matrix into the fresh matrix, and of some lanes how heavy each coordinate is; 1 where it is
     regular. What is tried stands at the state, without accelerations."""
     memory, N = solver.memory, state.weight.shape[0]
     kept, zero = of(memory, SCALE), all_lanes(0.0)
-    g = three_at(lane.gravity, 0)
     put_lanes(memory, (SCALE,), all_lanes(1.0))
     for k in range(N):
         put_lanes(state.tried.y, (k,), lanes_at(state.now.y, (k,)))
@@ -145,11 +158,8 @@ def factor_masses(system, lane, who, state, solver):
         put_lanes(state.tried.a, (k,), zero)
         put_where(who, state.weight, (k,), all_lanes(1.0))
     tangent(system, lane, state, zero, zero, solver)
-    mass = 0.0
-    for b in range(system.bodies.shape[0]):
-        mass += system.bodies[b, MASS]
-    weight = root(mass * dot(g, g))
-    put_lanes(memory, (SCALE,), choose(who & (weight > kept), weight, kept))
+    least = least_scale(system, lane)
+    put_lanes(memory, (SCALE,), choose(who & (least > kept), least, kept))
     put_where(who, memory, (FRESH,), zero)
     for k in range(N):
         own = lanes_at(solver.fresh, (k, k))
