@@ -68,7 +68,6 @@ class Converged:
 def levels(study: Study, duration: float) -> Iterator[Level]:
     """Coarse to fine, for a time (s) that the longest of the variants takes."""
     fixed = study.solver.steps
-    is_open = any(body.modes == "auto" for body in study.body.values())
     model = build(study, FIRST_MODES)
     least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
     first = STATIONS * max(1, int(np.ceil(least / STATIONS)))
@@ -77,9 +76,9 @@ def levels(study: Study, duration: float) -> Iterator[Level]:
     every, factor = int(np.ceil(coarsest / STATIONS)), 1
     for level in range(LEVELS):
         modes = FIRST_MODES * 2**level
-        if is_open and modes > MOST_MODES:
+        if model.is_open and modes > MOST_MODES:
             return
-        own = build(study, modes) if is_open and level else model
+        own = build(study, modes) if model.is_open and level else model
         # more modes are faster ones: a scheme with a limit needs more than twice the steps for twice as many
         limit = FAR_WITHIN * scheme.stability_limit if fixed == "auto" else np.inf
         while coarsest * factor * limit < duration * own.highest_omega:
@@ -139,7 +138,7 @@ def converge(
             change, held = error.copy(), np.full(V, np.nan)
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
-        apart = differences(model, _part(found, active), now)
+        apart = differences(model, found.of(active), now)
         told = left_over(apart, change[:, active]) + rung.left_out[:, None]
         error[:, active], change[:, active] = told, apart
         modes[active], steps[active] = model.modes, level.steps
@@ -180,7 +179,7 @@ def observed(
             beyond = march(
                 level.model, values.part(lanes), duration[lanes], level.steps, stations(level), weights(level.scheme)
             )
-            apart[:, lanes] = differences(level.model, _part(found.outcome, lanes), outcome(level.model, beyond))
+            apart[:, lanes] = differences(level.model, found.outcome.of(lanes), outcome(level.model, beyond))
             left[lanes] = False
         if not left.any():
             break
@@ -199,11 +198,6 @@ def worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> A
         if np.isfinite(result.tolerance):
             found = np.maximum(found, own / (result.tolerance * (values.tighter if result.follows else 1.0)))
     return found
-
-
-def _part(found: Outcome, lanes: Counts) -> Outcome:
-    numbers = {name: array[lanes] for name, array in found.numbers.items()}
-    return Outcome(numbers, found.history[lanes], found.times[lanes], found.status[lanes])
 
 
 def _replaced(found: Outcome, lanes: Counts, other: Outcome) -> Outcome:

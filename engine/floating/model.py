@@ -68,6 +68,11 @@ class FloatingModel:
         return sum(body.omega.size for body in self.bodies.values())
 
     @property
+    def is_open(self) -> bool:
+        """Whether the study leaves the modes of a body open that bends."""
+        return any(self.study.body[name].modes == "auto" for name, body in self.bodies.items() if body.omega.size)
+
+    @property
     def first_omega(self) -> float:
         """The lowest elastic frequency, rad/s; that of one period in a second where nothing bends."""
         found = [body.omega.min() for body in self.bodies.values() if body.omega.size]

@@ -11,7 +11,7 @@ import numpy as np
 from engine.floating.theory import bent_times, unstiffened_times
 from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Status
 from results_schema.statuses import gravest, lost
@@ -65,6 +65,11 @@ class Outcome:
     history: Array
     times: Array
     status: np.ndarray[tuple[int], np.dtype[np.int8]]
+
+    def of(self, lanes: Counts) -> Outcome:
+        """That of some of the variants."""
+        numbers = {name: array[lanes] for name, array in self.numbers.items()}
+        return Outcome(numbers, self.history[lanes], self.times[lanes], self.status[lanes])
 
 
 def signals(model: FloatingModel) -> Iterator[Signal]:

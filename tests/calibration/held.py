@@ -20,26 +20,33 @@ import numpy as np
 from engine.accuracy.results import results_of
 from engine.batch.audit import SEED, audit
 from engine.linear_algebra import one_thread
+from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from tests.calibration.scenes import draw, judged, planned, reads_moment, with_fixed
 
 JUDGED = 8  # variants of a scene
 CANNOT_JUDGE = 0.3  # of the tolerance: a truth that may be off by more
 MATTERS = 0.01  # of the tolerance: smaller errors need not be told well
+GROUPS = "displacements", "with a moment"  # of scenes: without and with one that is read
 
 
 class Row(NamedTuple):
-    """One variant that was judged: its worst held error and that of its truth over the tolerance, whether the archive
-    marks it, its work; and told over true errors of its held results that matter."""
+    """One variant that was judged, of a group of scenes: its worst held error and that of its truth over the tolerance,
+    whether the archive marks it; and told over true errors of its held results that matter."""
 
     scene: int
-    tolerance: float
-    moment: bool
+    group: str
     worst: float
     doubt: float
     marked: bool
-    work: float
     ratios: tuple[float, ...]
+
+
+def row_of(scene: int, group: str, marked: bool, observed: Array, told: Array, doubt: Array) -> Row:
+    """Of the errors (R,) of a variant's held results over the tolerance: observed, told, and those of the truth."""
+    matter = (observed > MATTERS) & (observed > doubt)
+    ratios = tuple((told[matter] / observed[matter]).tolist())
+    return Row(scene, group, float(observed.max()), float(np.nanmax(doubt)), marked, ratios)
 
 
 @one_thread()
@@ -54,14 +61,10 @@ def rows_of(seed: int, size: int, tolerance: float, fixed: bool, number: int) ->
     found = audit(plan, picked)
     held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
     observed, told, doubt = (part[held] / tolerance for part in (found.observed, found.told, found.doubt))
-    work = {int(v): group.work for group in plan.groups for v in np.intersect1d(group.variants, picked)}
-    rows = []
-    for v, variant in enumerate(found.variants):
-        matter = (observed[:, v] > MATTERS) & (observed[:, v] > doubt[:, v])
-        ratios = tuple((told[matter, v] / observed[matter, v]).tolist())
-        worst, marked = float(observed[:, v].max()), bool(np.nanmax(told[:, v]) > 1.0 or np.isnan(told[:, v]).any())
-        own = tolerance, reads_moment(number), worst, float(np.nanmax(doubt[:, v])), marked, work[int(variant)]
-        rows.append(Row(number, *own, ratios))
+    group, rows = GROUPS[reads_moment(number)], []
+    for v in range(found.variants.size):
+        marked = bool(np.nanmax(told[:, v]) > 1.0 or np.isnan(told[:, v]).any())
+        rows.append(row_of(number, group, marked, observed[:, v], told[:, v], doubt[:, v]))
     return rows
 
 
@@ -82,6 +85,15 @@ def said(rows: Sequence[Row], words: str) -> str:
     )
 
 
+def tell(rows: Sequence[Row], groups: Sequence[str], tolerance: float) -> None:
+    """Print a line on each group, and the worst of all rows."""
+    for group in groups:
+        print(f"{tolerance:g}, {said([row for row in rows if row.group == group], group)}", flush=True)
+    worst = sorted(rows, key=lambda row: -row.worst)[:12]
+    shown = (f"scene {r.scene}: {r.worst:.2g} (truth {r.doubt:.2g}{', marked' * r.marked})" for r in worst)
+    print(f"  worst: {'; '.join(shown)}", flush=True)
+
+
 def main() -> None:
     """Judge and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -97,11 +109,7 @@ def main() -> None:
         for tolerance in given.tolerances:
             work = partial(rows_of, given.seed, given.size, tolerance, given.fixed)
             rows = [row for part in pool.imap_unordered(work, numbers) for row in part]
-            for moment, words in ((False, "displacements"), (True, "with a moment")):
-                print(f"{tolerance:g}, {said([row for row in rows if row.moment is moment], words)}", flush=True)
-            worst = sorted(rows, key=lambda row: -row.worst)[:12]
-            shown = (f"scene {r.scene}: {r.worst:.2g} (truth {r.doubt:.2g}{', marked' * r.marked})" for r in worst)
-            print(f"  worst: {'; '.join(shown)}")
+            tell(rows, GROUPS, tolerance)
             print(f"  {time.perf_counter() - started:.0f} s", flush=True)
 
 
