@@ -15,7 +15,8 @@ import numpy as np
 from engine.floating.lanes import in_blocks, lanes
 from engine.floating.model import FloatingModel, build
 from engine.kernels.floating import given, march
-from engine.kernels.floating.equations import follow_frame, residual
+from engine.kernels.floating.equations import residual
+from engine.kernels.floating.following import follow_frame
 from engine.kernels.floating.layout import STATISTICS, Lane, Record, Weights
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.layout import LANES

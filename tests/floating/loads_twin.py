@@ -8,8 +8,6 @@ there; a spring has an energy. Then each term is switched off in turn.
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import numpy as np
 
 from engine.floating.model import build
@@ -150,14 +148,6 @@ TERMS = {
 }
 
 
-def equations_with(old: str, new: str) -> ModuleType:
-    """The equations with the loads' kernels of another text."""
-    own = mutated(loads, old, new)
-    whole = mutated(equations, "", "")  # a copy, as others use the module itself
-    whole.load_forces, whole.link_forces = own.load_forces, own.link_forces  # type: ignore[attr-defined]
-    return whole
-
-
 def main() -> None:
     with_loads, without = build(study()), build(twin.study())
     for seed in range(3):
@@ -169,7 +159,7 @@ def main() -> None:
         print(f"state {seed}: {gap:.1e}")
         assert gap < AGREE, (found, wanted)
     for name, (old, new) in TERMS.items():
-        found = twin.left_of(equations_with(old, new), with_loads, y, u, a) - bare
+        found = twin.left_of(mutated(equations, old, new, loads), with_loads, y, u, a) - bare
         gap = np.abs(found - wanted).max() / np.abs(wanted).max()
         print(f"without {name}: {gap:.1e}")
         assert gap > DIFFER, name

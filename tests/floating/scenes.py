@@ -86,12 +86,19 @@ def largest_drift(study: Study, count: int) -> float:
     return float(max(np.ptp(energy) / energy[0], (np.ptp(momentum, axis=0) / size).max()))
 
 
-def mutated(module: ModuleType, old: str, new: str) -> ModuleType:
-    """A module of kernels that are not compiled, with another text."""
-    source = Path(str(module.__file__)).read_text(encoding="utf-8")
-    assert old in source, old
-    found = ModuleType("mutated")
-    exec(compile(source.replace(old, new), "mutated", "exec"), found.__dict__)
+def mutated(module: ModuleType, old: str, new: str, *below: ModuleType) -> ModuleType:
+    """A module of kernels that are not compiled, with another text; below: modules that it takes functions from, each
+    after those that it needs, in one of which the text may stand instead."""
+    changed: dict[str, object] = {}
+    for one in (*below, module):
+        source = Path(str(one.__file__)).read_text(encoding="utf-8")
+        found = ModuleType("mutated")
+        exec(compile(source.replace(old, new), "mutated", "exec"), found.__dict__)
+        found.__dict__.update({name: changed[name] for name in changed.keys() & one.__dict__.keys()})
+        own = [name for name, value in one.__dict__.items() if getattr(value, "__module__", "") == one.__name__]
+        if old in source or any(name in changed for name in one.__dict__):
+            changed |= {name: found.__dict__[name] for name in own}
+    assert changed, old
     return found
 
 

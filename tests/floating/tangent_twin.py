@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.floating.lanes import in_blocks, lanes
 from engine.floating.model import FloatingModel, build
-from engine.kernels.floating import march
+from engine.kernels.floating import march, newton
 from engine.kernels.floating.equations import residual
 from engine.kernels.floating.layout import STATISTICS, Coordinates, Lane, Record
 from engine.kernels.floating.motions import motions_at
@@ -38,7 +38,7 @@ def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarr
     table = lanes(model, VariantValues(model.study, {}, 1), np.full(1, STEP))
     lane, N = Lane(*(in_blocks(part)[0] for part in table)), model.size
     blank = np.zeros((1, 1, STATISTICS, LANES))
-    state, solver, _ = module.room_to_march(model.system, lane, Record(np.zeros(1), blank, blank, blank, blank))
+    state, solver, _ = march.room_to_march(model.system, lane, Record(np.zeros(1), blank, blank, blank, blank))
     motions_at(lane.motions, np.zeros(LANES), np.zeros(LANES), solver.work.piece, solver.work.motions)
     for part, values in zip(state.tried, residual_twin.state(model, 1), strict=True):
         part[:] = values[:, None]
@@ -58,11 +58,11 @@ def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarr
 
 def main() -> None:
     model = build(loads_twin.study())
-    for name, module in (("tangent", march), *((name, mutated(march, *term)) for name, term in TERMS.items())):
+    for name, module in (("tangent", newton), *((name, mutated(newton, *term)) for name, term in TERMS.items())):
         found, wanted = both(module, model)
         gap = (np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max()
-        print(f"{'' if module is march else 'without '}{name}: {gap:.1e}")
-        assert gap < AGREE if module is march else gap > DIFFER, name
+        print(f"{'' if module is newton else 'without '}{name}: {gap:.1e}")
+        assert gap < AGREE if module is newton else gap > DIFFER, name
 
 
 if __name__ == "__main__":

@@ -6,11 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.floating.march import march
 from engine.floating.model import build
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
-from tests.floating.scenes import ARM, FLYER, FOX_GOODWIN, SPIN_UP, history, steps
+from tests.floating.scenes import ARM, AVERAGE_ACCELERATION, FLYER, FOX_GOODWIN, SPIN_UP, history, steps
 from tests.naive.particles_in_frames import Particles, beam_in_plane
 
 
@@ -28,6 +30,25 @@ def test_spin_up_of_kane_ryan_and_banerjee() -> None:
     assert np.abs(tip[times > 15.0]).max() == pytest.approx(3.65e-3, rel=5e-3)
     end = history(model, marched, "ends", 0, 3)[times > 15.0]
     assert (np.hypot(end[:, 0], end[:, 2]) - 10.0).mean() == pytest.approx(5.143e-4, rel=2e-3)
+
+
+@pytest.mark.parametrize("load", [0.1, 1.0])
+def test_a_smooth_start_is_marched_at_every_rate(load: float) -> None:
+    """The acceleration that is given at the start is a difference of two numbers that are equal but for rounding."""
+    way = {"kind": "waypoints", "times": [0, 15], "positions": [2, 8]}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": ARM},
+        frame={"arm": {"stiffening": True, "joints": [SPIN_UP]}},
+        carriage={"load": {"on": "arm", "kind": "mass", "mass": load, "motion": way}},
+        question={"duration": 20.0},
+    )
+    rates = np.linspace(1.0, 6.0, 160)  # 1.094, 3.453 and 4.428 gave up in the first step
+    values = VariantValues(study, {"frame.arm.joints.0.motion.rate": rates}, rates.size)
+    for count in (80, 160):
+        found = march(build(study), values, np.full(rates.size, 2.0), count, np.zeros(1, int), AVERAGE_ACCELERATION)
+        assert (found.status == 0).all()
 
 
 @pytest.mark.fault(17)

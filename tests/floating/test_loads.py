@@ -130,3 +130,28 @@ def test_springs_between_bodies_keep_energy() -> None:
         drifts.append(np.abs(kinetic + potential - kinetic[0] - potential[0]).max() / potential[0])
     assert drifts[0] < 1e-3
     assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e6])
+def test_a_body_between_two_springs_rests(stiffness: float) -> None:
+    """Pulled as far by either."""
+    for place in np.linspace(0.3, 2.9, 6):
+        one, other = ([place + 0.5 + side, 0.2, 0.1] for side in (1.7, -1.7))
+        study = Study(
+            kind="moving-frames",
+            gravity=0.0,
+            body={"block": {"kind": "rigid", "length": 1.0, "mass": 3.7, "inertia": 0.31}},
+            frame={"block": {"position": [place, 0.2, 0.1], "joints": [{"kind": "free"}]}},
+            spring={
+                name: {
+                    "ends": [{"on": "block", "at": 0.5}, {"position": end}],
+                    "stiffness": stiffness,
+                    "length": 0.6,
+                }
+                for name, end in (("one", one), ("other", other))
+            },
+            question={"duration": 0.1},
+        )
+        model, found = steps(study, 0.1, 800)
+        assert found.status[0] == 0
+        assert np.abs(history(model, found, "ends")[:, 0] - place - 1.0).max() < 1e-12

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from engine.floating.converge import levels
 from engine.floating.results import frame_signals
 from engine.scene.study import Study
-from tests.floating.scenes import FOX_GOODWIN, history, steps
+from tests.floating.scenes import ARM, FOX_GOODWIN, history, steps
 
 HINGE = {"kind": "revolute", "axis": [0, 1, 0]}
+TIP = {"kind": "rigid", "length": 0.2, "mass": 2.0, "inertia": 0.01}
 LINK = {"kind": "rigid", "length": 1.0, "mass": 2.0, "inertia": 2.0 / 12.0, "own_weight": True}
 
 
@@ -185,3 +187,19 @@ def test_the_drives_of_a_robot_on_a_bed_do_the_work() -> None:
     errors = [unbalanced(count) for count in (8_000, 32_000)]
     assert errors[1] < 1e-6
     assert 0.5 * np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("bodies", [{"arm": ARM}, {"arm": ARM, "tip": TIP}], ids=["an arm", "an arm and a rigid body"])
+def test_only_modes_that_are_open_end_the_levels(bodies: dict[str, object]) -> None:
+    """Those that are fixed are marched in ever more steps; a rigid body leaves no modes open, though it names none."""
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body=bodies,
+        frame={"tip": {"on": "arm"}} if "tip" in bodies else {},
+        load={"push": {"on": "arm", "force": [0.0, 0.0, 1.0]}},
+        question={"duration": 1.0},
+    )
+    found = list(levels(study, 1.0))
+    assert len(found) == 12
+    assert len({level.model.modes for level in found}) == 1

@@ -10,7 +10,8 @@ T = 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffen
 that it has if accelerations go on as they did; directions of torques follow deflections in first order.
 """
 
-from engine.kernels.floating.equations import acceleration_at, carried, follow_frame, ridden, touched
+from engine.kernels.floating.carriages import acceleration_at, carried, ridden, touched
+from engine.kernels.floating.following import follow_frame
 from engine.kernels.floating.layout import (
     DAMPER,
     FIRST,

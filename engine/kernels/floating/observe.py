@@ -1,7 +1,8 @@
 """What is observed of a block of lanes at a station: readings of sensors, carriages, points, frames, energy and
 momentum."""
 
-from engine.kernels.floating.equations import carried, has_attitude, inertia_times, ridden, second_moments
+from engine.kernels.floating.bodies import second_moments
+from engine.kernels.floating.carriages import carried, has_attitude, inertia_times, ridden
 from engine.kernels.floating.layout import (
     COORDINATE,
     FIRST,

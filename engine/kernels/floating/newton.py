@@ -1,0 +1,192 @@
+"""Newton's method for the accelerations at the end of a step, and where a march or a piece of a motion begins.
+
+The tangent is made of differences of the residual, and kept for as many steps as the iteration converges fast. Lanes
+go side by side, and each decides for itself: a lane that is done, or has failed, stays where it is while others go on,
+so that its numbers do not depend on its neighbours.
+"""
+
+import numpy as np
+
+from engine.kernels.floating.equations import residual
+from engine.kernels.floating.layout import DIVERGED, LENGTH, MASS, NOT_CONVERGED
+from engine.kernels.floating.state import (
+    CODE,
+    DONE,
+    FRESH,
+    LAST,
+    SCALE,
+    advance,
+    factor,
+    going_on,
+    of,
+    or_one,
+    put_where,
+    size_of,
+    solve,
+    sound,
+)
+from engine.kernels.floating.vectors import dot
+from engine.kernels.floating.work import three_at
+from engine.kernels.jit import called
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes, root
+
+PART = 1e-3  # of the largest acceleration so far, by which accelerations are moved for differences
+#: A correction, and what is left after one more, over the largest acceleration so far, at which the iteration ends.
+SMALL, ENOUGH = 1e-6, 1e-10
+STALLED = 0.5  # a small correction that is no smaller than so much of the one before is rounding
+SLOW = 0.1  # a correction over the one before it, from which on the tangent of a lane is made anew
+MOST_ITERATIONS = 25
+STILL = 1e-9  # of a length within a step: what moves by less rests
+
+
+@called
+def tangent(system, lane, state, of_y, of_u, solver):
+    """Derivative of the residual by the accelerations, coordinates and velocities following by of_y and of_u, into the
+    fresh matrix: the residual is linear in accelerations, and nearly so in what a step makes of them."""
+    x, M = state.tried, solver.fresh
+    N = M.shape[0]
+    residual(system, lane, x, solver.work, solver.other)
+    for k in range(N):
+        by = PART * or_one(of(solver.memory, SCALE)) / lanes_at(state.weight, (k,))
+        y, u, a = lanes_at(x.y, (k,)), lanes_at(x.u, (k,)), lanes_at(x.a, (k,))
+        put_lanes(x.y, (k,), y + of_y * by)
+        put_lanes(x.u, (k,), u + of_u * by)
+        put_lanes(x.a, (k,), a + by)
+        residual(system, lane, x, solver.work, state.residual)
+        for i in range(N):
+            put_lanes(M, (i, k), (lanes_at(state.residual, (i,)) - lanes_at(solver.other, (i,))) / by)
+        put_lanes(x.y, (k,), y)
+        put_lanes(x.u, (k,), u)
+        put_lanes(x.a, (k,), a)
+
+
+@called
+def solve_accelerations(system, lane, who, state, solver):
+    """Accelerations of some lanes as they follow from the state, in which the equations are linear; lanes in which
+    there are none do not converge."""
+    x, memory = state.tried, solver.memory
+    regular = factor_masses(system, lane, who, state, solver)
+    for _ in range(2):
+        residual(system, lane, x, solver.work, state.residual)
+        solve(solver.fresh, state.residual)
+        for k in range(x.a.shape[0]):
+            a = lanes_at(x.a, (k,)) - lanes_at(state.residual, (k,))
+            put_lanes(x.a, (k,), a)
+            heavy = lanes_at(state.weight, (k,)) * size_of(a)
+            put_where(who & (heavy > of(memory, SCALE)), memory, (SCALE,), heavy)
+    residual(system, lane, x, solver.work, state.residual)
+    for k in range(x.a.shape[0]):
+        a = lanes_at(x.a, (k,))
+        put_where(who, state.now.a, (k,), a)
+        put_where(who, state.inner, (k,), a)
+        put_where(who, state.before, (k,), a)
+        put_where(who, state.earlier, (k,), a)
+    put_where(who & (regular < 0.5), memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+
+
+@called
+def least_scale(system, lane):
+    """The least that weighted accelerations are measured by: gravity's, and `STILL` of a length within a step. Forces
+    that are balanced leave accelerations that are rounding alone, and differences by parts of these no tangent."""
+    mass, length, g = 0.0, 0.0, three_at(lane.gravity, 0)
+    for b in range(system.bodies.shape[0]):
+        mass += system.bodies[b, MASS]
+        length = max(length, system.bodies[b, LENGTH])
+    h = lanes_at(lane.step, (0,))
+    weight, still = root(mass * dot(g, g)), np.sqrt(mass) * STILL * length / (h * h)
+    return choose(weight > still, weight, still)
+
+
+@called
+def factor_masses(system, lane, who, state, solver):
+    """Factors of the mass matrix into the fresh matrix, and of some lanes how heavy each coordinate is; 1 where it is
+    regular. What is tried stands at the state, without accelerations."""
+    memory, N = solver.memory, state.weight.shape[0]
+    kept, zero = of(memory, SCALE), all_lanes(0.0)
+    put_lanes(memory, (SCALE,), all_lanes(1.0))
+    for k in range(N):
+        put_lanes(state.tried.y, (k,), lanes_at(state.now.y, (k,)))
+        put_lanes(state.tried.u, (k,), lanes_at(state.now.u, (k,)))
+        put_lanes(state.tried.a, (k,), zero)
+        put_where(who, state.weight, (k,), all_lanes(1.0))
+    tangent(system, lane, state, zero, zero, solver)
+    least = least_scale(system, lane)
+    put_lanes(memory, (SCALE,), choose(who & (least > kept), least, kept))
+    put_where(who, memory, (FRESH,), zero)
+    for k in range(N):
+        own = lanes_at(solver.fresh, (k, k))
+        put_where(who, state.weight, (k,), root(size_of(own)))
+    return factor(solver.fresh)
+
+
+@called
+def correct(who, state, solver):
+    """One correction of the accelerations of some lanes; its size over the largest so far."""
+    solve(solver.matrix, state.residual)
+    change, scale, a = all_lanes(0.0), of(solver.memory, SCALE), state.tried.a
+    for k in range(a.shape[0]):
+        by, weight = lanes_at(state.residual, (k,)), lanes_at(state.weight, (k,))
+        new = lanes_at(a, (k,)) - by
+        put_where(who, a, (k,), new)
+        heavy = weight * size_of(new)
+        scale = choose(who & (heavy > scale), heavy, scale)
+        change = change + (weight * by) * (weight * by)
+    put_lanes(solver.memory, (SCALE,), scale)
+    return root(change) / or_one(scale)
+
+
+@called
+def renew(system, lane, scheme, h, state, solver):
+    """New tangents, and their factors, for the lanes that need them."""
+    memory, M, new = solver.memory, solver.matrix, solver.fresh
+    stale = (of(memory, FRESH) < 0.5) & (of(memory, DONE) < 0.5)
+    if everywhere((of(memory, FRESH) > 0.5) | (of(memory, DONE) > 0.5)):
+        return
+    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
+    tangent(system, lane, state, scheme.beta * of_new * h * h, scheme.gamma * of_new * h, solver)
+    regular = factor(new)
+    for i in range(M.shape[0]):
+        for j in range(M.shape[0]):
+            put_where(stale, M, (i, j), lanes_at(new, (i, j)))
+    put_where(stale, memory, (FRESH,), all_lanes(1.0))
+    put_where(stale, memory, (LAST,), all_lanes(np.inf))
+    singular = stale & (regular < 0.5)
+    put_where(singular, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    put_where(singular, memory, (DONE,), all_lanes(1.0))
+
+
+@called
+def judge(change, memory):
+    """Whose iteration ends with a correction of that size, and whose tangent is too old."""
+    last, going = of(memory, LAST), of(memory, DONE) < 0.5
+    rate = choose((last < np.inf) & (last > 0.0), change / last, SLOW)
+    ends = (change * rate * rate <= ENOUGH) | (change > STALLED * last)
+    put_where(going & (rate > SLOW), memory, (FRESH,), all_lanes(0.0))
+    put_where(going, memory, (LAST,), change)
+    put_where(going & (change <= SMALL) & ends, memory, (DONE,), all_lanes(1.0))
+    lost = choose(change < np.inf, 0.0, 1.0) > 0.5  # NaN too
+    put_where(going & lost, memory, (CODE,), all_lanes(1.0 * DIVERGED))
+    put_where(going & lost, memory, (DONE,), all_lanes(1.0))
+
+
+@called
+def step(system, lane, scheme, who, h, state, solver):
+    """Newton's method for one step of some lanes, from accelerations that go on as they did. Each ends with one
+    correction more, which is not judged: what is observed is of before it."""
+    memory = solver.memory
+    put_lanes(memory, (DONE,), choose(who, all_lanes(0.0), 1.0))
+    for k in range(state.before.shape[0]):
+        put_lanes(state.tried.a, (k,), going_on(state, k))
+    put_lanes(memory, (LAST,), all_lanes(np.inf))
+    for _ in range(MOST_ITERATIONS):
+        advance(state, scheme, h)
+        renew(system, lane, scheme, h, state, solver)
+        residual(system, lane, state.tried, solver.work, state.residual)
+        judge(correct(of(memory, DONE) < 0.5, state, solver), memory)
+        if everywhere(of(memory, DONE) > 0.5):
+            break
+    put_where(of(memory, DONE) < 0.5, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    advance(state, scheme, h)
+    residual(system, lane, state.tried, solver.work, state.residual)
+    correct(who & sound(memory), state, solver)
+    advance(state, scheme, h)
