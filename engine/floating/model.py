@@ -232,6 +232,7 @@ def _system(model: FloatingModel) -> System:
         np.arange(B, dtype=np.int64),
         _ends(model, n),
         *_readings(model),
+        _smooth(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
         np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
         False,
@@ -323,6 +324,13 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
     depths = _depths(model)
     under += [(-1, Z, 0)] * len(depths)
     return np.concatenate([rows, depths]), np.array(under, dtype=np.int64).reshape(-1, 3)
+
+
+def _smooth(model: FloatingModel) -> Counts:
+    """Signals that go on as smoothly as coordinates do: what sensors read of these, and places along tracks."""
+    sensors = [number for number, sensor in enumerate(model.study.sensor.values()) if not sensor.reads.rate]
+    first = model.signal_of("carriages")
+    return np.array([*sensors, *(first + OF_CARRIAGE * c for c in range(len(model.study.carriage)))], dtype=np.int64)
 
 
 def _depths(model: FloatingModel) -> Array:

@@ -17,13 +17,14 @@ WORDS = {
     "contact_force": "contact force, positive where it presses",
 }
 WORD_OF = {"max": "largest", "min": "smallest"}
+EXTREME = "over all stations, of what is no rate and no force also between them, by parabolas through three"
 
 
 def _ends(name: str, units: str, words: str) -> list[Variable]:
     found = []
     for end in ENDS:
         word = WORD_OF[end]
-        found.append(Variable(f"{name}_{end}", units=units, long_name=f"{word} {words}", meaning="over all stations"))
+        found.append(Variable(f"{name}_{end}", units=units, long_name=f"{word} {words}", meaning=EXTREME))
         when = f"time of the {word} {words}"
         found.append(Variable(f"{name}_{end}_time", units="s", long_name=when, required=False))
     return found

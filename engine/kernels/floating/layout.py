@@ -61,7 +61,8 @@ class System(NamedTuple):
     points (P, 3 + 3 n), pointed (P): places whose position over
     the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
-    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations.
+    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that
+    have extremes between stations.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
     iteration.
@@ -87,6 +88,7 @@ class System(NamedTuple):
     points: FloatArray
     readings: FloatArray
     read_under: IntArray
+    smooth: IntArray
     leans: BoolArray
     pairing: IntArray
     given: bool

@@ -63,11 +63,13 @@ JUMP = 1e-12  # of a rate: below it is rounding
 
 
 class Room(NamedTuple):
-    """What the march of a block of lanes works in; signals (signals, LANES)."""
+    """What the march of a block of lanes works in; signals (signals, LANES), and past (2, K, LANES): those that are
+    smooth, at the two stations before."""
 
     state: State
     solver: Solver
     signals: FloatArray
+    past: FloatArray
 
 
 @called
@@ -194,7 +196,7 @@ def room_to_march(system, lane, record):
     two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
     memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
     solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
-    return Room(state, solver, signals)
+    return Room(state, solver, signals, np.zeros((2, system.smooth.shape[0], LANES)))
 
 
 @called
@@ -217,7 +219,7 @@ def start(system, lane, state, solver):
 @called
 def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
-    state, solver, signals = room
+    state, solver, signals, past = room
     work, memory, kept = solver.work, solver.memory, 0
     start(system, lane, state, solver)
     for number in range(steps + 1):
@@ -229,6 +231,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
         note_last(memory, number, block, record.last)
         watched = observe(system, lane, state.now, work, signals)
         count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
+        count_between(goes, system.smooth, signals, past, number, record.statistics, block)
         if kept < record.stations.size and record.stations[kept] == number:
             observe_whole(system, lane, state.now, work, signals, watched)
             for k in range(signals.shape[0]):
@@ -277,6 +280,28 @@ def count(who, signals, watched, number, weight, statistics, block):
         put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
         squares = lanes_at(statistics, (block, j, SQUARES))
         put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
+
+
+@called
+def count_between(who, smooth, signals, past, number, statistics, block):
+    """Extremes of smooth signals between stations: the vertices of parabolas through three, near the middle one."""
+    for k in range(smooth.shape[0]):
+        j = smooth[k]
+        one, two, three = lanes_at(past, (0, k)), lanes_at(past, (1, k)), lanes_at(signals, (j,))
+        put_lanes(past, (0, k), two)
+        put_lanes(past, (1, k), three)
+        if number < 2:
+            continue
+        slope, bend = 0.5 * (three - one), one - 2.0 * two + three
+        turns = who & (bend * bend > 0.0) & (4.0 * slope * slope <= bend * bend)
+        after_it = -1.0 * slope / choose(turns, bend, 1.0)
+        value, at = two + 0.5 * slope * after_it, after_it + (number - 1.0)
+        larger = turns & (bend < 0.0) & (value > lanes_at(statistics, (block, j, LARGEST)))
+        put_where(larger, statistics, (block, j, LARGEST), value)
+        put_where(larger, statistics, (block, j, LARGEST_AT), at)
+        smaller = turns & (bend > 0.0) & (value < lanes_at(statistics, (block, j, SMALLEST)))
+        put_where(smaller, statistics, (block, j, SMALLEST), value)
+        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
 
 
 @kernel
