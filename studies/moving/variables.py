@@ -17,7 +17,7 @@ WORDS = {
     "contact_force": "contact force, positive where it presses",
 }
 WORD_OF = {"max": "largest", "min": "smallest"}
-EXTREME = "over all stations, of what is no rate and no force also between them, by parabolas through three"
+EXTREME = "over all stations; of places, and of sensors that read no rates, also between them by parabolas"
 
 
 def _ends(name: str, units: str, words: str) -> list[Variable]:

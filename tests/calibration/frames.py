@@ -38,7 +38,7 @@ Columns = dict[str, Array]
 
 SIZE = 8  # variants of a scene
 FINER = (4, 1.5), (8, 2.0)  # times the steps that told an error, and times the modes where these are open
-MOST_WORK = 1e7  # steps x coordinates of a truth: about half a minute
+MOST_WORK = 3e6  # steps x coordinates of a truth: about ten seconds
 
 
 class Truth(NamedTuple):
