@@ -30,8 +30,8 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     that the study's own summary is made of (`<sensor>_static`)."""
     dataset = results_over(plan, plan.cases, arrays)
     if selected is not None:
-        dataset = _with_histories(plan, dataset, selected, _declared(plan))
-    return _with_ratios(plan, dataset)
+        dataset = with_histories(plan, dataset, selected)
+    return with_ratios(plan, dataset)
 
 
 def _declared(plan: Plan) -> dict[str, Variable]:
@@ -108,7 +108,7 @@ def coordinates(cases: Cases) -> dict[str, Any]:
     return found
 
 
-def _with_ratios(plan: Plan, dataset: xr.Dataset) -> xr.Dataset:
+def with_ratios(plan: Plan, dataset: xr.Dataset) -> xr.Dataset:
     """Speed and mass ratios of the first carriage, along those dimensions only on which they depend."""
     for name, ratio in (("speed_ratio", _speed_ratio(plan)), ("mass_ratio", _mass_ratio(plan))):
         if ratio is not None:
@@ -153,8 +153,9 @@ def _narrowed(plan: Plan, values: Array) -> tuple[tuple[str, ...], Array]:
     return tuple(dims), grid
 
 
-def _with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows, declared: dict[str, Variable]) -> xr.Dataset:
-    """Histories on the whole grid where every variant has one, else along ``history``."""
+def with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows) -> xr.Dataset:
+    """The dataset with histories: on the whole grid where every variant has one, else along ``history``."""
+    declared = _declared(plan)
     stations = selected.arrays["elapsed"].shape[1]
     whole = selected.variants.size == plan.size
     lead = plan.cases.dims if whole else ("history",)

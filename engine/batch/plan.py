@@ -178,6 +178,11 @@ class Plan:
         return (counts_shown(timeline, self.asked.window, self.study.output.histories) - first) / (last - first)
 
     @property
+    def numbers_bytes(self) -> int:
+        """Upper bound of the results of all variants, besides histories."""
+        return 8 * self.size * numbers_per_variant(self.asked)
+
+    @property
     def disk_bytes(self) -> int:
         """Upper bound of the archive's size; the parts take as much until it is written."""
         kept = int(self.shown.size)

@@ -18,7 +18,7 @@ from results_schema.errors import ArchiveError
 from results_schema.late import xr
 from results_schema.status import Status, label
 from results_schema.store import files
-from results_schema.store.reading import SCHEMA_VERSION, checked, groups_of, read_tables, verify
+from results_schema.store.reading import SCHEMA_VERSION, checked, groups_of, read_small_tables, verify
 from results_schema.store.tables import CONTENTS, DIGEST, from_dataset, seal, to_dataset
 from results_schema.store.writing import write_tables
 
@@ -31,7 +31,7 @@ OutputState = Literal["absent", "same study, finished", "same study, other files
 
 @dataclass(frozen=True)
 class Archive:
-    """An archive in memory: the gridded results, and the groups by path ("/audit", "/model/bed")."""
+    """An archive in memory, or of a large one what is small: the gridded results, and the groups by path ("/audit", "/model/bed")."""
 
     path: Path
     root: xr.Dataset
@@ -93,14 +93,14 @@ def write_archive(
 
 
 def open_archive(path: Path | str) -> Archive:
-    """Load an archive into memory.
+    """Load an archive into memory, but for large arrays of a large one, which are read when they are asked for.
 
     Raises BadInput (no such file, or it points at other files) and ArchiveError (truncated, flipped bits, foreign,
     newer schema, missing variables, impossible sizes), each naming the file.
     """
     path = Path(path)
     with checked(path) as dataset:
-        tables = read_tables(path, dataset)
+        tables = read_small_tables(path, dataset)
     datasets = {group: to_dataset(table) for group, table in tables.items()}
     root = datasets.pop("/")
     for name in (CONTENTS, DIGEST):

@@ -21,6 +21,7 @@ import numpy as np
 
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput
 from results_schema.store import files
+from results_schema.store.blocks import IN_MEMORY
 from results_schema.store.files import output_failed
 from results_schema.store.reading import opened, read_tables
 from results_schema.store.rows import VARIANTS
@@ -91,6 +92,8 @@ class PartStore:
     Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key, or
     files that are none of ours lie among them.
     """
+
+    in_memory: float = IN_MEMORY
 
     def __init__(
         self,

@@ -5,21 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from results_schema.errors import ArchiveError, BadInput, WanderlastError
+from results_schema.late import xr
 from results_schema.store import files
+from results_schema.store.blocks import CHUNK_BYTES, IN_MEMORY
 from results_schema.store.links import refuse_pointers
-from results_schema.store.tables import CONTENTS, DIGEST, Column, Table, checksum, contents, digest
+from results_schema.store.tables import CONTENTS, DIGEST, Column, Numbers, Table, checksum, contents, digest
 
 SCHEMA_VERSION = 2  # archives of version 1 are of before `estimated_error`
 
 # zlib cannot shrink anything by more than 1032; a file that claims more was never written in full.
 _LARGEST_COMPRESSION = 1100
 _TEXT_BYTES = 16
+
+_Loaded = tuple[Numbers, str]
 
 
 @contextmanager
@@ -49,17 +55,26 @@ def opened(path: Path) -> Iterator[Any]:
 
 def read_tables(path: Path, dataset: Any) -> dict[str, Table]:
     """Everything in the file, by group. Raises ArchiveError where data or attributes are damaged."""
-    with _as_archive_error(path):
-        tables = {group: _read_table(place) for group, place in groups_of(dataset)}
-        _check_digest(path, dataset, tables)
-    return tables
+    return _read(path, dataset, _all_of)
+
+
+def read_small_tables(path: Path, dataset: Any) -> dict[str, Table]:
+    """The same, but the large arrays of a large file are read when they are asked for."""
+    return _read(path, dataset, _all_of if _claimed(dataset) <= IN_MEMORY else _Left(path, _state(path)))
 
 
 def verify(path: Path, dataset: Any) -> None:
-    """Read everything once, one variable at a time. Raises ArchiveError where something is damaged."""
+    """Read everything once, a block at a time. Raises ArchiveError where something is damaged."""
+    _read(path, dataset, _checksum_only)
+
+
+def _read(path: Path, dataset: Any, load: Callable[[Any], _Loaded]) -> dict[str, Table]:
     with _as_archive_error(path):
-        tables = {group: _read_table(place, _checksum_only) for group, place in groups_of(dataset)}
-        _check_digest(path, dataset, tables)
+        tables = {group: _read_table(place, load) for group, place in groups_of(dataset)}
+        if digest(tables) != getattr(dataset, DIGEST, ""):
+            what = "damaged: values or attributes are not those that were written"
+            raise ArchiveError(what, where=str(path), remedy="run the study again with --overwrite")
+    return tables
 
 
 def groups_of(dataset: Any) -> Iterator[tuple[str, Any]]:
@@ -118,19 +133,22 @@ def _check_schema(path: Path, dataset: Any) -> None:
 
 def check_sizes(path: Path, dataset: Any) -> None:
     """Refuse a file that claims more data than it can hold, or none, or of foreign types. Raises ArchiveError."""
-    claimed = 0
     for group, place in groups_of(dataset):
         if place.vltypes or place.cmptypes or place.enumtypes:
             raise ArchiveError("holds types that archives do not have", where=str(path), received=f"group {group}")
         for name, variable in place.variables.items():
-            count = math.prod(variable.shape)
-            if count == 0:
+            if math.prod(variable.shape) == 0:
                 raise ArchiveError("a variable has no rows", where=str(path), received=name)
-            claimed += count * (_TEXT_BYTES if variable.dtype is str else variable.dtype.itemsize)
-    present = path.stat().st_size
+    present, claimed = path.stat().st_size, _claimed(dataset)
     if claimed > _LARGEST_COMPRESSION * present:
         expected, received = f"at most {_LARGEST_COMPRESSION} times its {present} bytes", f"{claimed} bytes"
         raise ArchiveError("claims more data than it can hold", where=str(path), expected=expected, received=received)
+
+
+def _claimed(dataset: Any) -> int:
+    """Bytes of all variables."""
+    variables = (variable for _, place in groups_of(dataset) for variable in place.variables.values())
+    return sum(math.prod(v.shape) * (_TEXT_BYTES if v.dtype is str else v.dtype.itemsize) for v in variables)
 
 
 def _check_contents(path: Path, dataset: Any) -> None:
@@ -145,23 +163,48 @@ def _check_contents(path: Path, dataset: Any) -> None:
         raise ArchiveError(f"variables are {word}", where=str(path), expected=expected, received=received)
 
 
-def _check_digest(path: Path, dataset: Any, tables: dict[str, Table]) -> None:
-    if digest(tables) != getattr(dataset, DIGEST, ""):
-        what = "damaged: values or attributes are not those that were written"
-        raise ArchiveError(what, where=str(path), remedy="run the study again with --overwrite")
-
-
-_Loaded = tuple[np.ndarray, str]
-
-
 def _all_of(variable: Any) -> _Loaded:
     data = np.asarray(variable[...])
     return (data.astype(object) if variable.dtype is str else data), ""
 
 
 def _checksum_only(variable: Any) -> _Loaded:
-    data, _ = _all_of(variable)
-    return _outline(variable)[0], checksum(data)
+    if variable.dtype is str:
+        return _outline(variable)[0], checksum(_all_of(variable)[0])
+    return _outline(variable)[0], checksum(variable)
+
+
+@dataclass(frozen=True)
+class _Left:
+    """Leaves large arrays of a file where they are."""
+
+    path: Path
+    state: tuple[int, ...]
+
+    def __call__(self, variable: Any) -> _Loaded:
+        """The array, or what reads it when it is asked for, with the checksum of what is there now."""
+        if variable.dtype is str or math.prod(variable.shape) * variable.dtype.itemsize <= CHUNK_BYTES:
+            return _all_of(variable)
+        from results_schema.store.on_disk import on_disk
+
+        place = f"{variable.group().path.rstrip('/')}/{variable.name}"
+        data = on_disk(variable.shape, variable.dtype, partial(self._rows, place))
+        return xr.Variable(variable.dimensions, data), checksum(variable)
+
+    def _rows(self, place: str, first: int, end: int) -> np.ndarray:
+        """Some rows of an array. Raises ArchiveError where it is not the file that was checked any more."""
+        with opened(self.path) as dataset:
+            if _state(self.path) != self.state:
+                raise ArchiveError("has changed while it was read", where=str(self.path), remedy="try again")
+            variable = dataset[place]
+            variable.set_auto_maskandscale(False)
+            return np.asarray(variable[first:end])
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """What changes where a file is replaced or written."""
+    found = path.stat()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _outline(variable: Any) -> _Loaded:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from results_schema.store.blocks import BLOCK_BYTES
 from results_schema.store.tables import Table, from_arrays
 
 Arrays = dict[str, np.ndarray]
@@ -85,6 +88,78 @@ class Collector:
     def selected(self) -> Rows | None:
         """The rows of a few, ascending by variant."""
         return joined(self._selected)
+
+
+class RowsOnDisk:
+    """Rows of all variants, taken as they come and read again by name in the order of the variants.
+
+    The file holds blocks of neighbouring variants; in each, one array after another with the rows as they came.
+    """
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self.finished = np.zeros(size, bool)
+        self._file, self._size = file, size
+        self._kinds: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {}
+        self._starts: dict[str, int] = {}  # bytes of a variant before those of an array
+        self._bytes, self._block = 0, 0  # of a variant; variants of a block
+        self._came: list[list[np.ndarray]] = []
+
+    def add(self, rows: Rows) -> None:
+        """Take the rows of variants that have not come yet, always with the same arrays."""
+        if not self._kinds:
+            self._lay_out(rows)
+        assert not self.finished[rows.variants].any(), "a variant comes twice"
+        self.finished[rows.variants] = True
+        blocks = rows.variants // self._block
+        for block in np.unique(blocks):
+            own = np.flatnonzero(blocks == block)
+            held = sum(came.size for came in self._came[block])
+            for name in self._kinds:
+                self._file.seek(self._place(name, block, held))
+                self._file.write(np.ascontiguousarray(rows.arrays[name][own]).data)
+            self._came[block].append((rows.variants[own] - block * self._block).astype(np.int32))
+
+    def _lay_out(self, rows: Rows) -> None:
+        for name, array in rows.arrays.items():
+            self._kinds[name], self._starts[name] = (array.dtype, array.shape[1:]), self._bytes
+            self._bytes += self._bytes_of(name)
+        self._block = max(1, 2 * BLOCK_BYTES // self._bytes)
+        self._came = [[] for _ in range(0, self._size, self._block)]
+
+    def _bytes_of(self, name: str) -> int:
+        """Bytes of a variant in an array."""
+        dtype, shape = self._kinds[name]
+        return dtype.itemsize * math.prod(shape)
+
+    def _place(self, name: str, block: int, row: int) -> int:
+        """Where in the file a row of a block is."""
+        variants = min(self._block, self._size - block * self._block)
+        return block * self._block * self._bytes + variants * self._starts[name] + row * self._bytes_of(name)
+
+    def read(self, name: str, first: int, end: int) -> np.ndarray:
+        """(end - first, ...) an array from one variant to before another."""
+        dtype, shape = self._kinds[name]
+        found = np.empty((end - first, *shape), dtype)
+        for block in range(first // self._block, -(-end // self._block)):
+            places = np.concatenate(self._came[block]) + (block * self._block - first)
+            self._file.seek(self._place(name, block, 0))
+            rows = np.frombuffer(self._file.read(places.size * self._bytes_of(name)), dtype).reshape(-1, *shape)
+            inside = slice(None)
+            if places.min() < 0 or places.max() >= end - first:
+                inside = (places >= 0) & (places < end - first)
+            found[places[inside]] = rows[inside]
+        return found
+
+    def array(self, name: str, shape: tuple[int, ...]) -> Any:
+        """An array of a dataset over the grid of all variants, `shape`, that is read when it is asked for."""
+        from results_schema.store.on_disk import on_disk
+
+        dtype, rest = self._kinds[name]
+        return on_disk((*shape, *rest), dtype, partial(self._over_grid, name, shape))
+
+    def _over_grid(self, name: str, shape: tuple[int, ...], first: int, end: int) -> np.ndarray:
+        each = math.prod(shape[1:])
+        return self.read(name, first * each, end * each).reshape(end - first, *shape[1:], *self._kinds[name][1])
 
 
 def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.late import xr
+from results_schema.store.blocks import BLOCK_BYTES, slices
 
 CONTENTS = "contents"
 DIGEST = "contents_sha256"
@@ -23,15 +24,19 @@ _ADDED = (CONTENTS, DIGEST)
 _NUMBER_KINDS = "iuf"
 
 
+Numbers = Any  # np.ndarray, or what has its shape and type and gives it by slices of the first axis
+
+
 @dataclass(frozen=True)
 class Column:
-    """One variable: data of shape `dims`; str for text (an object array of str), numbers otherwise.
+    """One variable: data of shape `dims`; str for text (an object array of str), numbers otherwise, which may be on the
+    disk (a variable of xarray, of which slices are asked for).
 
     checksum: of data that were read and let go; "" where they are in `data`.
     """
 
     dims: tuple[str, ...]
-    data: np.ndarray
+    data: Numbers
     attributes: Mapping[str, Any]
     is_coordinate: bool = False
     checksum: str = ""
@@ -78,9 +83,9 @@ def from_dataset(dataset: xr.Dataset) -> Table:
 
 
 def _column(name: str, variable: xr.Variable, is_coordinate: bool) -> Column:
-    data = np.asarray(variable.values)
+    data: Numbers = variable if variable.nbytes > BLOCK_BYTES else np.asarray(variable.values)
     if data.dtype.kind in "UTO":
-        data = data.astype(object)
+        data = np.asarray(data).astype(object)
         if not all(isinstance(value, str) for value in data.ravel()):
             raise ValueError(f"{name}: expected text or numbers, received objects")
     elif data.dtype.kind not in _NUMBER_KINDS:
@@ -161,7 +166,7 @@ def _pieces(tables: Mapping[str, Table]) -> Iterator[str]:
             yield from _attribute_texts(f"{place}@", column.attributes)
 
 
-def checksum(data: np.ndarray) -> str:
+def checksum(data: Numbers) -> str:
     """CRC-32 of numbers (fast; beside fletcher32 it only has to notice lost and exchanged chunks), or text itself.
 
     >>> checksum(np.array([1, 2], np.int8)), checksum(np.array(["a"], object))
@@ -169,8 +174,10 @@ def checksum(data: np.ndarray) -> str:
     """
     if data.dtype.kind == "O":
         return repr(data.tolist())
-    little = np.ascontiguousarray(data, data.dtype.newbyteorder("<"))
-    return f"{data.dtype.name} {zlib.crc32(little.reshape(-1).view(np.uint8).data):08x}"
+    found, little = 0, data.dtype.newbyteorder("<")
+    for part in slices(data.shape, data.dtype.itemsize) if data.shape else [...]:
+        found = zlib.crc32(np.ascontiguousarray(data[part], little).reshape(-1).view(np.uint8).data, found)
+    return f"{data.dtype.name} {found:08x}"
 
 
 def _attribute_texts(place: str, attributes: Mapping[str, Any]) -> Iterator[str]:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from results_schema.store import files
+from results_schema.store.blocks import CHUNK_BYTES, chunk_shape, slices
 from results_schema.store.tables import Column, Table
 
-_CHUNK_BYTES = 1 << 20
 PLAIN: Mapping[str, Any] = {"fletcher32": True}  # of what is read soon
 PACKED: Mapping[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
 
@@ -53,31 +53,19 @@ def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, A
     if column.data.dtype.kind == "f" and not column.is_coordinate:
         options["fill_value"] = column.data.dtype.type(np.nan)
     if column.is_chunked:
-        options |= {**filters, "chunksizes": chunk_shape(column.data.shape, column.data.itemsize)}
+        options |= {**filters, "chunksizes": chunk_shape(column.data.shape, column.data.dtype.itemsize)}
     variable = place.createVariable(name, str if column.is_text else column.data.dtype, column.dims, **options)
     variable.set_auto_maskandscale(False)
     if column.is_chunked:
         # Chunks are written whole, one after the other: a cache per variable would only take memory.
-        variable.set_var_chunk_cache(_CHUNK_BYTES)
+        variable.set_var_chunk_cache(CHUNK_BYTES)
     variable.setncatts({key: _attribute(value) for key, value in column.attributes.items() if key != "_FillValue"})
-    variable[...] = column.data if column.dims else column.data.item()
+    if not column.is_chunked:
+        variable[...] = column.data if column.dims else column.data.item()
+        return
+    for part in slices(column.data.shape, column.data.dtype.itemsize):
+        variable[part] = np.asarray(column.data[part])
 
 
 def _attribute(value: Any) -> Any:
     return value[0] if isinstance(value, np.ndarray) and value.size == 1 else value
-
-
-def chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
-    """Chunks of about a megabyte that keep the last axes whole, so that one variant's rows lie together.
-
-    >>> chunk_shape((1000, 400, 200), 8)
-    (1, 400, 200)
-    >>> chunk_shape((1_000_000,), 8)
-    (131072,)
-    """
-    left = max(1, _CHUNK_BYTES // itemsize)
-    chunks = []
-    for size in reversed(shape):
-        chunks.append(min(size, left))
-        left = max(1, left // size)
-    return tuple(reversed(chunks))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.study import Study
@@ -116,9 +118,7 @@ class DoublePeak(Kind):
         return DoublePeakReduction()
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-        """With amplification, and with the numbers of peaks and harmonics and the frequency ratio as coordinates."""
-        dataset = with_amplification(dataset, study)
-        ratio = xr.DataArray(theory.frequency_ratio(Results(dataset, study)))
+        """With amplification, and with the numbers of peaks and harmonics as coordinates."""
         found = {
             "peak": ("peak", np.arange(1, PEAKS + 1, dtype=np.int64), _axis("peak")),
             "harmonic_number": (
@@ -126,9 +126,14 @@ class DoublePeak(Kind):
                 np.arange(indices.HARMONICS + 1, dtype=np.int64),
                 _axis("harmonic_number"),
             ),
-            "frequency_ratio": (ratio.dims, ratio.values, _axis("frequency_ratio")),
         }
-        return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
+        found = {name: value for name, value in found.items() if name not in study.sweep.axes}
+        return with_amplification(dataset, study).assign_coords(found)
+
+    def along(self, results: Results) -> Mapping[str, tuple[Sequence[str], NDArray[Any], Mapping[str, Any]]]:
+        """The frequency ratio."""
+        ratio = xr.DataArray(theory.frequency_ratio(results))
+        return {"frequency_ratio": (tuple(map(str, ratio.dims)), ratio.values, _axis("frequency_ratio"))}
 
     def findings(self, results: Results) -> list[str]:
         said = []

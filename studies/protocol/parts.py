@@ -4,6 +4,7 @@ so a killed run goes on from there, and put together at the end.
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +26,7 @@ from results_schema.variables import declarations
 from studies.protocol.kept_pilots import NAME as PILOTS
 from studies.protocol.kept_pilots import KeptPilots
 from studies.protocol.stopping import AskedElsewhere, Stop
+from studies.protocol.streamed import streamed, summarised, with_coordinates
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 PIECES_BYTES = 64 * 2**20  # more than what studies that measure leave on the disk
 GRACE_SECONDS = 1.0  # for a piece to end by itself when it is to stop
+USED = "_used"  # the end of the names of what a variant was computed with
 SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 
 
@@ -77,7 +80,12 @@ class Work:
 
 
 class Store(Protocol):
-    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory."""
+    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory.
+
+    in_memory: bytes of results of variants that are put together there at most.
+    """
+
+    in_memory: float
 
     def write(self, name: str, part: Mapping[str, Table]) -> object:
         """Keep one part."""
@@ -94,6 +102,8 @@ class Store(Protocol):
 
 class Memory:
     """Parts of a run that writes no archive."""
+
+    in_memory = math.inf
 
     def __init__(self) -> None:
         self._parts: dict[str, Mapping[str, Table]] = {}
@@ -185,6 +195,22 @@ class Variants:
 
     def gather(self, store: Store) -> xr.Dataset:
         """The march's dataset with the study's own results."""
+        return self._collected(store) if self.plan.numbers_bytes <= store.in_memory else self._streamed(store)
+
+    def _streamed(self, store: Store) -> xr.Dataset:
+        """The same without the results of all variants in memory."""
+        from engine.batch.dataset import with_histories, with_ratios
+
+        dataset, histories = streamed(self.kind, self.plan, store)
+        whole = with_coordinates(self.kind, with_ratios(self.plan, dataset), self.plan.study)
+        named = self._named(whole)
+        if named.size:
+            used = {name: whole[name].values.reshape(-1) for name in map(str, whole.data_vars) if name.endswith(USED)}
+            more = self._histories(named, used)
+            histories = joined([rows for rows in (histories, more) if rows is not None])
+        return whole if histories is None else with_histories(self.plan, whole, histories)
+
+    def _collected(self, store: Store) -> xr.Dataset:
         found = Collector(self.plan.size)
         for name in store.finished():
             if name != PILOTS:
@@ -194,7 +220,8 @@ class Variants:
         named = self._named(dataset)
         if not named.size:
             return dataset
-        found.select(self._histories(named, found))
+        used = {name: column for name, column in found.arrays.items() if name.endswith(USED)}
+        found.select(self._histories(named, used))
         return self._summarised(found)
 
     def _named(self, dataset: xr.Dataset) -> Counts:
@@ -207,26 +234,17 @@ class Variants:
         named = [int(np.ravel_multi_index(index, self.plan.cases.shape)) if index else 0 for index in indices]
         return np.setdiff1d(np.array(named, dtype=np.int64), self.plan.shown)
 
-    def _histories(self, variants: Counts, found: Collector) -> Rows | None:
+    def _histories(self, variants: Counts, used: Mapping[str, NDArray[Any]]) -> Rows | None:
+        """The histories of some variants from what all were computed with."""
         from engine.batch.chunk import histories_of
 
-        used = {name: column[variants] for name, column in found.arrays.items() if name.endswith("_used")}
-        return histories_of(self.plan, variants, used)
+        return histories_of(self.plan, variants, {name: column[variants] for name, column in used.items()})
 
     def _summarised(self, found: Collector) -> xr.Dataset:
         from engine.batch.dataset import build
 
-        study = self.plan.study
-        return summarised(self.kind, build(self.plan, found.arrays, found.selected), study)
-
-
-def summarised(kind: Kind, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """The march's dataset of some variants with the results of their kind of study."""
-    dataset = kind.summarise(dataset, study)
-    declared = study.results(kind.name)
-    # The engine offers static values to every summary; they are results only where the kind says so.
-    offered = [name for sensor in study.sensor if (name := f"{sensor}_static") not in declared]
-    return dataset.drop_vars(offered, errors="ignore")
+        dataset = summarised(self.kind, build(self.plan, found.arrays, found.selected), self.plan.study)
+        return with_coordinates(self.kind, dataset, self.plan.study)
 
 
 class Gatherer:

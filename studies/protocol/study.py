@@ -86,8 +86,12 @@ class Kind:
         return None
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
-        """The march's dataset with the study's own results."""
+        """The march's dataset, of all variants or of some along `variant`, with the study's own results of each."""
         return dataset
+
+    def along(self, results: Results) -> Mapping[str, tuple[Sequence[str], NDArray[Any], Mapping[str, Any]]]:
+        """Coordinates over axes of the sweep: dimensions, values and attributes by name."""
+        return {}
 
     def coordinates(self, study: Study) -> Mapping[str, NDArray[Any]]:
         """The coordinates that follow from the table [question]."""

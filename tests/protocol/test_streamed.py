@@ -1,0 +1,172 @@
+"""Archives of studies whose results stay on the disk against those of the same studies put together in memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from results_schema.errors import ArchiveError
+from results_schema.store import blocks, files, on_disk, reading, rows, tables
+from results_schema.store.archive import open_archive
+from results_schema.store.parts import PartStore
+from results_schema.store.rows import Rows, RowsOnDisk
+from results_schema.store.tables import Column, Table, seal
+from results_schema.store.writing import write_tables
+from studies.commands.cli import main as command
+from tests.protocol.test_named import KINDS, swept
+from tests.studies.every_way import assert_same_archives
+
+BLOCK = 3000  # bytes, of some of a hundred variants
+
+
+def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (blocks, rows, tables):
+        monkeypatch.setattr(module, "BLOCK_BYTES", BLOCK)
+    monkeypatch.setattr(blocks, "CHUNK_BYTES", BLOCK // 2)
+
+
+def on_disk_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is small enough for memory."""
+    small_blocks(monkeypatch)
+    monkeypatch.setattr(PartStore, "in_memory", 0)
+    monkeypatch.setattr(reading, "IN_MEMORY", 0)
+    monkeypatch.setattr(reading, "CHUNK_BYTES", 100)
+
+
+def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("engine.batch.plan.SHOWN", 4)
+    monkeypatch.setattr("studies.protocol.parts.SECONDS_PER_PART", 0.0)
+
+
+def ran(kind: str, path: Path, *options: str) -> Path:
+    study = path.with_suffix(".toml")
+    study.write_text(swept(kind, KINDS[kind]).source.text, encoding="utf-8")
+    assert command(["run", str(study), "-o", str(path), *options]) in (0, 3)
+    return path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_archive_is_the_same(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    many_parts(monkeypatch)
+    whole = open_archive(ran(kind, tmp_path / "whole.nc"))
+    on_disk_alone(monkeypatch)
+    path = ran(kind, tmp_path / "streamed.nc", "--threads", "1")
+    assert_same_archives(whole, open_archive(path))
+    assert sorted(tmp_path.iterdir()) == [path, path.with_suffix(".toml"), whole.path, whole.path.with_suffix(".toml")]
+
+
+def told(path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Sequence[str]:
+    """What the commands make of an archive."""
+    folder.mkdir()
+    said = []
+    for arguments in (("info", "--all"), ("compare", path), ("export", folder / "a.csv"), ("report", "-o", folder / "r")):
+        assert command([arguments[0], str(path), *map(str, arguments[1:])]) == 0
+        said.append(capsys.readouterr().out.replace(folder.name, ""))
+    return [*said, (folder / "a.csv").read_text(encoding="utf-8"), (folder / "r/report.html").read_text("utf-8")]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_commands_read_the_same(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    path = ran(kind, tmp_path / "a.nc")
+    capsys.readouterr()
+    expected = told(path, tmp_path / "one", capsys)
+    on_disk_alone(monkeypatch)
+    assert told(path, tmp_path / "two", capsys) == expected
+
+
+def test_rows_come_back_in_the_order_of_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_blocks(monkeypatch)
+    order, expected = np.random.default_rng(3).permutation(1000), {"a": np.arange(1000.0), "b": np.empty((1000, 3, 2))}
+    expected["b"][:] = np.arange(6.0).reshape(3, 2) + np.arange(1000.0)[:, None, None]
+    expected["c"] = (np.arange(1000) % 7).astype(np.int8)
+    with (tmp_path / "scratch").open("w+b") as file:
+        found = RowsOnDisk(file, 1000)
+        for variants in np.array_split(order, 13):
+            assert not found.finished.all()
+            found.add(Rows(variants, {name: array[variants] for name, array in expected.items()}))
+        assert found.finished.all()
+        for name, array in expected.items():
+            for first, end in ((0, 1000), (17, 18), (100, 700), (999, 1000)):
+                np.testing.assert_array_equal(found.read(name, first, end), array[first:end])
+            on_grid = found.array(name, (10, 20, 5))
+            np.testing.assert_array_equal(np.asarray(on_grid), array.reshape(10, 20, 5, *array.shape[1:]))
+        with pytest.raises(AssertionError, match="comes twice"):
+            found.add(Rows(order[:1], {name: array[order[:1]] for name, array in expected.items()}))
+
+
+@pytest.mark.parametrize("shape", [(5000,), (40, 70), (3, 900), (7, 2, 2000)])
+def test_blocks_give_the_bytes_of_the_whole(
+    shape: tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = np.random.default_rng(1).normal(size=shape)
+    dims = tuple(f"d{axis}" for axis in range(len(shape)))
+    table = {"/": Table(dict(zip(dims, shape, strict=True)), {"a": Column(dims, data, {})})}
+    monkeypatch.setattr(blocks, "CHUNK_BYTES", BLOCK // 2)
+    written = []
+    for size in (2**24, BLOCK, 1):
+        monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
+        write_tables(tmp_path / "a.nc", table, seal(table))
+        written.append((tmp_path / "a.nc").read_bytes())
+    assert written[0] == written[1] == written[2]
+
+
+def test_slices_of_what_is_on_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers, asked = np.arange(120.0).reshape(10, 4, 3), list[tuple[int, int]]()
+
+    def read(first: int, end: int) -> np.ndarray:
+        asked.append((first, end))
+        return numbers[first:end].copy()
+
+    for most in (0, 2**20):
+        monkeypatch.setattr(on_disk, "RECENT_BYTES", most)
+        array = on_disk.OnDisk(numbers.shape, numbers.dtype, read)
+        variable = tables.xr.Variable(("x", "y", "z"), on_disk.indexing.LazilyIndexedArray(array))
+        for key in ((slice(2, 5),), (7, 1, 2), (slice(8, 1, -3), slice(None), 0), ([3, 1], slice(1, 3)), (slice(4, 4),)):
+            np.testing.assert_array_equal(variable[key].values, numbers[key])
+        np.testing.assert_array_equal(variable.transpose("z", "x", "y").values, numbers.transpose(2, 0, 1))
+    assert asked[0] == (2, 5) and asked[-1] == (0, 10) and asked.count((0, 10)) == 2  # once whole, and once transposed
+
+
+def test_an_archive_that_is_replaced_while_it_is_read_is_no_mixture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = ran("passage", tmp_path / "a.nc")
+    on_disk_alone(monkeypatch)
+    monkeypatch.setattr(on_disk, "RECENT_BYTES", 0)
+    root = open_archive(path).root
+    assert root["midspan_max"].values.size == 100
+    files.write_whole(path, lambda temporary: temporary.write_bytes(path.read_bytes()))
+    with pytest.raises(ArchiveError, match="has changed while it was read"):
+        root["midspan_max"].load()
+
+
+def test_memory_holds_a_few_arrays_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """24 arrays of 4 MB through a file into an archive, and out of it: less than 24 MB at any time."""
+    monkeypatch.setattr(reading, "IN_MEMORY", 0)
+    monkeypatch.setattr(on_disk, "RECENT_BYTES", 2**23)
+    monkeypatch.setattr(tables, "BLOCK_BYTES", 2**20)
+    for module in (blocks, rows):
+        monkeypatch.setattr(module, "BLOCK_BYTES", 2**21)
+    count, names = 2**19, [f"a{number}" for number in range(24)]
+    tracemalloc.start()
+    with (tmp_path / "scratch").open("w+b") as file:
+        found = RowsOnDisk(file, count)
+        for variants in np.array_split(np.random.default_rng(3).permutation(count), 32):
+            found.add(Rows(variants, {name: variants.astype(float) for name in names}))
+        columns = {name: tables.xr.Variable(("variant",), found.array(name, (count,))) for name in names}
+        root = tables.from_dataset(tables.xr.Dataset(columns, attrs={"schema_version": 2, "study_kind": "passage"}))
+        write_tables(tmp_path / "a.nc", {"/": root}, seal({"/": root}))
+    with reading.opened(tmp_path / "a.nc") as dataset:
+        read = tables.to_dataset(reading.read_small_tables(tmp_path / "a.nc", dataset)["/"])
+    for name in names:
+        assert np.array_equal(read[name].values, np.arange(float(count)))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 24 * 2**20
