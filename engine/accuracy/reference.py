@@ -262,14 +262,14 @@ def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: in
     return level_work(grid, values, levels, level) <= MOST_WORK
 
 
-def usual_work(grid: SceneGrid, dear: float) -> Array:
+def usual_work(grid: SceneGrid, values: VariantValues, dear: float) -> Array:
     """(V,) about what an audit's last level takes of modes x steps: one beyond that of most references, where that is
     not dear."""
     levels = in_full(grid)
     usual = min(USUAL_LEVEL, len(levels.numerics) - 1)
     more = min(usual + 1, len(levels.numerics) - 1)
-    level = np.where(_is_dear(grid, grid.values, levels, more, dear), usual, more)
-    work = [level_work(grid, grid.values, levels, number) for number in (usual, more)]
+    level = np.where(_is_dear(grid, values, levels, more, dear), usual, more)
+    work = [level_work(grid, values, levels, number) for number in (usual, more)]
     return _units(grid) * np.where(level == usual, *work)
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, USED
 from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
 from engine.accuracy.ladder import REFERENCE_PART
@@ -20,12 +21,13 @@ from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.scene.variants import VariantValues
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.statuses import lost
 
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
+AT_ONCE = 2**18  # variants whose work is estimated
 TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 to 49 with 32 and 16 modes
 
 
@@ -91,22 +93,40 @@ def _seconds(plan: Plan, count: int) -> float:
     share, found = min(1.0, count / plan.size), 0.0
     for grid in plan.grids:
         # each march has its tables, and whole blocks
-        work, number = np.unique(usual_work(grid, _dear(plan)), return_counts=True)
+        work, number = _works(grid, _dear(plan))
         own = share * number
         lanes = np.maximum(own, LANES * np.minimum(1.0, own)) + TABLES * np.minimum(1.0, own)
         found += float(work @ lanes) * grid.scene.ties**1.2 / PACE
     return found
 
 
+def _works(grid: SceneGrid, dear: float) -> tuple[Array, Counts]:
+    """The different modes x steps of a scene's audits, and how many variants have them."""
+    found = []
+    for first in range(0, grid.values.size, AT_ONCE):
+        some = np.arange(first, min(first + AT_ONCE, grid.values.size))
+        found.append(np.unique(usual_work(grid, grid.values.part(some), dear), return_counts=True))
+    works, numbers = (np.concatenate(column) for column in zip(*found, strict=True))
+    work, place = np.unique(works, return_inverse=True)
+    return work, np.bincount(place, numbers).astype(np.int64)
+
+
 def audit(plan: Plan, variants: Counts, share: Share = IN_TURN) -> Audit:
     """Compute some variants again, by jobs that ``share`` does: the marches of a single scene, or scenes as wholes.
     Raises Halted, and Crashed by flat numbers of variants."""
-    parts = [variants[np.isin(variants, members)] for members in plan.members]
+    parts = [variants[_among(variants, members, plan.size)] for members in plan.members]
     of_scenes = [(scene, own) for scene, own in enumerate(parts) if own.size]
     if len(of_scenes) == 1:
         return joined(_of_scene(plan, *of_scenes[0], share), plan, variants.size)
     found = share(plan, [Job(partial(_in_turn, scene=scene), own) for scene, own in of_scenes])
     return joined([one for ones in found for one in ones], plan, variants.size)
+
+
+def _among(some: Counts, variants: Counts, size: int) -> Mask:
+    """Which of a few variants are among others, which may be millions: these are not sorted."""
+    held = np.zeros(size, dtype=np.bool_)
+    held[variants] = True
+    return np.asarray(held[some])
 
 
 def _in_turn(plan: Plan, own: Counts, halted: Halted, scene: int) -> list[Audit]:
@@ -121,7 +141,8 @@ def _of_scene(plan: Plan, scene: int, own: Counts, share: Share) -> list[Audit]:
     try:
         truth = converge(grid, values, in_full(grid), REFERENCE_PART, Beyond(1, _dear(plan)), share)
         groups = [number for number, group in enumerate(plan.groups) if group.grid is grid]
-        parts = [(number, np.flatnonzero(np.isin(own, plan.groups[number].variants))) for number in groups]
+        among = ((number, _among(own, plan.groups[number].variants, plan.size)) for number in groups)
+        parts = [(number, np.flatnonzero(held)) for number, held in among]
         jobs = [Job(partial(_Audited.compared, group=number), lanes) for number, lanes in parts if lanes.size]
         return list(share(_Audited(plan, own, truth), jobs))
     except Crashed as crashed:

@@ -15,7 +15,7 @@ from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job
 from engine.batch.places import Place, Shared, Threads, Where, cores, place, run_jobs
-from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, make_plan
+from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
 from engine.march.richardson import march_pair, march_scheme
@@ -53,6 +53,7 @@ def run(
     from engine.batch.dataset import build
 
     plan = make_plan(study, reduction=reduction, results=results)
+    check_memory(study, plan.size, plan.disk_bytes)
     collector = Collector(plan.size)
     with place(**where) as here:
         execute(plan, collector.add, here, chunk=chunk, progress=progress)

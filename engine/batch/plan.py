@@ -35,6 +35,7 @@ from engine.scene.variants import VariantValues, cases_tolerance
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
+from results_schema.store.blocks import IN_MEMORY
 from results_schema.store.rows import Chunk
 from results_schema.variables import declarations, registered
 
@@ -49,6 +50,7 @@ CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes
 EVERY_MARCH = "march"  # the kind of results that every march has
 NUMBERS_REDUCED = 4  # of 8 bytes, of a variant where extremes alone are kept: its number, its status, what it took
 PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
+READ_BYTES = 80  # of a variant, at most, while an answer is made of some arrays over all variants
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
@@ -179,8 +181,9 @@ class Plan:
 
     @property
     def numbers_bytes(self) -> int:
-        """Upper bound of the results of all variants, besides histories."""
-        return 8 * self.size * numbers_per_variant(self.asked)
+        """Upper bound of what is kept of all variants, besides histories."""
+        numbers = numbers_per_variant(self.asked) if self.study.output.keep != "extremes" else NUMBERS_REDUCED
+        return 8 * self.size * numbers
 
     @property
     def disk_bytes(self) -> int:
@@ -189,13 +192,17 @@ class Plan:
         if self.study.output.histories == "auto" and self.study.output.keeps_variants:
             kept = min(kept + NAMED, self.size)
         shown = kept * self.stations_shown * (len(self.study.sensor) + 2)
-        numbers = numbers_per_variant(self.asked) if self.study.output.keep != "extremes" else NUMBERS_REDUCED
-        return 8 * (self.size * numbers + shown) + 65536
+        return self.numbers_bytes + 8 * shown + 65536
 
     @property
     def memory_bytes(self) -> int:
-        """Expected peak: results, a chunk per thread, and the program itself."""
-        return needed_memory(self.study, self.size, self.disk_bytes)
+        """Expected peak of a run to an archive."""
+        return needed_memory(self.study, self.size, self.gathered_bytes)
+
+    @property
+    def gathered_bytes(self) -> int:
+        """Upper bound of what a run to an archive puts together in memory: histories, and results that are small."""
+        return self.disk_bytes - max(0, self.numbers_bytes - IN_MEMORY)
 
     def chunks(self, done: Counts | None, chunk: int | None) -> Iterator[tuple[int, Counts]]:
         """The tasks that are left, each with the number of its group; ``chunk`` fixes the variants of each."""
@@ -249,7 +256,7 @@ def make_plan(
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"
     asked = Asked(study, reduction, window, reads_accelerations(results))
-    check_memory(study, cases.size, 8 * cases.size * numbers_per_variant(asked))
+    check_memory(study, cases.size, min(IN_MEMORY, 8 * cases.size * numbers_per_variant(asked)))
     grids, members = [], []
     for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):
         for grid, own in _grids(asked, cases, scene, variants, check_steps):
@@ -257,7 +264,7 @@ def make_plan(
             members.append(own)
     check_places(study, (grid.scene for grid in grids))
     plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base_scene(study), results)
-    check_memory(study, plan.size, plan.disk_bytes)
+    check_memory(study, plan.size, plan.gathered_bytes)
     return plan
 
 
@@ -319,15 +326,17 @@ def numbers_per_variant(asked: Asked) -> int:
     return found
 
 
-def needed_memory(study: Study, size: int, result_bytes: int) -> int:
-    """Expected peak in bytes: the plan, results while they are gathered, a chunk per thread, and the program itself."""
-    gathered = 3 * result_bytes if study.output.keeps_variants else 0
-    return 300 * 2**20 + PLANNED_BYTES * size + gathered + 6 * CHUNK_BYTES
+def needed_memory(study: Study, size: int, gathered: int) -> int:
+    """Expected peak in bytes: the plan, results that are gathered in memory and those that an answer reads, a chunk per
+    thread, and the program itself."""
+    results = 3 * gathered + READ_BYTES * size if study.output.keeps_variants else 0
+    return 300 * 2**20 + PLANNED_BYTES * size + results + 6 * CHUNK_BYTES
 
 
-def check_memory(study: Study, size: int, result_bytes: int) -> None:
-    """Refuse a study whose results do not fit (fault 14), from whole numbers and before anything is allocated."""
-    needed = needed_memory(study, size, result_bytes)
+def check_memory(study: Study, size: int, gathered: int) -> None:
+    """Refuse a study that does not fit (fault 14), from whole numbers and before anything is allocated. gathered: bytes
+    of results that are put together in memory."""
+    needed = needed_memory(study, size, gathered)
     if needed > MOST_MEMORY:
         raise study.source.fault(
             "sweep",

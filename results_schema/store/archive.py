@@ -31,7 +31,8 @@ OutputState = Literal["absent", "same study, finished", "same study, other files
 
 @dataclass(frozen=True)
 class Archive:
-    """An archive in memory, or of a large one what is small: the gridded results, and the groups by path ("/audit", "/model/bed")."""
+    """An archive in memory, but for large arrays of a large one: the gridded results, and the groups by path ("/audit",
+    "/model/bed")."""
 
     path: Path
     root: xr.Dataset

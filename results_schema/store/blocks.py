@@ -22,7 +22,7 @@ def chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
     chunks = []
     for size in reversed(shape):
         chunks.append(min(size, left))
-        left = max(1, left // size)
+        left = max(1, left // max(1, size))
     return tuple(reversed(chunks))
 
 

@@ -5,6 +5,7 @@ xarray carries them as it carries those of files that it opens itself: to select
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +13,9 @@ import numpy as np
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-RECENT_BYTES = 2**28  # of arrays that were read last and are likely to be asked for again
+from results_schema.store.blocks import slices
+
+RECENT_BYTES = 2**27  # of the array that was read last, which is likely to be asked for again
 
 Read = Callable[[int, int], np.ndarray]
 
@@ -22,44 +25,44 @@ class OnDisk(BackendArray):
 
     def __init__(self, shape: tuple[int, ...], dtype: np.dtype[Any], read: Read) -> None:
         self.shape, self.dtype = shape, dtype
-        self._read = read
+        self.read = read
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._part)
 
     def _part(self, key: tuple[int | slice, ...]) -> np.ndarray:
         """The numbers at some rows (a slice, or one) and further places."""
-        if 2 * self.size * self.dtype.itemsize <= RECENT_BYTES:
+        rows = key[0] if isinstance(key[0], slice) else slice(key[0], key[0] + 1)
+        first, end, step = rows.indices(self.shape[0])
+        if _RECENT.array is self or (first == 0 and end == self.shape[0] and self.nbytes <= RECENT_BYTES):
             return np.asarray(_RECENT.whole(self)[key])
-        if not isinstance(key[0], slice):
-            return np.asarray(self._read(key[0], key[0] + 1)[(0, *key[1:])])
-        first, end, step = key[0].indices(self.shape[0])
-        return np.asarray(self._read(first, max(first, end))[(slice(None, None, step), *key[1:])])
+        count = max(first, end) - first
+        found = np.empty((count, *np.empty(self.shape[1:], np.int8)[key[1:]].shape), self.dtype)
+        for block in slices((count, *self.shape[1:]), self.dtype.itemsize):
+            found[block] = self.read(first + block.start, first + block.stop)[(slice(None), *key[1:])]
+        return np.asarray(found[::step] if isinstance(key[0], slice) else found[0])
 
-    def whole(self) -> np.ndarray:
-        """All of it, not to be changed."""
-        found = self._read(0, self.shape[0])
-        found.flags.writeable = False
-        return found
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all of it."""
+        return math.prod(self.shape) * self.dtype.itemsize
 
 
 class _Recent:
-    """What was read last."""
+    """The array that was read last as a whole."""
 
     def __init__(self) -> None:
-        self._read: list[tuple[OnDisk, np.ndarray]] = []  # the last one last
+        self.array: OnDisk | None = None
+        self._numbers = np.empty(0)
 
     def whole(self, array: OnDisk) -> np.ndarray:
-        """An array as a whole, from memory where it is there."""
-        held = [pair for pair in self._read if pair[0] is not array]
-        found = next((own for one, own in self._read if one is array), None)
-        # What is let go comes first: both together would be too much.
-        while held and sum(own.nbytes for _, own in held) + array.size * array.dtype.itemsize > RECENT_BYTES:
-            held.pop(0)
-        self._read = held
-        whole = array.whole() if found is None else found
-        self._read = [*held, (array, whole)]
-        return whole
+        """An array, not to be changed, from memory where it is there."""
+        if self.array is not array:
+            self.array, self._numbers = None, np.empty(0)  # first: both together would be too much
+            self._numbers = array.read(0, array.shape[0])
+            self._numbers.flags.writeable = False
+            self.array = array
+        return self._numbers
 
 
 _RECENT = _Recent()

@@ -24,7 +24,7 @@ from results_schema.store import files
 from results_schema.store.blocks import IN_MEMORY
 from results_schema.store.files import output_failed
 from results_schema.store.reading import opened, read_tables
-from results_schema.store.rows import VARIANTS
+from results_schema.store.rows import VARIANTS, RowsOnDisk
 from results_schema.store.tables import CONTENTS, DIGEST, Table, seal
 from results_schema.store.writing import PLAIN, write_tables
 
@@ -92,8 +92,6 @@ class PartStore:
     Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key, or
     files that are none of ours lie among them.
     """
-
-    in_memory: float = IN_MEMORY
 
     def __init__(
         self,
@@ -185,6 +183,10 @@ class PartStore:
             return tempfile.TemporaryFile(dir=self._folder, suffix=files.TEMPORARY)
         except OSError as error:
             raise output_failed(self._folder, error) from error
+
+    def rows(self, variants: int, size: int) -> RowsOnDisk | None:
+        """Where to put results of so many variants, of at most so many bytes; None: in memory. Raises OutputFailed."""
+        return RowsOnDisk(self.scratch(), self._folder, variants) if size > IN_MEMORY else None
 
     def remove(self) -> None:
         """Remove all of it: the archive is written."""

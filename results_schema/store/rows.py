@@ -6,10 +6,12 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from results_schema.store import files
 from results_schema.store.blocks import BLOCK_BYTES
 from results_schema.store.tables import Table, from_arrays
 
@@ -93,19 +95,20 @@ class Collector:
 class RowsOnDisk:
     """Rows of all variants, taken as they come and read again by name in the order of the variants.
 
-    The file holds blocks of neighbouring variants; in each, one array after another with the rows as they came.
+    The file, without a name in a folder, holds blocks of neighbouring variants; in each, one array after another with
+    the rows as they came.
     """
 
-    def __init__(self, file: IO[bytes], size: int) -> None:
+    def __init__(self, file: IO[bytes], folder: Path, size: int) -> None:
         self.finished = np.zeros(size, bool)
-        self._file, self._size = file, size
+        self._file, self._folder, self._size = file, folder, size
         self._kinds: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {}
         self._starts: dict[str, int] = {}  # bytes of a variant before those of an array
         self._bytes, self._block = 0, 0  # of a variant; variants of a block
         self._came: list[list[np.ndarray]] = []
 
     def add(self, rows: Rows) -> None:
-        """Take the rows of variants that have not come yet, always with the same arrays."""
+        """Take the rows of variants that have not come yet, always with the same arrays. Raises OutputFailed."""
         if not self._kinds:
             self._lay_out(rows)
         assert not self.finished[rows.variants].any(), "a variant comes twice"
@@ -115,9 +118,17 @@ class RowsOnDisk:
             own = np.flatnonzero(blocks == block)
             held = sum(came.size for came in self._came[block])
             for name in self._kinds:
-                self._file.seek(self._place(name, block, held))
-                self._file.write(np.ascontiguousarray(rows.arrays[name][own]).data)
+                self._write(self._place(name, block, held), np.ascontiguousarray(rows.arrays[name][own]))
             self._came[block].append((rows.variants[own] - block * self._block).astype(np.int32))
+
+    def _write(self, place: int, array: np.ndarray) -> None:
+        try:
+            files.FAULTS.before("write", self._folder)
+            self._file.seek(place)
+            self._file.write(array.data)
+            self._file.flush()
+        except OSError as error:
+            raise files.output_failed(self._folder, error) from error
 
     def _lay_out(self, rows: Rows) -> None:
         for name, array in rows.arrays.items():
@@ -144,10 +155,10 @@ class RowsOnDisk:
             places = np.concatenate(self._came[block]) + (block * self._block - first)
             self._file.seek(self._place(name, block, 0))
             rows = np.frombuffer(self._file.read(places.size * self._bytes_of(name)), dtype).reshape(-1, *shape)
-            inside = slice(None)
             if places.min() < 0 or places.max() >= end - first:
                 inside = (places >= 0) & (places < end - first)
-            found[places[inside]] = rows[inside]
+                places, rows = places[inside], rows[inside]
+            found[places] = rows
         return found
 
     def array(self, name: str, shape: tuple[int, ...]) -> Any:

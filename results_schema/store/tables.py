@@ -44,7 +44,7 @@ class Column:
     @property
     def is_text(self) -> bool:
         """Whether the values are strings."""
-        return self.data.dtype.kind == "O"
+        return bool(self.data.dtype.kind == "O")
 
     @property
     def is_chunked(self) -> bool:

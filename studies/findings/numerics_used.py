@@ -73,16 +73,19 @@ def as_json(results: Results) -> list[dict[str, Any]]:
 
 def _entry(results: Results, model: Fidelity, which: Mask) -> dict[str, Any]:
     """A model with the ranges of its modes and steps, its largest estimated error and its mean work."""
-    modes, steps, errors, work = (of_variants(results, name)[which] for name in (MODES, STEPS, ERROR, WORK))
-    return {
-        "model": label(model),
-        "variants": int(which.sum()),
-        "modes": [int(modes.min()), int(modes.max())],
-        "steps": [int(steps.min()), int(steps.max())],
-        "schemes": [label(SchemeUsed(int(number))) for number in np.unique(known(of_variants(results, SCHEME)[which]))],
-        "largest_error_estimate": float(known(errors).max()) if known(errors).size else None,
-        "without_estimate": int(np.isnan(errors).sum()),
-        "mean_work": float(known(work).mean()) if known(work).size else None,
+    found: dict[str, Any] = {"model": label(model), "variants": int(which.sum())}
+    for noun, name in (("modes", MODES), ("steps", STEPS)):  # one after the other: there may be very many variants
+        values = of_variants(results, name)[which]
+        found[noun] = [int(values.min()), int(values.max())]
+    schemes = np.unique(known(of_variants(results, SCHEME)[which]))
+    errors = of_variants(results, ERROR)[which]
+    largest, unknown = float(known(errors).max(initial=-np.inf)), int(np.isnan(errors).sum())
+    work = known(of_variants(results, WORK)[which])
+    return found | {
+        "schemes": [label(SchemeUsed(int(number))) for number in schemes],
+        "largest_error_estimate": largest if np.isfinite(largest) else None,
+        "without_estimate": unknown,
+        "mean_work": float(work.mean()) if work.size else None,
     }
 
 

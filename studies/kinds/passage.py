@@ -235,10 +235,10 @@ def _closed(results: Results, carriage: str, force: Array) -> str:
     least, name = extreme(-force), f"{carriage}_contact_force_min"
     assert least is not None
     smallest = f"the smallest contact force is {quantity(float(force[least]), 'N')}"
-    error, weighs = results.estimated_error(name), results.study.carriage[carriage].moving_mass > 0.0
-    off = float((results.everywhere(_weight(results, carriage)) * error)[least]) if weighs else np.nan
+    weighs = results.study.carriage[carriage].moving_mass > 0.0
+    off = results.everywhere(_weight(results, carriage))[least] * results.error_at(name, least) if weighs else np.nan
     if off > force[least]:
-        known = f"with an estimated error of {quantity(off, 'N')}"
+        known = f"with an estimated error of {quantity(float(off), 'N')}"
         return f"Whether {carriage} keeps its contact is not certain: {smallest}, {known}{in_words(results, least)}."
     loosely = uncertainty(results, name, least)
     return f"{carriage} keeps its contact everywhere; {smallest}{loosely}{in_words(results, least)}."

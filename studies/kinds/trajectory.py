@@ -82,5 +82,5 @@ def _span(results: Results, sensor: str) -> str:
     span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
     places = (results.index_of(int(flat)) for flat in (np.nanargmin(low), np.nanargmax(high)))
     named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
-    looser = max(named, key=lambda end: float(np.nan_to_num(results.estimated_error(end[0])[end[1]])))
+    looser = max(named, key=lambda end: np.nan_to_num(results.error_at(*end)))
     return f"{sensor}: from {span}{over}{uncertainty(results, *looser)}."

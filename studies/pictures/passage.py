@@ -224,7 +224,7 @@ def _response(results: Results, sensors: list[str], shown: list[Index], top: Ind
     where = quantity(float(way.position[at]), "m")
     title = f"{first.replace('_', ' ')} reaches {value} when {results.carriage_name} has come to {where}"
     whose = "the variant of the answer" if own == top else "the kept history with the largest value"
-    errors = {sensor: float(results.estimated_error(sensor)[own]) for sensor in sensors}
+    errors = {sensor: results.error_at(sensor, own) for sensor in sensors}
     loose = [f" {name.replace('_', ' ')}: estimated to within {percent(e)}." for name, e in errors.items() if e > LOOSE]
     hang = f" {DOWN}" if any(map(results.hangs, sensors)) else ""
     caption = (

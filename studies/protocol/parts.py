@@ -4,7 +4,6 @@ so a killed run goes on from there, and put together at the end.
 
 from __future__ import annotations
 
-import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +19,7 @@ from engine.march.stepper import Halted
 from results_schema.arrays import Counts
 from results_schema.errors import Interrupted, OutputFailed, WorkersGaveUp
 from results_schema.late import xr
-from results_schema.store.rows import Chunk, Collector, Rows, joined
+from results_schema.store.rows import Chunk, Collector, Rows, RowsOnDisk, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
 from studies.protocol.kept_pilots import NAME as PILOTS
@@ -80,12 +79,7 @@ class Work:
 
 
 class Store(Protocol):
-    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory.
-
-    in_memory: bytes of results of variants that are put together there at most.
-    """
-
-    in_memory: float
+    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory."""
 
     def write(self, name: str, part: Mapping[str, Table]) -> object:
         """Keep one part."""
@@ -99,11 +93,12 @@ class Store(Protocol):
     def scratch(self) -> IO[bytes]:
         """A file without a name, gone when it is closed, for what is too large for memory."""
 
+    def rows(self, variants: int, size: int) -> RowsOnDisk | None:
+        """Where to put the results of so many variants, of at most so many bytes; None: in memory."""
+
 
 class Memory:
     """Parts of a run that writes no archive."""
-
-    in_memory = math.inf
 
     def __init__(self) -> None:
         self._parts: dict[str, Mapping[str, Table]] = {}
@@ -123,6 +118,10 @@ class Memory:
     def scratch(self) -> IO[bytes]:
         """A file without a name."""
         return tempfile.TemporaryFile()
+
+    def rows(self, variants: int, size: int) -> RowsOnDisk | None:
+        """In memory, where its dataset is to be."""
+        return None
 
 
 class Parts(Protocol):
@@ -163,7 +162,8 @@ class Variants:
         self.kind = kind
         self.plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
         self.words = f"the parts and the archive of {self.plan.size} variants"
-        self.disk_bytes = 2 * self.plan.disk_bytes
+        # The parts, the archive, and results on their way from these to that where they do not fit into memory.
+        self.disk_bytes = 2 * self.plan.disk_bytes + (self.plan.disk_bytes - self.plan.gathered_bytes)
         self.remarks = tuple(remarks(self.plan))
 
     def compute(self, store: Store, work: Work) -> int:
@@ -195,19 +195,21 @@ class Variants:
 
     def gather(self, store: Store) -> xr.Dataset:
         """The march's dataset with the study's own results."""
-        return self._collected(store) if self.plan.numbers_bytes <= store.in_memory else self._streamed(store)
+        rows = store.rows(self.plan.size, self.plan.numbers_bytes)
+        return self._collected(store) if rows is None else self._streamed(store, rows)
 
-    def _streamed(self, store: Store) -> xr.Dataset:
+    def _streamed(self, store: Store, rows: RowsOnDisk) -> xr.Dataset:
         """The same without the results of all variants in memory."""
         from engine.batch.dataset import with_histories, with_ratios
 
-        dataset, histories = streamed(self.kind, self.plan, store)
+        parts = (Chunk.of(store.read(name)) for name in store.finished() if name != PILOTS)
+        dataset, histories = streamed(self.kind, self.plan, parts, rows)
         whole = with_coordinates(self.kind, with_ratios(self.plan, dataset), self.plan.study)
         named = self._named(whole)
         if named.size:
             used = {name: whole[name].values.reshape(-1) for name in map(str, whole.data_vars) if name.endswith(USED)}
             more = self._histories(named, used)
-            histories = joined([rows for rows in (histories, more) if rows is not None])
+            histories = joined([own for own in (histories, more) if own is not None])
         return whole if histories is None else with_histories(self.plan, whole, histories)
 
     def _collected(self, store: Store) -> xr.Dataset:

@@ -1,22 +1,19 @@
-"""Results of very many variants, part after part through a file: memory holds what a part has, and a few arrays of those
-of all variants at a time."""
+"""Results of very many variants, part after part through a file: memory holds those of a part, and of all variants one
+array at a time."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from engine.scene.sweep import VARIANT
 from results_schema.late import xr
 from results_schema.store.rows import Chunk, Rows, RowsOnDisk, joined
-from studies.protocol.kept_pilots import NAME as PILOTS
 from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan
     from engine.scene.study import Study
-    from studies.protocol.parts import Store
     from studies.protocol.study import Kind
 
 
@@ -35,20 +32,18 @@ def with_coordinates(kind: Kind, dataset: xr.Dataset, study: Study) -> xr.Datase
     return dataset.assign_coords({name: value for name, value in found.items() if name not in study.sweep.axes})
 
 
-def streamed(kind: Kind, plan: Plan, store: Store) -> tuple[xr.Dataset, Rows | None]:
-    """The dataset of all variants without histories, whose results are read when they are asked for, and histories."""
+def streamed(kind: Kind, plan: Plan, parts: Iterable[Chunk], rows: RowsOnDisk) -> tuple[xr.Dataset, Rows | None]:
+    """The dataset of all variants, by way of `rows`, whose results are read when they are asked for; and histories."""
     from engine.batch.dataset import results_over
 
-    rows_of_all, selected = RowsOnDisk(store.scratch(), plan.size), list[Rows]()
-    dataset = xr.Dataset()
-    for name in [name for name in store.finished() if name != PILOTS]:
-        rows, more = Chunk.of(store.read(name))
-        own = results_over(plan, plan.cases.part(rows.variants), dict(rows.arrays))
+    dataset, selected = xr.Dataset(), list[Rows]()
+    for part, more in parts:
+        own = results_over(plan, plan.cases.part(part.variants), dict(part.arrays))
         dataset = summarised(kind, own, plan.study)
-        rows_of_all.add(Rows(rows.variants, {str(name): dataset[name].values for name in _of_variants(dataset)}))
+        rows.add(Rows(part.variants, {name: dataset[name].values for name in _of_variants(dataset)}))
         selected += [] if more is None else [more]
-    assert rows_of_all.finished.all(), "variants are missing"
-    return _whole(plan, dataset, rows_of_all), joined(selected)
+    assert rows.finished.all(), "variants are missing"
+    return _whole(plan, dataset, rows), joined(selected)
 
 
 def _of_variants(dataset: xr.Dataset) -> list[str]:

@@ -66,7 +66,7 @@ def compare(first: Results, second: Results) -> Comparison:
     if first.dims != second.dims:
         what = "the archives have different axes, so there is nothing to compare"
         raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")
-    mine, other = xr.align(first.dataset, second.dataset, join="inner", exclude=_not_swept(first, second))
+    mine, other = xr.align(first.dataset, second.dataset, join="inner", copy=False, exclude=_not_swept(first, second))
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)
     return Comparison(

@@ -3,10 +3,10 @@ Parquet."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_COLUMNS = 64  # of one result
-WRITERS = {".csv": "to_csv", ".parquet": "to_parquet"}
+ROWS_AT_ONCE = 2**17  # variants, of which a table is in memory
+
+
+def _write_csv(path: Path, tables: Iterable[pd.DataFrame]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        for number, table in enumerate(tables):
+            table.to_csv(stream, index=False, header=number == 0)
+
+
+def _write_parquet(path: Path, tables: Iterable[pd.DataFrame]) -> None:
+    import pandas as pd
+
+    pd.concat(list(tables), ignore_index=True).to_parquet(path, index=False)
+
+
+WRITERS = {".csv": _write_csv, ".parquet": _write_parquet}
 
 
 def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> list[str]:
@@ -38,13 +53,27 @@ def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> lis
     files.check_output_place(path)
     if path.exists():
         raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
-    table, left_out = table_of(results, chosen)
+    parts = _parts(results)
+    table, left_out = table_of(next(parts), chosen)
+    tables = chain([table], (table_of(part, chosen)[0] for part in parts))
     try:
-        files.write_whole(path, partial(getattr(table, WRITERS[path.suffix]), index=False))
+        files.write_whole(path, partial(WRITERS[path.suffix], tables=tables))
     except ImportError:
         what = "Parquet needs a package that is not installed"
         raise BadInput(what, where=str(path), remedy="pip install pyarrow, or write a .csv") from None
     return left_out
+
+
+def _parts(results: Results) -> Iterator[Results]:
+    """The results in parts of neighbouring variants."""
+    if not results.dims:
+        yield results
+        return
+    along, count = results.dims[0], results.shape[0]
+    step = max(1, ROWS_AT_ONCE * count // results.size)
+    for first in range(0, count, step):
+        part = results.dataset.isel({along: slice(first, first + step)})
+        yield Results(part, results.study, results.models)
 
 
 def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame, list[str]]:

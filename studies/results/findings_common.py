@@ -66,7 +66,7 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
 
     result: as in the archive's `result`. What is held to no tolerance, though a sensor's could hold it, is told so.
     """
-    error = float(results.estimated_error(result)[place])
+    error = results.error_at(result, place)
     if not error > LOOSE:
         return ""
     sensor = next((name for name in results.sensors if result in (f"{name}_max", f"{name}_min")), "")

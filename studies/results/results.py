@@ -343,6 +343,13 @@ class Results:
         error = self.dataset["estimated_error"].sel(result=result).transpose(*self.dims)
         return np.asarray(error.values, dtype=np.float64)
 
+    def error_at(self, result: str, index: Index) -> float:
+        """The same of one variant."""
+        if "estimated_error" not in self.dataset or result not in self.dataset["result"].values:
+            return np.nan
+        place = dict(zip(self.dims, index, strict=True))
+        return float(self.dataset["estimated_error"].sel(result=result).isel(place))
+
     def traced(self) -> list[Index]:
         """The variants whose values and histories are kept, in the order of their flat numbers."""
         traces = (

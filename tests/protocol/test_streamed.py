@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from results_schema.errors import ArchiveError
-from results_schema.store import blocks, files, on_disk, reading, rows, tables
+from results_schema.store import blocks, files, on_disk, parts, reading, rows, tables
 from results_schema.store.archive import open_archive
-from results_schema.store.parts import PartStore
 from results_schema.store.rows import Rows, RowsOnDisk
 from results_schema.store.tables import Column, Table, seal
 from results_schema.store.writing import write_tables
 from studies.commands.cli import main as command
+from studies.reporting import tabulated
 from tests.protocol.test_named import KINDS, swept
 from tests.studies.every_way import assert_same_archives
 
@@ -32,7 +32,8 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 def on_disk_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is small enough for memory."""
     small_blocks(monkeypatch)
-    monkeypatch.setattr(PartStore, "in_memory", 0)
+    monkeypatch.setattr(parts, "IN_MEMORY", 0)
+    monkeypatch.setattr(tabulated, "ROWS_AT_ONCE", 17)
     monkeypatch.setattr(reading, "IN_MEMORY", 0)
     monkeypatch.setattr(reading, "CHUNK_BYTES", 100)
 
@@ -63,7 +64,12 @@ def told(path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Sequen
     """What the commands make of an archive."""
     folder.mkdir()
     said = []
-    for arguments in (("info", "--all"), ("compare", path), ("export", folder / "a.csv"), ("report", "-o", folder / "r")):
+    for arguments in (
+        ("info", "--all"),
+        ("compare", path),
+        ("export", folder / "a.csv"),
+        ("report", "-o", folder / "r"),
+    ):
         assert command([arguments[0], str(path), *map(str, arguments[1:])]) == 0
         said.append(capsys.readouterr().out.replace(folder.name, ""))
     return [*said, (folder / "a.csv").read_text(encoding="utf-8"), (folder / "r/report.html").read_text("utf-8")]
@@ -87,7 +93,7 @@ def test_rows_come_back_in_the_order_of_variants(tmp_path: Path, monkeypatch: py
     expected["b"][:] = np.arange(6.0).reshape(3, 2) + np.arange(1000.0)[:, None, None]
     expected["c"] = (np.arange(1000) % 7).astype(np.int8)
     with (tmp_path / "scratch").open("w+b") as file:
-        found = RowsOnDisk(file, 1000)
+        found = RowsOnDisk(file, tmp_path, 1000)
         for variants in np.array_split(order, 13):
             assert not found.finished.all()
             found.add(Rows(variants, {name: array[variants] for name, array in expected.items()}))
@@ -128,7 +134,13 @@ def test_slices_of_what_is_on_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(on_disk, "RECENT_BYTES", most)
         array = on_disk.OnDisk(numbers.shape, numbers.dtype, read)
         variable = tables.xr.Variable(("x", "y", "z"), on_disk.indexing.LazilyIndexedArray(array))
-        for key in ((slice(2, 5),), (7, 1, 2), (slice(8, 1, -3), slice(None), 0), ([3, 1], slice(1, 3)), (slice(4, 4),)):
+        for key in (
+            (slice(2, 5),),
+            (7, 1, 2),
+            (slice(8, 1, -3), slice(None), 0),
+            ([3, 1], slice(1, 3)),
+            (slice(4, 4),),
+        ):
             np.testing.assert_array_equal(variable[key].values, numbers[key])
         np.testing.assert_array_equal(variable.transpose("z", "x", "y").values, numbers.transpose(2, 0, 1))
     assert asked[0] == (2, 5) and asked[-1] == (0, 10) and asked.count((0, 10)) == 2  # once whole, and once transposed
@@ -157,7 +169,7 @@ def test_memory_holds_a_few_arrays_alone(tmp_path: Path, monkeypatch: pytest.Mon
     count, names = 2**19, [f"a{number}" for number in range(24)]
     tracemalloc.start()
     with (tmp_path / "scratch").open("w+b") as file:
-        found = RowsOnDisk(file, count)
+        found = RowsOnDisk(file, tmp_path, count)
         for variants in np.array_split(np.random.default_rng(3).permutation(count), 32):
             found.add(Rows(variants, {name: variants.astype(float) for name in names}))
         columns = {name: tables.xr.Variable(("variant",), found.array(name, (count,))) for name in names}
