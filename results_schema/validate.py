@@ -10,6 +10,7 @@ import numpy as np
 from results_schema.errors import ArchiveError
 from results_schema.late import xr
 from results_schema.statuses import lost
+from results_schema.store.blocks import slices
 from results_schema.variables import Variable, axes, expand
 
 _TEXT_KINDS = "UTO"
@@ -134,21 +135,22 @@ def _agree(received: Any, wanted: Any, key: str) -> bool:
 
 def _value_findings(dataset: xr.Dataset, name: str, variable: Variable) -> Iterator[str]:
     array = dataset[name]
-    values = array.values
-    if np.isinf(values).any():
-        yield f"{name}: expected finite numbers or NaN, received {int(np.isinf(values).sum())} infinite ones"
+    parts = slices(array.shape, array.dtype.itemsize) if array.shape else [...]
+    infinite = sum(int(np.isinf(array[part].values).sum()) for part in parts)
+    if infinite:
+        yield f"{name}: expected finite numbers or NaN, received {infinite} infinite ones"
     if variable.nan_allowed:
         return
     failed = _failed(dataset, array)
     if failed is None:
         return
-    missing = np.isnan(values)
+    missing = np.isnan(array.values)
     if variable.gaps_allowed:
         missing &= missing.all(axis=-1, keepdims=True)
     unexplained = missing & ~failed
     if unexplained.any():
         yield f"{name}: expected numbers where the status keeps them, received NaN at {_places(unexplained)}"
-    unwanted = ~np.isnan(values) & failed
+    unwanted = ~np.isnan(array.values) & failed
     if unwanted.any():
         yield f"{name}: expected NaN where the status keeps no values, received numbers at {_places(unwanted)}"
 

@@ -197,7 +197,7 @@ class _Left:
             if _state(self.path) != self.state:
                 raise ArchiveError("has changed while it was read", where=str(self.path), remedy="try again")
             variable = dataset[place]
-            variable.set_auto_maskandscale(False)
+            _set_up(variable)
             return np.asarray(variable[first:end])
 
 
@@ -219,7 +219,7 @@ def _read_table(place: Any, load: Callable[[Any], _Loaded] = _all_of) -> Table:
     beside = set(str(attributes.pop("coordinates", "")).split())
     columns: dict[str, tuple[Any, dict[str, Any]]] = {}
     for name, variable in place.variables.items():
-        variable.set_auto_maskandscale(False)
+        _set_up(variable)
         own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != "_FillValue"}
         beside |= set(str(own.pop("coordinates", "")).split())
         columns[name] = (variable, own)
@@ -231,6 +231,14 @@ def _read_table(place: Any, load: Callable[[Any], _Loaded] = _all_of) -> Table:
         },
         attributes,
     )
+
+
+def _set_up(variable: Any) -> None:
+    """Values as they are; and whole chunks one after the other: a larger cache, which every variable has until the file
+    is closed, would only take memory."""
+    variable.set_auto_maskandscale(False)
+    if variable.dimensions and variable.dtype is not str:
+        variable.set_var_chunk_cache(CHUNK_BYTES)
 
 
 def _column(name: str, variable: Any, attributes: dict[str, Any], is_named: bool, loaded: _Loaded) -> Column:

@@ -113,22 +113,22 @@ class RowsOnDisk:
             self._lay_out(rows)
         assert not self.finished[rows.variants].any(), "a variant comes twice"
         self.finished[rows.variants] = True
+        try:
+            files.FAULTS.before("write", self._folder)
+            self._write(rows)
+        except OSError as error:
+            raise files.output_failed(self._folder, error) from error
+
+    def _write(self, rows: Rows) -> None:
         blocks = rows.variants // self._block
         for block in np.unique(blocks):
             own = np.flatnonzero(blocks == block)
             held = sum(came.size for came in self._came[block])
             for name in self._kinds:
-                self._write(self._place(name, block, held), np.ascontiguousarray(rows.arrays[name][own]))
+                self._file.seek(self._place(name, block, held))
+                self._file.write(np.ascontiguousarray(rows.arrays[name][own]).data)
             self._came[block].append((rows.variants[own] - block * self._block).astype(np.int32))
-
-    def _write(self, place: int, array: np.ndarray) -> None:
-        try:
-            files.FAULTS.before("write", self._folder)
-            self._file.seek(place)
-            self._file.write(array.data)
-            self._file.flush()
-        except OSError as error:
-            raise files.output_failed(self._folder, error) from error
+        self._file.flush()
 
     def _lay_out(self, rows: Rows) -> None:
         for name, array in rows.arrays.items():

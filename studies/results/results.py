@@ -281,8 +281,9 @@ class Results:
 
     def everywhere(self, values: Any) -> Array:
         """Values that depend on some of the sweep's axes, or on none, for every variant, in the sweep's shape."""
-        full = xr.broadcast(xr.DataArray(values), self.dataset["status"])[0].transpose(*self.dims)
-        return np.asarray(full.values, dtype=np.float64)
+        own = xr.as_variable(values)  # without coordinates, of which xarray would make copies
+        found = np.asarray(own.transpose(*(dim for dim in self.dims if dim in own.dims)).values, dtype=np.float64)
+        return np.broadcast_to(found.reshape([own.sizes.get(dim, 1) for dim in self.dims]), self.shape)
 
     def deciding_axis(self, variable: str, sensor: str) -> Axis | None:
         """The axis, other than the pace of the motion, along which a result changes most; the mass in doubt."""

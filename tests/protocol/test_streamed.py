@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,13 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from results_schema.errors import ArchiveError
+import engine
+import studies
+from engine.batch import plan
+from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import blocks, files, on_disk, parts, reading, rows, tables
 from results_schema.store.archive import open_archive
 from results_schema.store.rows import Rows, RowsOnDisk
 from results_schema.store.tables import Column, Table, seal
 from results_schema.store.writing import write_tables
 from studies.commands.cli import main as command
+from studies.protocol.parts import Variants
+from studies.protocol.study import kind_of
 from studies.reporting import tabulated
 from tests.protocol.test_named import KINDS, swept
 from tests.studies.every_way import assert_same_archives
@@ -73,6 +80,49 @@ def told(path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Sequen
         assert command([arguments[0], str(path), *map(str, arguments[1:])]) == 0
         said.append(capsys.readouterr().out.replace(folder.name, ""))
     return [*said, (folder / "a.csv").read_text(encoding="utf-8"), (folder / "r/report.html").read_text("utf-8")]
+
+
+def test_what_stays_on_the_disk_takes_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = swept("passage", KINDS["passage"])
+    small = kind_of(given).parts(given)
+    assert isinstance(small, Variants) and small.plan.gathered_bytes == small.plan.disk_bytes
+    monkeypatch.setattr(plan, "IN_MEMORY", 0)
+    large = kind_of(given).parts(given)
+    assert isinstance(large, Variants)
+    assert small.plan.memory_bytes - large.plan.memory_bytes == 3 * large.plan.numbers_bytes > 3 * 100 * 8 * 15
+    assert large.disk_bytes - small.disk_bytes == large.plan.numbers_bytes
+    monkeypatch.setattr(plan, "MOST_MEMORY", large.plan.memory_bytes)
+    kind_of(given).parts(given)
+    for run in (engine.run, studies.run):  # whose datasets are in memory
+        with pytest.raises(BadInput, match="does not fit into memory"):
+            run(given)
+
+
+class FullOnTheWay(files.Faults):
+    """No space where results are put between parts and archive, the second time."""
+
+    count = 0
+
+    def before(self, operation: str, path: Path) -> None:
+        self.count += path.name.endswith(".parts") and operation == "write"
+        if self.count == 2:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+@pytest.mark.fault(26)
+def test_a_disk_that_is_full_then_is_code_74(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    many_parts(monkeypatch)
+    whole = open_archive(ran("passage", tmp_path / "whole.nc"))
+    on_disk_alone(monkeypatch)
+    monkeypatch.setattr(files, "FAULTS", FullOnTheWay())
+    assert command(["run", str(tmp_path / "whole.toml"), "-o", str(tmp_path / "a.nc")]) == 74
+    said = capsys.readouterr().err
+    assert "a.nc.parts" in said and "bytes free there" in said
+    assert {path.name for path in tmp_path.iterdir()} == {"whole.nc", "whole.toml", "a.nc.parts"}
+    monkeypatch.setattr(files, "FAULTS", files.Faults())
+    assert_same_archives(whole, open_archive(ran("passage", tmp_path / "a.nc")))
 
 
 @pytest.mark.parametrize("kind", KINDS)

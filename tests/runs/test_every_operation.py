@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from results_schema.store import files
+from results_schema.store import files, parts
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main
 from tests.schema.samples import FailNth, KillNth
@@ -21,6 +21,8 @@ from tests.studies.small import ROOT, write
 
 CALL = "import sys; from tests.runs.test_every_operation import every_operation as e; e(*sys.argv[1:])"
 FAULTS: dict[str, Callable[[int], files.Faults]] = {"fails": FailNth, "dies": KillNth}
+ON_DISK = "marched, results on the disk"
+WAYS = TEXTS | {ON_DISK: TEXTS["marched"]}
 ENDS = {"fails": 74, "dies": -signal.SIGKILL}
 
 
@@ -31,7 +33,8 @@ def child(*arguments: str) -> int:
 
 def every_operation(way: str, how: str) -> None:
     """A run for every N, with what goes wrong then, and the one that goes on, forked of a process that has run once."""
-    write(Path(), TEXTS[way])
+    parts.IN_MEMORY = 0 if way == ON_DISK else parts.IN_MEMORY
+    write(Path(), WAYS[way])
     assert main(["run", "small.toml", "-o", "whole.nc"]) in (0, 3)
     whole, number, ended = open_archive("whole.nc"), 0, ENDS[how]
     while ended == ENDS[how]:
@@ -51,7 +54,7 @@ def every_operation(way: str, how: str) -> None:
 @pytest.mark.slow
 @pytest.mark.fault(21, 24, 26)
 @pytest.mark.parametrize("how", FAULTS)
-@pytest.mark.parametrize("way", TEXTS)
+@pytest.mark.parametrize("way", WAYS)
 def test_a_run_that_fails_or_dies_anywhere_goes_on(way: str, how: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", CALL, way, how],
