@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from results_schema.blocks import slices
 from results_schema.errors import ArchiveError
 from results_schema.late import xr
 from results_schema.statuses import lost
-from results_schema.store.blocks import slices
 from results_schema.variables import Variable, axes, expand
 
 _TEXT_KINDS = "UTO"

@@ -33,9 +33,9 @@ from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
 from engine.scene.variants import VariantValues, cases_tolerance
 from results_schema.arrays import Array, Counts
+from results_schema.blocks import IN_MEMORY
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
-from results_schema.store.blocks import IN_MEMORY
 from results_schema.store.rows import Chunk
 from results_schema.variables import declarations, registered
 

@@ -13,7 +13,7 @@ import numpy as np
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from results_schema.store.blocks import slices
+from results_schema.blocks import slices
 
 RECENT_BYTES = 2**27  # of the array that was read last, which is likely to be asked for again
 

@@ -19,9 +19,9 @@ from typing import IO, Self
 
 import numpy as np
 
+from results_schema.blocks import IN_MEMORY
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput
 from results_schema.store import files
-from results_schema.store.blocks import IN_MEMORY
 from results_schema.store.files import output_failed
 from results_schema.store.reading import opened, read_tables
 from results_schema.store.rows import VARIANTS, RowsOnDisk

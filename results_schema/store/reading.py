@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from results_schema.blocks import CHUNK_BYTES, IN_MEMORY
 from results_schema.errors import ArchiveError, BadInput, WanderlastError
 from results_schema.late import xr
 from results_schema.store import files
-from results_schema.store.blocks import CHUNK_BYTES, IN_MEMORY
 from results_schema.store.links import refuse_pointers
 from results_schema.store.tables import CONTENTS, DIGEST, Column, Numbers, Table, checksum, contents, digest
 

@@ -11,8 +11,8 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from results_schema.blocks import BLOCK_BYTES
 from results_schema.store import files
-from results_schema.store.blocks import BLOCK_BYTES
 from results_schema.store.tables import Table, from_arrays
 
 Arrays = dict[str, np.ndarray]

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from results_schema.blocks import BLOCK_BYTES, slices
 from results_schema.late import xr
-from results_schema.store.blocks import BLOCK_BYTES, slices
 
 CONTENTS = "contents"
 DIGEST = "contents_sha256"

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from results_schema.blocks import CHUNK_BYTES, chunk_shape, slices
 from results_schema.store import files
-from results_schema.store.blocks import CHUNK_BYTES, chunk_shape, slices
 from results_schema.store.tables import Column, Table
 
 PLAIN: Mapping[str, Any] = {"fletcher32": True}  # of what is read soon

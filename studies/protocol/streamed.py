@@ -6,10 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from engine.scene.sweep import VARIANT
 from results_schema.late import xr
 from results_schema.store.rows import Chunk, Rows, RowsOnDisk, joined
-from studies.results.results import Results
+from studies.results.results import VARIANT, Results
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.accuracy.reference import usual_work
 from engine.accuracy.results import results_of
+from engine.batch import audit as module
 from engine.batch.audit import audit, audit_size, joined, sampled
 from engine.batch.plan import Plan, make_plan
 from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
@@ -46,6 +48,17 @@ def test_no_pilot_is_audited() -> None:
 
 def test_a_hundredth_is_audited() -> None:
     assert [audit_size(masses(count)) for count in (3, 100, 4000, 100_000)] == [3, 16, 40, 256]
+
+
+def test_work_is_the_same_of_all_and_of_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = masses(4000, solver={"tolerance": 1e-5})
+    (grid,) = plan.grids
+    work, number = module._works(grid, 1e5)
+    whole = np.unique(usual_work(grid, grid.values, 1e5), return_counts=True)
+    monkeypatch.setattr(module, "AT_ONCE", 301)
+    for found in ((work, number), module._works(grid, 1e5)):
+        np.testing.assert_array_equal(found, whole)
+    assert number.sum() == 4000
 
 
 def test_less_is_audited_of_what_takes_long_beside_the_run() -> None:
