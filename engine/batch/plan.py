@@ -50,7 +50,7 @@ CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes
 EVERY_MARCH = "march"  # the kind of results that every march has
 NUMBERS_REDUCED = 4  # of 8 bytes, of a variant where extremes alone are kept: its number, its status, what it took
 PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
-READ_BYTES = 80  # of a variant, at most, while an answer is made of some arrays over all variants
+READ_BYTES = 40  # of a variant, at most, while an answer is made of some arrays over all variants
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs

@@ -19,7 +19,8 @@ from studies.commands import catalogue
 from studies.commands import error_exit as trouble
 from studies.commands.cli import main
 from tests.engine.build import beam, mass, study, swing
-from tests.schema.samples import FailNth
+from tests.schema.samples import FailNth, ReadOnlyFrom
+from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED, SMALL, write
 
 Captured = pytest.CaptureFixture[str]
@@ -279,6 +280,24 @@ def test_workers_that_give_up_are_code_70(here: Path, capsys: Captured, monkeypa
 
     monkeypatch.setattr("engine.batch.execution.execute", give_up)
     assert "no worker is left" in refused(capsys, "run", "small.toml", code=70)
+
+
+@pytest.mark.fault(26)
+@pytest.mark.parametrize("way", [(), ("--workers", "1")])
+def test_a_disk_that_becomes_read_only_is_code_74_and_the_next_start_finishes(
+    way: tuple[str, ...], here: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(here)
+    assert main(["run", "small.toml", "-o", "clean.nc"]) == 0
+    for number in (6, 12):
+        monkeypatch.setattr(files, "FAULTS", ReadOnlyFrom(number))
+        assert main(["run", "small.toml", *way]) == 74
+        said = capsys.readouterr().err
+        assert "Read-only file system" in said and "bytes free there" in said and "free some space" not in said
+        assert Path("small.nc.parts").is_dir() and not Path("small.nc").exists()
+    monkeypatch.setattr(files, "FAULTS", files.Faults())
+    assert main(["run", "small.toml", *way]) == 0
+    assert_same_archives(open_archive("small.nc"), open_archive("clean.nc"))
 
 
 @pytest.mark.fault(26)

@@ -14,16 +14,16 @@ import pytest
 from results_schema.store import files, parts
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main
-from tests.schema.samples import FailNth, KillNth
+from tests.schema.samples import FailNth, KillNth, ReadOnlyFrom
 from tests.studies.every_way import TEXTS, assert_same_archives
 from tests.studies.forked import exit_code, forked
 from tests.studies.small import ROOT, write
 
 CALL = "import sys; from tests.runs.test_every_operation import every_operation as e; e(*sys.argv[1:])"
-FAULTS: dict[str, Callable[[int], files.Faults]] = {"fails": FailNth, "dies": KillNth}
+FAULTS: dict[str, Callable[[int], files.Faults]] = {"fails": FailNth, "stays read-only": ReadOnlyFrom, "dies": KillNth}
 ON_DISK = "marched, results on the disk"
 WAYS = TEXTS | {ON_DISK: TEXTS["marched"]}
-ENDS = {"fails": 74, "dies": -signal.SIGKILL}
+ENDS = {"fails": 74, "stays read-only": 74, "dies": -signal.SIGKILL}
 
 
 def child(*arguments: str) -> int:

@@ -110,6 +110,15 @@ class FailNth(files.Faults):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
+class ReadOnlyFrom(FailNth):
+    """The disk becomes read-only before the N-th operation."""
+
+    def before(self, operation: str, path: Path) -> None:
+        self.count += 1
+        if self.count >= self.number:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+
 class KillNth(FailNth):
     """Kills the process, as SIGKILL or a power cut would, in the N-th operation."""
 
