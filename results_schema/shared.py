@@ -85,6 +85,9 @@ MARCH = outputs("""
         train often is by then
     {sensor}_rms | | {sensor} | optional | root mean square of {sensor}
         averaged over the recorded time; of sensors under a carriage, over the time that it is on the body
+    {sensor}_residual | | {sensor} | optional nan | residual vibration of {sensor}
+        largest difference from its static value there after all carriages have come to rest or left; NaN where it is
+        under one that has left
     {carriage}_contact_force_max | | N | nan | largest contact force of {carriage}
         over its way, without the last 2 % of the track towards a held end; NaN where the carriage is never there
     {carriage}_contact_force_min | | N | nan | smallest contact force of {carriage}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 
-EXTREMES = ("max", "min", "rms")
+EXTREMES, RESIDUAL = ("max", "min", "rms"), ("residual",)
 ENDS = ("max", "min")
 
 
@@ -110,7 +110,7 @@ Entry = tuple[Result, Callable[[Pair], Array]]  # and how far it is apart
 def _of_sensors(asked: Asked) -> Iterator[Entry]:
     for j, (name, sensor) in enumerate(asked.study.sensor.items()):
         held = _held(asked.study, sensor.quantity, sensor.tolerance)
-        for own in (f"{name}_{end}" for end in EXTREMES):
+        for own in (f"{name}_{end}" for end in EXTREMES + RESIDUAL * asked.study.output.residual):
             yield Result(own, name, *held), partial(Pair.reading, name=own, sensor=j)
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)

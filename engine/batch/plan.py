@@ -299,6 +299,12 @@ def check_readings(scene: SceneModel, window: Window) -> None:
     """Refuse a sensor under a carriage that is never on its body while anything is recorded, and rates of what is at
     rest. Raises BadInput."""
     tables = SceneTables(scene, 1, window)
+    if scene.study.output.residual and (window != "whole" or not tables.at_rest.size):
+        what = "a residual vibration is read over a whole run with rest at its end"
+        expected = (
+            'kind = "passage" or "trajectory", and a motion with a dwell (point-to-point), or after (cruise), last'
+        )
+        raise scene.study.source.fault("output.residual", what, expected=expected, received="true")
     for sensor in tables.sensors:
         if scene.fidelity is Fidelity.STATIC and sensor.offset_order:
             what = f'fidelity = "static" has no {sensor.quantity}'
@@ -318,7 +324,7 @@ def reads_accelerations(results: str) -> bool:
 def numbers_per_variant(asked: Asked) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
     study, reduction = asked.study, asked.reduction
-    found = 6 * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
+    found = (6 + study.output.residual) * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
     found += -(-len(results_of(asked)) // 2)  # errors are of half that size
     if reduction is not None:
         sizes = reduction.sizes(study)

@@ -43,10 +43,12 @@ STATUS = np.array([Status.OK, Status.NOT_CONVERGED, Status.DIVERGED], dtype=np.i
 @dataclass(frozen=True, eq=False)
 class Marched:
     """What a march of V variants leaves: statistics (J, STATISTICS, V) of all signals over the recorded part, of the
-    contact forces before it (C, STATISTICS, V), the samples of the first signals (H, S, V), and how it went (V,)."""
+    contact forces before it (C, STATISTICS, V), of all signals over the part of it in which all carriages rest (none
+    where the study does not ask for it), the samples of the first signals (H, S, V), and how it went (V,)."""
 
     statistics: Array
     unrecorded: Array
+    resting: Array
     history: Array
     status: NDArray[np.int8]
 
@@ -68,6 +70,7 @@ class March:
     state: State
     statistics: Array
     unrecorded: Array
+    resting: Array
     history: Array
 
     def go(self, halted: Callable[[], bool] = lambda: False) -> Codes:
@@ -83,7 +86,14 @@ class March:
         if not segment.recorded:
             record = Record(self.unrecorded, rows_sampled(segment, self.counts[:0]), self.history)
             return Observed(table.unrecorded, record)
-        return Observed(table.watch, Record(self.statistics, rows_sampled(segment, self.counts), self.history))
+        record = Record(self.statistics_along(segment), rows_sampled(segment, self.counts), self.history)
+        return Observed(table.watch, record)
+
+    def statistics_along(self, segment: Segment) -> Array:
+        """The statistics that a segment counts in."""
+        if not segment.recorded:
+            return self.unrecorded
+        return self.resting if segment.rests and self.resting.shape[1] else self.statistics
 
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
         """The impulse and the new accelerations of a segment's event, and its first station."""
@@ -126,10 +136,29 @@ class March:
 
     def result(self, codes: Codes, size: int) -> Marched:
         """What the march of the first ``size`` variants left, whose lanes went by these codes."""
-        statistics, unrecorded, history = (
-            from_blocks(part, size) for part in (self.statistics, self.unrecorded, self.history)
+        statistics, unrecorded, resting, history = (
+            from_blocks(part, size) for part in (self.statistics, self.unrecorded, self.resting, self.history)
         )
-        return Marched(statistics, unrecorded, history, STATUS[codes].reshape(-1)[:size])
+        if len(resting):
+            statistics = _both(statistics, resting)
+        return Marched(statistics, unrecorded, resting, history, STATUS[codes].reshape(-1)[:size])
+
+
+def _both(before: Array, after: Array) -> Array:
+    """Statistics (J, STATISTICS, V) of two parts of a run, one after the other, as those of both."""
+    found = after.copy()
+    for value, at, beyond in (
+        (layout.LARGEST, layout.LARGEST_AT, np.less),
+        (layout.SMALLEST, layout.SMALLEST_AT, np.greater),
+    ):
+        later = beyond(before[:, value], after[:, value]) | np.isnan(after[:, value])
+        for column in (value, at):
+            found[:, column] = np.where(later, after[:, column], before[:, column])
+    for first in (layout.BELOW_AT, layout.DIVERGED_AT):
+        found[:, first] = np.where(before[:, first] >= 0.0, before[:, first], after[:, first])
+    for total in (layout.SQUARES, layout.SECONDS):
+        found[:, total] += before[:, total]
+    return found
 
 
 def step_kernel(ties: Ties) -> Callable[..., Codes]:
@@ -147,8 +176,9 @@ def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled:
     statistics, unrecorded = _blank_statistics(blocks, signals), _blank_statistics(blocks, signals - guarded)
     bounds = _bounds(tables, lanes)
     statistics[:, :, layout.BOUND], unrecorded[:, :, layout.BOUND] = bounds, bounds[:, guarded:]
+    resting = statistics.copy() if tables.watches_rest else statistics[:, :0]
     history = np.full((blocks, counts.size, sensors if sampled is None else sampled, layout.LANES), np.nan)
-    return March(tables, lanes, counts, initial_state(tables.model, lanes), statistics, unrecorded, history)
+    return March(tables, lanes, counts, initial_state(tables.model, lanes), statistics, unrecorded, resting, history)
 
 
 def march(

@@ -109,6 +109,7 @@ def outcome(
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
         **_extremes(tables, marched, counts),
+        **_residuals(tables, values, marched),
         **_contact_forces(tables, values, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
@@ -166,6 +167,19 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
         found[f"{sensor.name}_rms"] = np.sqrt(
             statistics[layout.SQUARES] / np.where(statistics[layout.SECONDS] > 0.0, statistics[layout.SECONDS], 1.0)
         )
+    return found
+
+
+def _residuals(tables: SceneTables, values: VariantValues, marched: Marched) -> Flat:
+    """By how much every sensor is off its static value at most, while all carriages rest."""
+    if not len(marched.resting):
+        return {}
+    unit, found = tables.statics.at(tables.at_rest), Flat()
+    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
+        static = unit.force[0, j] @ weights(tables.model, values) + unit.gravity[0, j] * values.gravity
+        above, below = marched.resting[j, layout.LARGEST] - static, static - marched.resting[j, layout.SMALLEST]
+        off = np.maximum(above, below)
+        found[f"{sensor.name}_residual"] = np.where(np.isneginf(off), np.nan, off)
     return found
 
 

@@ -53,7 +53,11 @@ def quasistatic_extremes(
         here = _counted(tables, signals[:shown], standing(tables.timeline, counts))[:, :, None]
         found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
-    return Marched(statistics, unrecorded, history, np.full(size, Status.OK, dtype=np.int8))
+    resting = statistics[:0]
+    if tables.watches_rest:
+        here = _counted(tables, signals, standing(tables.timeline, tables.at_rest))
+        resting = _statistics(np.einsum("sjl,lv->sjv", _unit(tables, tables.at_rest), loads), here, tables.at_rest)
+    return Marched(statistics, unrecorded, resting, history, np.full(size, Status.OK, dtype=np.int8))
 
 
 def _unit(tables: SceneTables, counts: Array | Counts) -> Array:

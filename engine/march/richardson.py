@@ -126,7 +126,7 @@ class _Pair:
         signals = fine.shape[2]
         gap = self.gap if segment.recorded else np.zeros_like(self.gap[:, :signals])
         extrapolate(fine, observed.coarse.record.history, own.counted, gap)
-        statistics = self.fine.statistics if segment.recorded else self.fine.unrecorded
+        statistics = self.fine.statistics_along(segment)
         carry = np.ascontiguousarray(self.carry[:, :signals])
         survey(fine, own.counted, statistics, carry, self.joined, segment.first)
         integrate(fine, own.summed, statistics, self.fine.step_size(segment))

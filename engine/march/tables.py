@@ -190,6 +190,17 @@ class SceneTables:
             companion.forget()
         self.__dict__.pop("coarser", None)
 
+    @property
+    def watches_rest(self) -> bool:
+        """Whether it is told how far sensors swing when all carriages have come to rest or left."""
+        return self.model.study.output.residual and bool(self.at_rest.size)
+
+    @cached_property
+    def at_rest(self) -> Array:
+        """(1,) a moment in that part of the run, by its count; none where the run has no such part."""
+        last = self.timeline.segments[-1]
+        return np.array([last.first + 0.5 * last.steps] if last.rests else [])
+
     @cached_property
     def statics(self) -> Statics:
         """Static readings of the sensors while the carriages go their way."""

@@ -48,6 +48,11 @@ class Rider:
         return self.delay + self.motion.duration / self.pace
 
     @property
+    def rests_from(self) -> float:
+        """Scene time from which it is at rest where it ends, or gone."""
+        return self.delay + self.motion.rests_from / self.pace
+
+    @property
     def stays(self) -> bool:
         """Whether the carriage stands on its place before and after its motion; a cruise only passes."""
         return not self.motion.passes
@@ -152,7 +157,8 @@ class Segment(NamedTuple):
 
     start, end: scene time; for free vibration both are the scene's end, and its duration follows from the body.
     first: count of the scene's stations at which it begins. active: per rider, whether it is in contact.
-    fresh: an event precedes it, so accelerations are solved for anew. recorded: whether extremes count.
+    fresh: an event precedes it, so accelerations are solved for anew. recorded: whether extremes count. rests: all
+    carriages are at rest where they end, or gone.
     """
 
     start: float
@@ -164,6 +170,7 @@ class Segment(NamedTuple):
     strikes: tuple[Impact, ...]
     recorded: bool
     free: bool
+    rests: bool
 
     @property
     def step(self) -> float:
@@ -334,6 +341,7 @@ class _Part(NamedTuple):
     fresh: bool
     strikes: tuple[Impact, ...]
     recorded: bool
+    rests: bool
 
     def stepped(self, total: int, count: int) -> Iterator[Segment]:
         """Its slices with so many steps in all, counted from ``count``; an event precedes the first."""
@@ -341,9 +349,8 @@ class _Part(NamedTuple):
         at = [self.start + (self.end - self.start) * n / total for n in bounds[:-1]] + [self.end]
         for i, (first, last) in enumerate(pairwise(bounds)):
             fresh, strikes = (self.fresh, self.strikes) if i == 0 else (False, ())
-            yield Segment(
-                at[i], at[i + 1], last - first, count + first, self.active, fresh, strikes, self.recorded, False
-            )
+            place = at[i], at[i + 1], last - first, count + first
+            yield Segment(*place, self.active, fresh, strikes, self.recorded, False, self.rests)
 
 
 @lru_cache(maxsize=64)
@@ -354,6 +361,7 @@ def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) 
     seams = list(stops)
     if leading.motion.period is not None:
         seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
+    rest = max(rider.rests_from for rider in riders)
     found: list[_Part] = []
     before = tuple(False for _ in riders)
     for start, stop in pairwise(_merged([*hard, *seams, *recorded], end)):
@@ -361,7 +369,7 @@ def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) 
         fresh = _near(hard, start, end)
         seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
         strikes = tuple(_strikes(riders, active, before, (start, stop))) if fresh else ()
-        found.append(_Part(start, stop, active, fresh, strikes, seen))
+        found.append(_Part(start, stop, active, fresh, strikes, seen, start >= rest - _SAME * end))
         before = active
     return tuple(found)
 
@@ -378,7 +386,7 @@ def _free_vibration(last: Segment, total: int) -> list[Segment]:
     """Slices after the end of the scene; who stands on a body and what is recorded is as ``last`` says."""
     count = last.first + last.steps
     return [
-        Segment(last.end, last.end, stop - first, count + first, last.active, first == 0, (), last.recorded, True)
+        Segment(last.end, last.end, stop - first, count + first, last.active, first == 0, (), last.recorded, True, True)
         for first, stop in pairwise(_slices(total))
     ]
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
 
@@ -178,46 +177,6 @@ class Robot(Spec):
         if len(set(self.rails)) < len(self.rails):
             raise fault("a robot stands on two different rails", expected="names of two bodies, or one name")
         return self
-
-
-class Profile(NamedTuple):
-    """A move of unit length: jerk (1/s3) and the times (s) of one jerk, of speeding up, and at full speed."""
-
-    jerk: float
-    jerk_time: float
-    up_time: float
-    steady_time: float
-
-    @property
-    def duration(self) -> float:
-        """s."""
-        return 2.0 * self.up_time + self.steady_time
-
-
-def profile(distance: float, speed: float, acceleration: float, jerk: float) -> Profile:
-    """Jerk-limited from rest to rest over a distance > 0, scaled to unit length.
-
-    With T_j = a/j, T_a = T_j + v/a, where v j < a^2 T_j = sqrt(v/j), T_a = 2 T_j, and T_v = D/v - T_a; where that is
-    negative the speed is never reached: T_a = T_j/2 + sqrt(T_j^2/4 + D/a) with T_j = a/j if that is 2 T_j at least,
-    else T_j = (D/(2 j))^(1/3), T_a = 2 T_j.
-
-    >>> profile(1.0, 10.0, 100.0, 2.0).duration  # 4 (D/(2 j))^(1/3)
-    2.5198420997897464
-    """
-    if speed * jerk >= acceleration**2:
-        ramp = acceleration / jerk
-        up = ramp + speed / acceleration
-    else:
-        ramp = math.sqrt(speed / jerk)
-        up = 2.0 * ramp
-    steady = distance / speed - up
-    if steady < 0.0:
-        steady, ramp = 0.0, acceleration / jerk
-        up = 0.5 * ramp + math.sqrt(0.25 * ramp**2 + distance / acceleration)
-        if up < 2.0 * ramp:
-            ramp = (distance / (2.0 * jerk)) ** (1.0 / 3.0)
-            up = 2.0 * ramp
-    return Profile(jerk=jerk / distance, jerk_time=ramp, up_time=up, steady_time=steady)
 
 
 def check_robots(

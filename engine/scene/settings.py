@@ -95,7 +95,8 @@ class Output(Spec):
     percentiles: of every result over the sweep, in per cent. keep: all variants, or of every cell the extremes of every
     result with the variants that have them, or these and the percentiles. cells: the axes that stay where variants are
     reduced; all of the grid beside a sample if not given, else none. unreduced: number of variants, spread over the
-    sweep, that are computed again by the unreduced finite-element model.
+    sweep, that are computed again by the unreduced finite-element model. residual: whether it is told how far sensors
+    swing when all carriages have come to rest or left.
     """
 
     histories: Annotated[
@@ -105,6 +106,7 @@ class Output(Spec):
     keep: Literal["all", "extremes", "percentiles"] = "all"
     cells: Annotated[tuple[str, ...], Strict(False)] | None = None
     unreduced: int = Field(default=0, ge=0, le=1000)
+    residual: bool = False
 
     @property
     def keeps_variants(self) -> bool:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from engine.scene.study import Study
-from engine.study_file.spec import Spec
-from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
+from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
+from studies.findings.beyond import MOST_TOLD, Limits, where_beyond
+from studies.findings.residual import check_residual, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, number, quantity
@@ -23,31 +23,18 @@ from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5
-MOST_PARTS = 3  # of a sweep that are told one by one
-MOST_TOLD = 3  # values of another swept number that are told one by one
-GAP = 3.0  # times the usual distance of two values of a sweep
 BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
 
-LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
-
-
-class Asked(Spec):
+class Asked(Limits):
     """The table [question]. amplification: dynamic over static, of which is told at which speeds it is exceeded; the
-    others: absolute values, of which the same is told for every sensor of that quantity."""
+    limits: of absolute values, of which the same is told for every sensor of that quantity; residual: of residual
+    vibrations."""
 
     amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
-    displacement: Annotated[Length, Field(gt=0)] | None = None
-    velocity: Annotated[Speed, Field(gt=0)] | None = None
-    acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
-    bending_moment: Annotated[Torque, Field(gt=0)] | None = None
-    stress: Annotated[Pressure, Field(gt=0)] | None = None
-
-    def limit(self, name: str) -> float | None:
-        """What is named for a quantity."""
-        return getattr(self, name) if name in LIMITED else None
+    residual: Limits = Limits()
 
 
 class Passage(Kind):
@@ -63,6 +50,7 @@ class Passage(Kind):
         """Something moves and something is measured."""
         first_carriage(study)
         check_sensors(study)
+        check_residual(study, question_of(study, Asked).residual)
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return with_amplification(dataset, study)
@@ -73,7 +61,9 @@ class Passage(Kind):
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
-        return [*said[:1], *lifted, *said[1:], *kept, *told_statuses(results)]
+        residual = residuals(results, question_of(results.study, Asked).residual)
+        first = [*residual[:1], *said[:1], *lifted]
+        return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variants with the largest value and the largest amplification."""
@@ -123,7 +113,8 @@ def _amplified(results: Results, sensor: str) -> str:
     if results.size < 2 or not np.isfinite(np.where(results.with_values, gain, np.nan)).any():
         return ""
     threshold = question_of(results.study, Asked).amplification
-    return f" The dynamic amplification exceeds {number(threshold)} {_where(results, gain, threshold)}."
+    where = where_beyond(results, gain, threshold, results.axis(*PACES))
+    return f" The dynamic amplification exceeds {number(threshold)} {where}."
 
 
 def _limited(results: Results, sensor: str) -> str:
@@ -131,58 +122,8 @@ def _limited(results: Results, sensor: str) -> str:
     limit = question_of(results.study, Asked).limit(results.study.sensor[sensor].quantity)
     if limit is None:
         return ""
-    said = quantity(limit, results.sensors[sensor])
-    return f" Its absolute value exceeds {said} {_where(results, sizes(results, sensor), limit)}."
-
-
-def _where(results: Results, values: Array, threshold: float) -> str:
-    """In which part of the sweep values exceed a threshold: of a swept pace, for each value of another number where
-    these are few."""
-    beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
-    axis = results.axis(*PACES)
-    if axis is None or axis.dim == VARIANT:
-        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
-    others = [other for other in results.axes if other.name != axis.name]
-    if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
-        return _paces(results, axis, beyond)
-    own = results.everywhere(results.dataset[others[0].name])
-    told = {float(value): _paces(results, axis, beyond, own == value) for value in np.unique(own)}
-    if len(set(told.values())) == 1:
-        return next(iter(told.values()))
-    return "; ".join(f"{text} ({others[0].noun} {others[0].in_words(value)})" for value, text in told.items())
-
-
-def _paces(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None) -> str:
-    """The parts of a swept pace in which any variant (among some) is beyond a threshold, and which variants these are.
-    A part ends where the pace leaves out more than `GAP` times its usual distance: nothing was computed there."""
-    beyond = beyond if among is None else beyond & among
-    along = results.everywhere(results.dataset[axis.name])
-    paces = np.unique(along)
-    over = np.isin(paces, along[beyond])
-    if not over.any():
-        return f"nowhere from {axis.span}"
-    steps = np.diff(paces)
-    apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
-    if over.all() and not apart.size:
-        return f"everywhere from {axis.span}{_common(results, axis, beyond) if among is None else ''}"
-    turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
-    bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
-    parts = [paces[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
-    told = [f"at {replace(axis, values=part).span}" for part in parts]
-    if over[-1] and parts[-1].size > 1:
-        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(paces[-1])}"
-    if among is None:
-        told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
-    return listed(told) if len(told) <= MOST_PARTS else f"first {told[0]}, last {told[-1]}"
-
-
-def _common(results: Results, pace: Axis, which: Mask) -> str:
-    """What else is swept and has not all of its values among some variants, in brackets."""
-    others = [axis for axis in results.axes if axis.name != pace.name]
-    values = [np.unique(results.everywhere(results.dataset[axis.name])[which]) for axis in others]
-    pairs = zip(others, values, strict=True)
-    told = [f"{axis.noun} {replace(axis, values=own).span}" for axis, own in pairs if own.size < axis.values.size]
-    return f" ({', '.join(told)})" if told else ""
+    said, values = quantity(limit, results.sensors[sensor]), sizes(results, sensor)
+    return f" Its absolute value exceeds {said} {where_beyond(results, values, limit, results.axis(*PACES))}."
 
 
 def _at_the_end(results: Results, place: Index) -> str:

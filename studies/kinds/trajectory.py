@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from engine.scene.study import Study
+from engine.study_file.spec import Spec
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
-from studies.protocol.study import Kind
+from studies.findings.beyond import Limits
+from studies.findings.residual import check_residual, residuals
+from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
 from studies.results.results import Results
@@ -28,18 +31,26 @@ RESULTS = outputs("""
 declare("trajectory", *MARCH, *RESULTS)
 
 
+class Asked(Spec):
+    """The table [question]. residual: limits of residual vibrations, of which is told where they are exceeded."""
+
+    residual: Limits = Limits()
+
+
 class Trajectory(Kind):
     """The kind "trajectory"."""
 
     name = "trajectory"
     summary = "histories of every sensor and of the carriages' motion"
     question = "What do the sensors and the carriages do over time?"
+    settings = Asked
     drawn_by = "studies.pictures.trajectory"
 
     def check(self, study: Study) -> None:
         """Something moves, something is measured, and histories are kept."""
         first_carriage(study)
         check_sensors(study)
+        check_residual(study, question_of(study, Asked).residual)
         if study.output.histories == "none":
             raise study.source.fault(
                 "output.histories",
@@ -51,6 +62,7 @@ class Trajectory(Kind):
     def findings(self, results: Results) -> list[str]:
         traced = results.traced()
         said = [_kept(results)] if traced else ["No history was kept."]
+        said += residuals(results, question_of(results.study, Asked).residual)
         said += [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
         return [*said, *told_statuses(results)]
 

@@ -131,6 +131,9 @@ class PiecedKind(Kind, ABC):
         if not study.output.keeps_variants:
             what = f"studies of the kind {self.name} are not marched by variants that could be reduced"
             raise study.source.fault("output.keep", what, expected='"all"', received=study.output.keep)
+        if study.output.residual:
+            what = f"studies of the kind {self.name} tell no residual vibration"
+            raise study.source.fault("output.residual", what, expected="false", received="true")
         if study.envelope:
             what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
             raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))

@@ -147,7 +147,7 @@ def _allowed(first: Results, second: Results, result: str, name: str, apart: Arr
 def _size(results: Results, name: str, shape: tuple[int, ...]) -> Array:
     """What errors of a result are relative to: of a sensor's extremes the larger of both, in place of its static value;
     of a contact force likewise; of lengths that of the track; indices are as they are."""
-    stem = name.removesuffix("_max").removesuffix("_min")
+    stem = name.removesuffix("_max").removesuffix("_min").removesuffix("_residual")
     ends = [f"{stem}_{end}" for end in ("max", "min") if f"{stem}_{end}" in results.dataset]
     if ends:
         values = [np.abs(results.dataset[end].transpose(*results.dims).values) for end in ends]

@@ -69,7 +69,8 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     error = results.error_at(result, place)
     if not error > LOOSE:
         return ""
-    sensor = next((name for name in results.sensors if result in (f"{name}_max", f"{name}_min")), "")
+    ends = ("max", "min", "residual")
+    sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
     free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
     remedy = f"; a `tolerance` of its own on sensor {sensor} asks for more" if free else ""
     if sensor and results.study.sensor[sensor].reads.rate == 2:

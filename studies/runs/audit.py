@@ -225,10 +225,11 @@ def _not_held(results: Results) -> str:
     fine = results.dataset["status"] == int(Status.OK)
     largest = results.dataset["estimated_error"].where(fine).max(results.dims)
     loose = largest.where(np.isnan(results.dataset["tolerance"]) & (largest > LARGE))
+    read = {f"{sensor}{end}" for sensor in results.sensors for end in ("", "_max", "_min", "_residual")}
     told = [
         f"{name} up to {percent(float(error))}"
         for name, error in zip(results.dataset["result"].values, loose.values, strict=True)
-        if np.isfinite(error) and str(name).removesuffix("_max").removesuffix("_min") in results.sensors
+        if np.isfinite(error) and str(name) in read
     ]
     return f"Estimated, but held to no tolerance: {listed(told)}." if told else ""
 

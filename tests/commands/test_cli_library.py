@@ -129,6 +129,7 @@ def test_commented_examples_at_the_end_are_valid_too() -> None:
         "out-and-back",
         "sinusoidal",
         "waypoints",
+        "point-to-point",
     }
     assert len(axes) >= 4
     base = STARTS["passage"].partition("[sweep]")

@@ -144,13 +144,27 @@ def phases_of(motion: Any, begin: float, length: float) -> tuple[Phase, ...]:
         return cruise_on(motion.start, motion.end, motion.speed, begin, length)
     if motion.kind == "waypoints":
         return spline_on(motion.times, motion.positions, begin, length)
-    if motion.kind == "sinusoidal":
+    if motion.kind == "point-to-point":
+        found = trapezoid(motion)
+    elif motion.kind == "sinusoidal":
         found = motions.sinusoidal(motion.centre, motion.amplitude, 2.0 * math.pi * motion.frequency, motion.cycles)
     elif motion.turn == 0.0:
         found = motions.instant_out_and_back(motion.start, motion.end, motion.speed, motion.cycles)
     else:
         found = motions.out_and_back(motion.start, motion.end, motion.speed, motion.turn, motion.cycles)
     return tuple(motions.shifted(phase, begin) for phase in found)
+
+
+def trapezoid(motion: Any) -> tuple[Phase, ...]:
+    """A point-to-point motion without a limit of jerk that reaches its speed, and its rest."""
+    assert motion.jerk is None
+    way = abs(motion.end - motion.start)
+    up, push = motion.speed / motion.acceleration, motion.acceleration / way
+    steady = way / motion.speed - up
+    assert steady > 0.0
+    parts = [(up, push, 0.0), (steady, 0.0, 0.0), (up, -push, 0.0)]
+    moving = motions.point_to_point(motion.start, motion.end, parts)
+    return motions.joined((*moving, standing(motion.end, moving[-1].end, moving[-1].end + motion.dwell)))
 
 
 def standing(at: float, start: float, end: float) -> Phase:

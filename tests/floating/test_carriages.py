@@ -14,12 +14,16 @@ from results_schema.errors import BadInput
 from tests.floating.scenes import PAPER_BEAM
 
 SHUTTLE = {"kind": "out-and-back", "start": 2.0, "end": 12.0, "speed": 4.0, "turn": 0.2, "cycles": 2}
+STOPPING = {"kind": "point-to-point", "start": 2.0, "end": 12.0, "speed": 4.0, "acceleration": 6.0}
 MOTIONS = {
     "there first": SHUTTLE,
     "backward": SHUTTLE | {"start": 12.0, "end": 2.0, "turn": 0.5},
     "instant": SHUTTLE | {"turn": 0.0, "cycles": 3},
     "a sine that ends": {"kind": "sinusoidal", "centre": 7.0, "amplitude": 3.0, "frequency": 0.4, "cycles": 3},
     "backward cruise": {"kind": "cruise", "start": 12.0, "end": 2.0, "speed": 3.0},
+    "jerk-limited": STOPPING | {"jerk": 20.0, "dwell": 0.5},
+    "a trapezoid, backward": STOPPING | {"start": 12.0, "end": 2.0},
+    "too short for its speed": STOPPING | {"end": 2.5, "jerk": 20.0},
     "spline": {"kind": "waypoints", "times": [0, 2, 5], "positions": [3, 10, 4]},
 }
 
@@ -93,6 +97,20 @@ def test_numbers_of_a_shuttle_may_be_swept() -> None:
     for k, turn in enumerate([0.0, 0.3]):
         for n, cycles in enumerate([1, 2]):
             one = study(SHUTTLE | {"turn": turn, "cycles": cycles}, question={"duration": 8.0})
+            alone = studies.run(one.with_values({"solver.tolerance": 1e-2}))
+            assert found["midspan_max"].values[k, n] == pytest.approx(float(alone["midspan_max"]), rel=1e-9)
+
+
+def test_limits_of_a_point_to_point_motion_may_be_swept() -> None:
+    """Each variant has its own pieces, also with a jerk that the scene without sweep does not have."""
+    sweep = {
+        "jerk": {"of": "carriage.load.motion.jerk", "values": [5.0, 50.0]},
+        "acceleration": {"of": "carriage.load.motion.acceleration", "values": [3.0, 9.0]},
+    }
+    found = studies.run(study(STOPPING, sweep=sweep, question={"duration": 6.0}, solver={"tolerance": 1e-2}))
+    for k, jerk in enumerate([5.0, 50.0]):
+        for n, acceleration in enumerate([3.0, 9.0]):
+            one = study(STOPPING | {"jerk": jerk, "acceleration": acceleration}, question={"duration": 6.0})
             alone = studies.run(one.with_values({"solver.tolerance": 1e-2}))
             assert found["midspan_max"].values[k, n] == pytest.approx(float(alone["midspan_max"]), rel=1e-9)
 

@@ -31,6 +31,9 @@ SENSORS = {
 SPRINGS = [{"at": 0.0, "stiffness": 60.0, "rotational": 0.3}, {"at": 1.0, "stiffness": 90.0}]
 DAMPED = [{"at": 0.0, "stiffness": 60.0, "damping": 2.0}, {"at": 0.9, "stiffness": 90.0, "damping": 0.7}]
 ENTERING = {"kind": "waypoints", "times": [0.0, 0.5, 0.9, 1.4], "positions": [-0.3, 0.4, 0.7, 1.2]}
+STOPPING = {
+    "kind": "point-to-point", "start": 0.2, "end": 0.9, "speed": 1.0, "acceleration": 3.0, "dwell": 0.3,
+}  # fmt: skip
 LONG = beam(length=2.0, area=0.03, second_moment=0.002, youngs_modulus=700.0, density=50.0, damping_ratio=0.01)
 LONG_SENSORS = {"place": fixed(0.83), "moment": fixed(0.83, "bending_moment"), "below": under("car")}
 THREE = {
@@ -110,6 +113,10 @@ SCENES: dict[str, Callable[[], Study]] = {
     "sinusoidal": lambda: case(beam(damping_ratio=0.02), mass(0.5, swing(0.5, 0.4, 0.7, 2))),
     "cruise from equilibrium": lambda: case(beam(), mass(0.5, cruise(0.3, 1.0, 0.8)), initial="equilibrium"),
     "waypoints from off the body": lambda: case(beam(supports=SPRINGS), mass(0.5, ENTERING)),
+    "point to point, and rest": lambda: case(beam(damping_ratio=0.02), mass(0.5, STOPPING)),
+    "point to point while another passes": lambda: case(
+        beam(supports=SPRINGS), {"car": mass(0.5, STOPPING, delay=0.1), "next": mass(0.4, cruise(0.0, 1.0, 0.7))}
+    ),
     "shuttle waits": lambda: case(beam(), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.1, 1), delay=0.25)),
     "stands while another passes": lambda: case(
         beam(),

@@ -71,6 +71,28 @@ def out_and_back(start: float, end: float, speed: float, turn: float, cycles: in
     return joined(phases)
 
 
+def point_to_point(start: float, end: float, parts: Sequence[tuple[float, float, float]]) -> tuple[Phase, ...]:
+    """From start to end by parts of some length (s), each with the acceleration of a move of unit length at its
+    beginning and its jerk, added up one after the other."""
+    phases: list[Phase] = []
+    way, t, s, v = end - start, 0.0, 0.0, 0.0
+    for length, a, j in parts:
+        phases.append(
+            Phase(
+                t,
+                t + length,
+                lambda x, t=t, s=s, v=v, a=a, j=j: (
+                    start + way * (s + v * (x - t) + a * (x - t) ** 2 / 2 + j * (x - t) ** 3 / 6)
+                ),
+                lambda x, t=t, v=v, a=a, j=j: way * (v + a * (x - t) + j * (x - t) ** 2 / 2),
+                lambda x, t=t, a=a, j=j: way * (a + j * (x - t)),
+            )
+        )
+        s, v = s + v * length + a * length**2 / 2 + j * length**3 / 6, v + a * length + j * length**2 / 2
+        t += length
+    return joined(phases)
+
+
 def instant_out_and_back(start: float, end: float, speed: float, cycles: int) -> tuple[Phase, ...]:
     """There and back `cycles` times at constant speed; s' changes its sign at once at both ends."""
     phases: list[Phase] = []

@@ -7,7 +7,8 @@ import pytest
 
 from engine.robots.model import build, drive_forces
 from engine.robots.plans import plans_of
-from engine.scene.robots import Arm, profile
+from engine.scene.motions.point_to_point import profile
+from engine.scene.robots import Arm
 from tests.naive.robots_as_particles import driven_by, pieces, told
 from tests.robots.scenes import ARM, GANTRY, marched, scene
 

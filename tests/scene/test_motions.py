@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 
 from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal, Waypoints
 from engine.scene.motions.base import Motion
+from engine.scene.motions.point_to_point import PointToPoint
 from tests.naive import motions as naive
+from tests.naive.robots_as_particles import pieces
 
 places = st.floats(0.0, 20.0).map(lambda x: round(x, 3))
 speeds = st.floats(0.01, 50.0)
@@ -49,7 +51,15 @@ def waypoints(draw: st.DrawFn) -> Waypoints:
     return Waypoints(kind="waypoints", times=[0.0, *np.cumsum(spans).tolist()], positions=positions)
 
 
-laws = cruises | shuttles | sines | waypoints()
+moves = st.builds(
+    lambda s, v, a, j, rest: PointToPoint(kind="point-to-point", speed=v, acceleration=a, jerk=j, dwell=rest, **s),
+    strokes(),
+    st.floats(0.1, 10.0),
+    st.floats(0.1, 100.0),
+    st.none() | st.floats(0.1, 1000.0),
+    st.just(0.0) | st.floats(0.01, 3.0),
+)
+laws = cruises | shuttles | sines | waypoints() | moves
 
 
 def smooth_instants(motion: Motion, margin: float) -> np.ndarray:
@@ -82,6 +92,8 @@ def test_range_and_largest_speed(motion: Motion) -> None:
     if isinstance(motion, Waypoints):  # a short interval between two instants needs its own
         edges = np.array(motion.times) / motion.times[-1]
         tau = np.concatenate([np.linspace(a, b, 401) for a, b in pairwise(edges)])
+    if isinstance(motion, PointToPoint):  # the top speed may last no time
+        tau = np.union1d(tau, motion.breaks())
     path = motion.path(tau)
     low, high = motion.range()
     slack = 1e-5 * (high - low)
@@ -127,6 +139,57 @@ def test_against_the_naive_twins(start: float, end: float) -> None:
     compare_with_phases(Cruise(kind="cruise", start=start, end=end, speed=5.0), naive.cruise(start, end, 5.0))
     wave = Sinusoidal(kind="sinusoidal", centre=7.5, amplitude=7.0, frequency=0.3, cycles=2)
     compare_with_phases(wave, naive.sinusoidal(7.5, 7.0, 2 * math.pi * 0.3, 2))
+
+
+LIMITS = {
+    "all limits are reached": (1.0, 6.0, 200.0),
+    "the speed is not": (10.0, 6.0, 200.0),
+    "the jerk alone limits": (10.0, 100.0, 5.0),
+    "the acceleration is not": (0.5, 100.0, 20.0),
+    "a trapezoid": (1.0, 6.0, None),
+    "a triangle": (10.0, 6.0, None),
+}
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.4])
+@pytest.mark.parametrize(("start", "end"), [(0.6, 3.6), (3.6, 0.6)])
+@pytest.mark.parametrize("limits", LIMITS.values(), ids=LIMITS)
+def test_point_to_point(limits: tuple[float, float, float | None], start: float, end: float, dwell: float) -> None:
+    """What jerks add up to by a search for the highest speed; no limit is broken, and one of them is always reached."""
+    speed, acceleration, jerk = limits
+    keys: dict[str, Any] = {"start": start, "end": end, "speed": speed, "acceleration": acceleration}
+    motion = PointToPoint(kind="point-to-point", jerk=jerk, dwell=dwell, **keys)
+    parts, push = [], 0.0
+    for length, change in pieces(speed / 3.0, acceleration / 3.0, (jerk or 1e9) / 3.0):
+        parts.append((float(length), push, change))
+        push += float(length) * change
+    naive_end = sum(length for length, _, _ in parts)
+    if jerk is None:  # a jerk of 1e9 m/s3 is as good as none
+        assert motion.time_scale - dwell == pytest.approx(naive_end, rel=1e-7)
+        up = min(speed / acceleration, math.sqrt(3.0 / acceleration))
+        steady = 3.0 / speed - up if speed < math.sqrt(3.0 * acceleration) else 0.0
+        parts = [(up, acceleration / 3.0, 0.0), (steady, 0.0, 0.0), (up, -acceleration / 3.0, 0.0)]
+    moving = [part for part in parts if part[0] > 1e-9]
+    compare_with_phases(motion, naive.point_to_point(start, end, [*moving, (dwell, 0.0, 0.0)] if dwell else moving))
+    assert motion.rests_from * motion.time_scale == pytest.approx(motion.time_scale - dwell, rel=1e-12)
+    assert [float(motion.path(tau).S) for tau in (0.0, motion.rests_from, 1.0)] == [start, end, end]
+    tau = np.union1d(np.linspace(0.0, 1.0, 20001), motion.breaks())
+    path, scale = motion.path(tau), motion.time_scale
+    fastest, hardest = np.abs(path.dS).max() / scale, np.abs(path.ddS).max() / scale**2
+    assert fastest <= speed * (1 + 1e-12) and hardest <= acceleration * (1 + 1e-12)
+    assert np.all(np.sign(end - start) * np.diff(path.S) >= -1e-15)
+    sides = [motion.path(motion.breaks(), side) for side in ("left", "right")]
+    for order, slack in ((0, 1e-14), (1, 1e-12), *([(2, 1e-9)] if jerk else [])):
+        np.testing.assert_allclose(sides[0][order], sides[1][order], rtol=0, atol=slack * scale**order * 10)
+
+
+def test_accelerations_of_a_trapezoid_are_one_sided() -> None:
+    motion = PointToPoint(kind="point-to-point", start=0.0, end=3.0, speed=1.0, acceleration=2.0)
+    scale = motion.time_scale**2
+    np.testing.assert_allclose(motion.path(motion.breaks(), "left").ddS / scale, [2.0, 0.0])
+    np.testing.assert_allclose(motion.path(motion.breaks(), "right").ddS / scale, [0.0, -2.0])
+    np.testing.assert_allclose(motion.path([0.0, 1.0]).ddS / scale, [2.0, -2.0])
+    np.testing.assert_array_equal(motion.path([0.0, 1.0]).dS, [0.0, 0.0])
 
 
 def test_instant_turns_are_one_sided() -> None:

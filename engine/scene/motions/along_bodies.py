@@ -1,4 +1,4 @@
-"""The motions that a carriage can have: cruise, out and back, sinusoidal, waypoints."""
+"""The motions that a carriage can have: cruise, out and back, sinusoidal, waypoints, sliding; and the table of all."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pydantic import Field, Strict, model_validator
 
 from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
+from engine.scene.motions.point_to_point import PointToPoint
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
@@ -322,7 +323,8 @@ class Sliding(Motion):
         return Path(np.full_like(tau, self.start), np.zeros_like(tau), np.zeros_like(tau))
 
 
-MOTIONS = kinds("motion", "wanderlast.motions", Motion, Cruise, OutAndBack, Sinusoidal, Waypoints, Sliding)
+ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, Sliding)
+MOTIONS = kinds("motion", "wanderlast.motions", Motion, *ALL)
 AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 
 _NO_TOUCH = "the path never touches its body"

@@ -101,6 +101,11 @@ class Motion(Spec):
         raise NotImplementedError
 
     @property
+    def rests_from(self) -> float:
+        """tau from which it is at rest where it ends."""
+        return self.duration
+
+    @property
     def free_vibration(self) -> float:
         """First periods of the body for which free vibration is marched afterwards."""
         return 0.0

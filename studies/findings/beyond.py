@@ -1,0 +1,83 @@
+"""Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from engine.study_file.spec import Spec
+from engine.study_file.units import Acceleration, Length, Pressure, Speed, Torque
+from results_schema.arrays import Array, Mask
+from studies.results.formatting import counted, listed
+from studies.results.results import VARIANT, Axis, Results
+
+MOST_PARTS = 3  # of a sweep that are told one by one
+MOST_TOLD = 3  # values of another swept number that are told one by one
+GAP = 3.0  # times the usual distance of two values of a sweep
+LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
+
+
+class Limits(Spec):
+    """Of sensors' readings, by their quantity."""
+
+    displacement: Annotated[Length, Field(gt=0)] | None = None
+    velocity: Annotated[Speed, Field(gt=0)] | None = None
+    acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
+    bending_moment: Annotated[Torque, Field(gt=0)] | None = None
+    stress: Annotated[Pressure, Field(gt=0)] | None = None
+
+    def limit(self, name: str) -> float | None:
+        """What is named for a quantity."""
+        return getattr(self, name) if name in LIMITED else None
+
+
+def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
+    """In which part of the sweep values (in its shape) exceed a threshold: along one swept number, for each value of
+    another where these are few; without one in how many variants."""
+    beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    if axis is None or axis.dim == VARIANT:
+        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+    others = [other for other in results.axes if other.name != axis.name]
+    if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
+        return _along(results, axis, beyond)
+    own = results.everywhere(results.dataset[others[0].name])
+    told = {float(value): _along(results, axis, beyond, own == value) for value in np.unique(own)}
+    if len(set(told.values())) == 1:
+        return next(iter(told.values()))
+    return "; ".join(f"{text} ({others[0].noun} {others[0].in_words(value)})" for value, text in told.items())
+
+
+def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None) -> str:
+    """The parts of a swept number in which any variant (among some) is beyond a threshold, and which these are. A part
+    ends where the number leaves out more than `GAP` times its usual distance: nothing was computed there."""
+    beyond = beyond if among is None else beyond & among
+    along = results.everywhere(results.dataset[axis.name])
+    places = np.unique(along)
+    over = np.isin(places, along[beyond])
+    if not over.any():
+        return f"nowhere from {axis.span}"
+    steps = np.diff(places)
+    apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
+    if over.all() and not apart.size:
+        return f"everywhere from {axis.span}{_common(results, axis, beyond) if among is None else ''}"
+    turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
+    bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
+    parts = [places[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
+    told = [f"at {replace(axis, values=part).span}" for part in parts]
+    if over[-1] and parts[-1].size > 1:
+        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(places[-1])}"
+    if among is None:
+        told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
+    return listed(told) if len(told) <= MOST_PARTS else f"first {told[0]}, last {told[-1]}"
+
+
+def _common(results: Results, along: Axis, which: Mask) -> str:
+    """What else is swept and has not all of its values among some variants, in brackets."""
+    others = [axis for axis in results.axes if axis.name != along.name]
+    values = [np.unique(results.everywhere(results.dataset[axis.name])[which]) for axis in others]
+    pairs = zip(others, values, strict=True)
+    told = [f"{axis.noun} {replace(axis, values=own).span}" for axis, own in pairs if own.size < axis.values.size]
+    return f" ({', '.join(told)})" if told else ""

@@ -1,0 +1,75 @@
+"""What answers say of residual vibrations, and of the documentation's own study of them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+import studies
+from engine.scene.study import Study, load
+from results_schema.errors import BadInput
+from studies.protocol.study import kind_of
+from studies.reporting import answers
+from tests.engine.build import beam, force, study
+
+PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
+MOVE = {"kind": "point-to-point", "start": 0.2, "end": 0.7, "speed": 3.0, "acceleration": 9.0, "dwell": 1.5}
+STEPS = [2, 6, 12, 20, 30]
+SWEPT = {"acceleration": {"of": "carriage.car.motion.acceleration", "values": STEPS}}
+
+
+def stops(kind: str = "passage", **changes: Any) -> Study:
+    """A force that stops on an undamped beam of one mode, with a swept acceleration."""
+    tables = {"output": {"histories": "all", "residual": True}, "solver": {"steps": 2000}, "sweep": SWEPT}
+    return study(beam(modes=1), force(2.0, MOVE), kind=kind, **(tables | changes))
+
+
+@pytest.mark.parametrize("kind", ["passage", "trajectory"])
+def test_it_is_said_where_a_limit_is_exceeded(kind: str) -> None:
+    """With the largest, for which variant; between two accelerations, and not from one on, where it rises and falls."""
+    found = studies.run(stops(kind))
+    sizes = found.midspan_residual.values
+    np.testing.assert_array_equal(sizes > 17e-3, [False, True, True, False, False])
+    assert np.argmax(sizes) == 1
+    limited = studies.run(stops(kind, question={"residual": {"displacement": 17e-3}}))
+    np.testing.assert_array_equal(limited.midspan_residual.values, sizes)
+    (said,) = (text for text in answers.answer(limited) if "at rest" in text)
+    where = "it exceeds 17 mm at 6 m/s² to 12 m/s² of acceleration"
+    assert said.endswith(f"at rest it still swings by up to 19.3 mm at acceleration 6 m/s²; {where}.")
+    (short,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert short == said.replace(f"; {where}", "")
+
+
+def test_what_is_not_asked_is_not_told() -> None:
+    found = studies.run(stops(output={"histories": "none"}))
+    assert not [name for name in found.variables if "residual" in str(name)]
+    assert not [text for text in answers.answer(found) if "at rest" in text]
+
+
+def test_limits_without_results_are_refused() -> None:
+    given = stops(output={"histories": "none"}, question={"residual": {"displacement": 1e-3}})
+    with pytest.raises(BadInput, match=r"question.residual.*residual = true"):
+        kind_of(given)
+
+
+@pytest.mark.parametrize("kind", ["asymmetry", "eigenfrequencies"])
+def test_other_kinds_have_none(kind: str) -> None:
+    motion = {"kind": "out-and-back", "start": 0.2, "end": 0.7, "speed": 1.0, "turn": 0.2, "cycles": 2}
+    given = study(beam(), force(1.0, motion), kind=kind, output={"residual": True})
+    with pytest.raises(BadInput, match=r"output.residual"):
+        kind_of(given).parts(given)
+
+
+def test_the_study_of_the_documentation() -> None:
+    """A gantry after a stop: half the swing is as an engineer's own finite-element model had it, 2 % damping apart."""
+    block = next(b for b in re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S) if "residual" in b)
+    given = load(re.sub(r"from = 1, to = 8, count = 8", "values = [1, 2, 4]", block))
+    found = engine.run(given)
+    half_swing = np.array([2.99, 4.84, 0.95]) * 1e-6
+    first = 1.0 + 0.5 * np.pi * 0.02  # over half of the swing, which spans half a period more
+    assert found.sway_residual.values == pytest.approx(half_swing * first, rel=0.01)

@@ -1,0 +1,116 @@
+"""Residual vibration: how far sensors swing about their static values when all carriages rest, against closed forms, an
+ODE and the kept history."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import engine
+from engine.model.timeline import MOST_STATIONS
+from results_schema.errors import BadInput
+from tests.engine.build import Table, beam, cruise, fixed, force, mass, shuttle, study, under
+
+OMEGA = math.pi**2  # of the first mode of `beam`
+MOVE: Table = {"kind": "point-to-point", "start": 0.2, "end": 0.7, "speed": 1.4, "acceleration": 9.0, "dwell": 1.5}
+RESIDUAL = {"output": {"histories": "all", "residual": True}}
+ONE_MODE = {"static_correction": False, "tolerance": 1e-5}
+
+
+@pytest.mark.parametrize("speed", [0.7, OMEGA / (3.0 * math.pi), 1.4, math.pi])
+def test_after_a_force_has_left(speed: float) -> None:
+    """One mode, undamped: 2 F phi^2 W/w |cos(w T/2)|/(w^2 - W^2) with W = pi v/L, T = L/v: nothing at v = L w/(3 pi),
+    F phi^2 pi/(2 w^2) in resonance."""
+    given = study(beam(modes=1), force(2.0, cruise(0.0, 1.0, speed, after=1.5)), solver=ONE_MODE, **RESIDUAL)
+    found, rate = engine.run(given), math.pi * speed
+    factor = 0.25 * math.pi / OMEGA**2
+    if speed != math.pi:
+        factor = abs(math.cos(0.5 * OMEGA / speed)) / abs(OMEGA**2 - rate**2)
+    static = 2.0 * 2.0 / OMEGA**2
+    expected = 2.0 * 2.0 * 2.0 * rate / OMEGA * factor
+    assert float(found.midspan_residual) == pytest.approx(expected, abs=2e-5 * static)
+    assert found.midspan_residual.attrs["units"] == "m"
+    assert float(found.tolerance.sel(result="midspan_residual")) == 1e-5
+
+
+@pytest.mark.parametrize("jerk", [None, 60.0])
+@pytest.mark.parametrize("scheme", ["average-acceleration", "fox-goodwin", "richardson"])
+def test_after_a_stop(jerk: float | None, scheme: str) -> None:
+    """One damped mode under a force that moves and stops, by an ODE on the motion's own law."""
+    move = MOVE if jerk is None else MOVE | {"jerk": jerk}
+    bed = beam(modes=1, damping_ratio=0.03)
+    given = study(bed, force(2.0, move), solver=ONE_MODE | {"scheme": scheme}, **RESIDUAL)
+    motion = given.carriage["car"].motion
+    end, scale = motion.rests_from * motion.time_scale, motion.time_scale
+
+    def shape(s: float) -> float:
+        return math.sqrt(2.0) * math.sin(math.pi * s)
+
+    def rates(t: float, state: Any) -> list[float]:
+        place = float(motion.path(min(t, end) / scale).S)
+        return [state[1], 2.0 * shape(place) - 0.06 * OMEGA * state[1] - OMEGA**2 * state[0]]
+
+    start = [2.0 * shape(0.2) / OMEGA**2, 0.0]
+    times = np.linspace(end, scale, 20001)
+    at = solve_ivp(rates, (0.0, scale), start, t_eval=times, rtol=1e-11, atol=1e-13, max_step=0.01).y[0]
+    expected = np.abs(shape(0.5) * (at - 2.0 * shape(0.7) / OMEGA**2)).max()
+    found = engine.run(given)
+    assert float(found.midspan_residual) == pytest.approx(expected, abs=2e-5 * float(found.midspan_max))
+    assert expected > 0.01 * float(found.midspan_max)  # so that something was compared
+
+
+@pytest.mark.parametrize("scheme", ["average-acceleration", "richardson"])
+def test_it_is_that_of_the_history(scheme: str) -> None:
+    """Of masses and sensors that move along, in slices of one segment; and extremes count the rest too."""
+    cars = {"car": mass(0.3, MOVE), "next": mass(0.2, MOVE | {"start": 0.9, "end": 0.4, "jerk": 80.0}, delay=0.1)}
+    sensors = {"midspan": fixed(0.5), "below": under("next")}
+    bed = beam(damping_ratio=0.02, own_weight=True)
+    solver = {"scheme": scheme, "steps": 24_000}
+    given = study(bed, cars, sensor=sensors, solver=solver, **RESIDUAL)
+    found = engine.run(given)
+    still = engine.run(study(bed, cars, sensor=sensors, solver={"fidelity": "static"}, **RESIDUAL))
+    ends = [(car.delay or 0.0) + car.motion.rests_from * car.motion.time_scale for car in given.carriage.values()]
+    rest = found.elapsed.values >= max(ends) - 1e-9
+    assert np.count_nonzero(rest) > MOST_STATIONS
+    for name in sensors:
+        history, static = found[name].values, float(still[name].values[-1])
+        expected = float(np.abs(history[rest] - static).max())
+        assert float(found[f"{name}_residual"]) == pytest.approx(expected, rel=1e-6)
+        assert float(found[f"{name}_max"]) == pytest.approx(history.max(), rel=1e-6)
+        assert float(found[f"{name}_min"]) == pytest.approx(history.min(), rel=1e-6)
+        assert float(still[f"{name}_residual"]) <= 1e-14
+
+
+def test_the_rest_changes_no_other_result() -> None:
+    """Extremes, their places and histories have the same bits whether the residual is told or not."""
+    solver = {"steps": 900}
+    told, silent = (
+        engine.run(study(beam(), mass(0.3, MOVE), solver=solver, output={"histories": "all", "residual": residual}))
+        for residual in (True, False)
+    )
+    assert set(told) - set(silent) == {"midspan_residual"}
+    for name in silent:
+        if "result" not in silent[name].dims:
+            close = 1e-14 if name == "midspan_rms" else 0.0
+            np.testing.assert_allclose(told[name].values, silent[name].values, rtol=close, atol=0.0, err_msg=str(name))
+
+
+def test_slowly_there_is_none() -> None:
+    """What is taken off is where the march ends."""
+    slow = MOVE | {"speed": 0.02, "acceleration": 0.001, "jerk": 0.01}
+    bed = beam(damping_ratio=0.1, own_weight=True)
+    found = engine.run(study(bed, mass(0.3, slow), solver={"steps": 20_000, "fidelity": "full"}, **RESIDUAL))
+    assert float(found.midspan_residual) < 1e-4 * float(found.midspan_max)
+
+
+@pytest.mark.parametrize(
+    "motion", [cruise(0.0, 1.0, 1.0), shuttle(0.2, 0.8, 1.0, 0.2, 1), {**MOVE, "dwell": 0.0}], ids=str
+)
+def test_without_a_rest_it_is_refused(motion: Table) -> None:
+    with pytest.raises(BadInput, match=r"output.residual.*rest at its end") as error:
+        engine.run(study(beam(), mass(0.3, motion), **RESIDUAL))
+    assert "dwell" in str(error.value)
