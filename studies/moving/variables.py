@@ -17,14 +17,15 @@ WORDS = {
     "contact_force": "contact force, positive where it presses",
 }
 WORD_OF = {"max": "largest", "min": "smallest"}
-EXTREME = "over all stations; of places, and of sensors that read no rates, also between them by parabolas"
+AT_STATIONS, BETWEEN = "over all stations", "over all stations and, by parabolas, between them"
+OF_SENSORS = f"{BETWEEN} (of velocities and accelerations at stations alone)"
 
 
-def _ends(name: str, units: str, words: str) -> list[Variable]:
+def _ends(name: str, units: str, words: str, meaning: str) -> list[Variable]:
     found = []
     for end in ENDS:
         word = WORD_OF[end]
-        found.append(Variable(f"{name}_{end}", units=units, long_name=f"{word} {words}", meaning=EXTREME))
+        found.append(Variable(f"{name}_{end}", units=units, long_name=f"{word} {words}", meaning=meaning))
         when = f"time of the {word} {words}"
         found.append(Variable(f"{name}_{end}_time", units="s", long_name=when, required=False))
     return found
@@ -48,7 +49,8 @@ def _of_carriages() -> list[Variable]:
     for end, _, _ in OF_CARRIAGES:
         units = UNITS.get(end, "m s-2")
         words = f"{WORDS[end]} of {{carriage}}"
-        found += [*_ends(f"{{carriage}}_{end}", units, words), _history(f"{{carriage}}_{end}", (), units, words)]
+        where = BETWEEN if end == "position" else AT_STATIONS
+        found += [*_ends(f"{{carriage}}_{end}", units, words, where), _history(f"{{carriage}}_{end}", (), units, words)]
     return [
         *found,
         Variable(
@@ -75,7 +77,7 @@ RESULTS = (
         nan_allowed=True,
     ),
     Variable("steps_used", (), "int32", long_name="number of steps used", meaning="over the whole time"),
-    *_ends("{sensor}", "{sensor}", "value of {sensor}"),
+    *_ends("{sensor}", "{sensor}", "value of {sensor}", OF_SENSORS),
     Variable("{sensor}_rms", units="{sensor}", long_name="root mean square of {sensor}", meaning="over the whole time"),
     _history("{sensor}", (), "{sensor}", "history of {sensor}"),
     *_of_carriages(),
