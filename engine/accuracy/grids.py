@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 #: Steps of the grid over a passage, or over a cycle. The cheapest march that holds 1e-2 took
 #: 32 to 64 (208 passages), 50 over a cycle of a shuttle; the 200 phases of kept histories are a multiple of those.
 PASSAGE_STEPS, CYCLE_STEPS = 32, 50
+MODES = (4, 8, 16, 32, 64)  # that loads excite, of levels: 64 are what a beam's closed forms were tested for
+FEWER, LEAST_LEVELS = (2, 1), 3  # the same where 64 modes hold few of them, and the levels that an error is told from
 PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3
 MOST_COMPARED = 4096  # stations of the histories that are compared: 0.5 MB of 16 variants each signal
 KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps took 2.1 s, 3.1 s with 96 MB
@@ -101,6 +103,25 @@ class SceneGrid:
         """Whether the study leaves model, modes or scheme open."""
         solver = self.asked.study.solver
         return bool(open_bodies(self.asked.study)) or solver.fidelity == "auto" or solver.scheme == "auto"
+
+    @cached_property
+    def mode_levels(self) -> tuple[int, ...]:
+        """Numbers of modes of bodies that leave them open, each with twice as many that loads excite as the one before:
+        a frame may have none of these among its first dozen."""
+        names = open_bodies(self.asked.study)
+        parts = [part for part in self.scene.bodies if part.name in names]
+        rigid = max((part.modal.rigid_modes for part in parts), default=0)
+        usual = tuple(modes for modes in MODES if modes > rigid + 1)
+        if all(self.scene.excited(part).all() for part in parts):
+            return usual
+        whole = self.model(self.scene.numerics._replace(modes=MODES[-1]))
+        excited = [np.flatnonzero(whole.excited(part)) + 1 for part in whole.bodies if part.name in names]
+        most = max(part.modal.omega.size for part in whole.bodies if part.name in names)
+        found: set[int] = set()
+        for count in (*usual, *FEWER):
+            if count in usual or len(found) < LEAST_LEVELS:
+                found.add(max(int(modes[count - 1]) if count <= modes.size else most for modes in excited))
+        return tuple(sorted(found))
 
     def model(self, numerics: Numerics) -> SceneModel:
         """The scene with other numerics, the same object for the same."""

@@ -8,7 +8,7 @@ ratios vary by chance, five times that is told where it is far below d, and no l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import (
     AVERAGE_ACCELERATION,
     FOX_GOODWIN,
+    MODES,
     SceneGrid,
     swift_scheme_fits,
     unit_steps,
@@ -32,7 +33,6 @@ from engine.model.numerics import Numerics, open_bodies
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 
-MODES = (4, 8, 16, 32, 64)  # of the levels: 64 are what a beam's closed forms were tested for
 #: Modes x steps over a passage or cycle of one march at most: some ten milliseconds. 24 modes and 4,800 steps hold 1e-3
 #: for the hardest passage of accuracy.md; undamped loads that step on free ends needed a hundred times that at 1e-4.
 MOST_WORK = 3e7
@@ -81,9 +81,8 @@ class Levels(NamedTuple):
 
 def in_full(grid: SceneGrid) -> Levels:
     """The levels with all terms, whatever the study fixes."""
-    return Levels(
-        tuple(Numerics("full", _scheme(grid), True, modes, 2**level) for level, modes in _modes(grid)), "grow"
-    )
+    modes, scheme = grid.mode_levels, _scheme(grid)
+    return Levels(tuple(Numerics("full", scheme, True, count, 2**level) for level, count in enumerate(modes)), "grow")
 
 
 def as_fixed(grid: SceneGrid) -> Levels:
@@ -92,7 +91,7 @@ def as_fixed(grid: SceneGrid) -> Levels:
     scheme: Scheme = own.scheme
     if study.solver.scheme == "auto" and not grid.fixed:
         scheme = _scheme(grid)
-    levels = [modes for _, modes in _modes(grid)] if open_bodies(study) else [0] * (1 if grid.fixed else len(MODES))
+    levels = list(grid.mode_levels) if open_bodies(study) else [0] * (1 if grid.fixed else len(MODES))
     numerics = tuple(own._replace(scheme=scheme, modes=modes) for modes in levels)
     return Levels(numerics, "as the study says" if grid.fixed else "grow")
 
@@ -102,13 +101,6 @@ def _scheme(grid: SceneGrid) -> Scheme:
     which hardly move, would ask for far more steps than average acceleration needs."""
     fits = bool(open_bodies(grid.scene.study)) and swift_scheme_fits(grid.scene)
     return FOX_GOODWIN if fits else AVERAGE_ACCELERATION
-
-
-def _modes(grid: SceneGrid) -> Iterator[tuple[int, int]]:
-    """The levels with their modes; those that hold nothing but motions as a rigid body are left out."""
-    names = open_bodies(grid.scene.study)
-    rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
-    yield from enumerate(modes for modes in MODES if modes > rigid + 1)
 
 
 def is_free(grid: SceneGrid) -> bool:
@@ -196,8 +188,8 @@ def left_over(change: Array, before: Array) -> Array:
 def uncorrected(change: Array, before: Array) -> Array:
     """(R, V) what is left of forces along a track, of which no exact static response is added: with twice the modes
     half of their error stays, so that as much as the change is left; half of the one before it where a level happened
-    to bring none of the modes that matter."""
-    return np.where(np.isinf(change), np.nan, np.fmax(change, 0.5 * before))
+    to bring none of the modes that matter. One change alone (NaN before it) tells nothing."""
+    return np.where(np.isinf(change), np.nan, np.maximum(change, 0.5 * before))
 
 
 def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: Array) -> Converged:

@@ -18,7 +18,7 @@ from engine.model.support_reactions import Place, stand
 from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
 from engine.model.timeline import Rider
 from engine.scene.variants import SpringKeys, keys_of_carriage
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 
@@ -107,9 +107,19 @@ class SceneModel:
     def first_omega(self) -> float:
         """Lowest elastic natural frequency of the leading body that moves its track along the load, rad/s."""
         modal = self.leading_body.modal
-        size = np.abs(modal.shape(np.linspace(0.0, modal.length, PROBED))).max(axis=0)
-        felt = (modal.omega > 0.0) & (size > UNFELT * size.max())
+        felt = (modal.omega > 0.0) & _larger(modal.shape(np.linspace(0.0, modal.length, PROBED)))
         return float(modal.omega[felt if felt.any() else modal.omega > 0.0][0])
+
+    def excited(self, part: BodyPart) -> Mask:
+        """(N,) which modes of a body its loads excite: of a frame, others sway and twist beside them."""
+        modal, x = part.modal, np.linspace(0.0, part.modal.length, PROBED)
+        found = (modal.omega == 0.0) | _larger(modal.shape(x))
+        if modal.points is not None:
+            found |= _larger(modal.points.shapes)
+        pushes = any(carriage.pushes_along and carriage.on == part.name for carriage in self.study.carriage.values())
+        if pushes and modal.along is not None:
+            found |= _larger(modal.along.derivatives(x, (0,))[0])
+        return np.asarray(found)
 
     @property
     def riders(self) -> tuple[Rider, ...]:
@@ -239,6 +249,12 @@ def build_model(
     )
     _check_rigid_modes(model)
     return model
+
+
+def _larger(shapes: Array) -> Mask:
+    """(N,) which modes of shapes (S, N) are more than rounding."""
+    size = np.abs(shapes).max(axis=0)
+    return np.asarray(size > UNFELT * size.max())
 
 
 def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:

@@ -22,6 +22,7 @@ from engine.accuracy.reference import (
     uncorrected,
 )
 from engine.accuracy.results import differences, results_of
+from engine.batch.plan import make_plan
 from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import outcome
 from engine.scene.study import Study
@@ -29,6 +30,7 @@ from results_schema.status import Status
 from tests.accuracy.passages import OPEN, WEIGHT, only_grid, passages
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.reference import values
+from tests.studies.at_rest import PORTAL
 
 PART = 0.1  # of the tolerance by which an answer may still change
 
@@ -210,4 +212,26 @@ def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_miss
         change, before = np.array([[left[1] - left[2]]]), np.array([[left[0] - left[1]]])
         assert 0.9 * left[2] < uncorrected(change, before).item() < 3.0 * left[2]
     assert np.isnan(uncorrected(np.array([np.inf]), np.array([1.0]))).all()
-    assert uncorrected(np.array([0.2]), np.array([np.nan])).item() == 0.2
+    assert np.isnan(uncorrected(np.array([0.2]), np.array([np.nan]))).all()
+
+
+def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
+    """A portal so slender across its plane that its first dozen modes sway and twist there, beside 60 modes; a beam,
+    all of whose modes are excited."""
+    way = cruise(0.5, 3.5, 60.0)
+    slim = {"box": PORTAL["section"]["box"] | {"second_moment_lateral": 2e-7, "torsion_constant": 1e-6}}
+    sensor = {"middle": {"body": "portal", "at": 2.0}}
+
+    def run(**modes: int) -> Any:
+        portal = PORTAL | {"section": slim, "damping_ratio": 0.02} | modes
+        car = {"car": {"on": "portal", "kind": "mass", "mass": 400.0, "motion": way}}
+        scene = Study(kind="passage", body={"portal": portal}, carriage=car, sensor=sensor, solver={"tolerance": 1e-3})
+        return studies.run(scene), scene
+
+    (found, scene), (truth, _) = run(), run(modes=60)
+    levels = make_plan(scene).grids[0].mode_levels
+    assert levels[0] > 12 and list(levels) == sorted(levels) and len(levels) >= 3
+    off = abs(float(found.middle_max - truth.middle_max)) / float(found.middle_max / found.dynamic_amplification[0])
+    assert off <= float(found.estimated_error.sel(result="middle_max")) + 1e-4
+    assert abs(float(found.dynamic_amplification[0]) - 1.0) > 1e-2  # what no mode of the first dozen tells
+    assert only_grid(passages(sweep={})).mode_levels == (4, 8, 16, 32, 64)
