@@ -137,6 +137,9 @@ class Parts(Protocol):
     disk_bytes: int
     remarks: Sequence[str]
 
+    def check_memory(self) -> None:
+        """Raise BadInput where the results are more than memory holds, for whom keeps them there."""
+
     def compute(self, store: Store, work: Work) -> int:
         """Compute what the store does not hold yet; the number of those that it held. Raises Interrupted."""
 
@@ -165,6 +168,12 @@ class Variants:
         # The parts, the archive, and results on their way from these to that where they do not fit into memory.
         self.disk_bytes = 2 * self.plan.disk_bytes + (self.plan.disk_bytes - self.plan.gathered_bytes)
         self.remarks = tuple(remarks(self.plan))
+
+    def check_memory(self) -> None:
+        """Raise BadInput where the results are more than memory holds."""
+        from engine.batch.plan import check_memory
+
+        check_memory(self.plan.study, self.plan.size, self.plan.disk_bytes)
 
     def compute(self, store: Store, work: Work) -> int:
         """March what the store does not hold yet."""
@@ -347,6 +356,9 @@ class Pieces:
             return 0 if wanted == "auto" else min(int(wanted), cases.size)
         whole = sum(piece.seconds for piece in self.pieces)
         return enough(cases.size, whole, lambda count: count * self.kind.audit_seconds * whole / cases.size)
+
+    def check_memory(self) -> None:
+        """Pieces are small, or refused where they are planned."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Another process makes them of the study."""

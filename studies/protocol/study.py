@@ -266,12 +266,10 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     options: progress and chunk, and where to run, as of `engine.run`.
     """
     from engine.batch.places import Where, place
-    from engine.batch.plan import check_memory
 
     started = time.perf_counter()
     parts, store = kind_of(study).parts(study), Memory()
-    if isinstance(parts, Variants):
-        check_memory(study, parts.plan.size, parts.plan.disk_bytes)
+    parts.check_memory()
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
     with place(**where) as here:
         parts.compute(store, Work(place=here, **options))
