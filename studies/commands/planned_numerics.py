@@ -58,8 +58,8 @@ def _largest(plan: Plan, error: Array) -> Array:
 
 
 def rows(parts: Sequence[Part]) -> list[tuple[str, ...]]:
-    """One row per model, number of modes and scheme, cheapest first: variants, steps over one
-    passage or cycle, the largest error that is estimated for what is held, and over its tolerance."""
+    """One row per model, number of modes and scheme, cheapest first: variants, steps over one passage
+    or cycle, the largest error that is estimated for what is held, and over its tolerance."""
     kinds: dict[tuple[int, int, int], list[Part]] = {}
     for part in parts:
         kind = tuple(int(part.used[f"{name}_used"][0]) for name in ("fidelity", "modes", "scheme"))

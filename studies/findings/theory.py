@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.model.scene_model import SceneModel
+from engine.model.scene_model import PROBED, UNFELT, SceneModel
 from results_schema.arrays import Array
 from results_schema.late import interpolate, xr
 from studies.results.results import Results
@@ -16,8 +16,7 @@ CYCLE_POINTS = 720
 ORDERS = (2, 4, 6, 8)  # harmonics that a shuttle about the middle excites
 ONE_PEAK = 1 / 8
 NEARLY = 0.01  # of the length: what counts as the middle
-PLACES = 65  # of the track, where shapes are looked at
-UNFELT, MOSTLY = 1e-6, 0.5  # of a motion, and of a deflection
+MOSTLY = 0.5  # of a deflection: more than all other modes together
 LONG_SWING = 0.45  # of the length: an amplitude that reaches the ends
 _PLACES = ("centre", "amplitude")
 
@@ -74,7 +73,7 @@ def first_mode_bears(results: Results) -> bool:
         omega, shapes = 2.0 * np.pi * recorded["frequency"].values, recorded["mode_shape"].values.T
     else:
         modal = _model(results, {}).leading_body.modal
-        omega, shapes = modal.omega, modal.shape(np.linspace(0.0, modal.length, PLACES))
+        omega, shapes = modal.omega, modal.shape(np.linspace(0.0, modal.length, PROBED))
     elastic = omega > 0.0
     borne = np.mean(shapes[:, elastic] ** 2, axis=0) / omega[elastic] ** 2
     felt = np.flatnonzero(borne > UNFELT**2 * borne.max())

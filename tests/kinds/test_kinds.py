@@ -15,12 +15,14 @@ from engine.batch.execution import run
 from engine.observation.cycle_reduction import Compared
 from engine.scene.variants import VariantValues
 from results_schema.errors import ArchiveError, BadInput
+from results_schema.status import Status
 from results_schema.variables import registered
 from studies.findings import theory
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.protocol import study as running
 from studies.protocol.study import kind_of
 from studies.reporting import answers
+from studies.results.findings_common import missed_most
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, force, oscillator, shuttle, study, under
@@ -234,6 +236,17 @@ def test_all_axles_that_lift_off_are_told_before_other_sensors() -> None:
     assert f" So would {other} in {counts[other]}. The equations assume contact" in said[1]
     heavy = scenes.run("passage", f"{scenes.pace('passage', 20, 30, 3)}\n{MASSES}")
     assert "with a contact that opens in every variant, the largest" in answers.answer(heavy)[0]
+
+
+def test_a_missed_tolerance_names_its_result() -> None:
+    """The one furthest beyond, among the variants that say so."""
+    dataset = scenes.run("passage", scenes.pace("passage")).copy(deep=True)
+    assert missed_most(Results.of(dataset)) == ""
+    dataset["status"].values[:2] = Status.TOLERANCE_MISSED
+    results, error = list(dataset["result"].values), dataset["estimated_error"].values
+    error[:, results.index("midspan_max")] = [np.nan, 0.03, 0.0, 0.5]
+    error[:, results.index("moment_min")] = [0.02, 0.0, 0.9, 0.9]
+    assert missed_most(Results.of(dataset)) == " (most of all for midspan_max: 3e-2 where 1e-3 was asked)"
 
 
 @pytest.mark.parametrize("part", [{"pace": 0}, {"pace": slice(0, 2)}])
