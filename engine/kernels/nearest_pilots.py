@@ -11,20 +11,32 @@ def nearest(points, pilots, found):
     k = found.shape[1]
     distance, apart = np.empty(k), np.empty(pilots.shape[1])
     for v in range(points.shape[0]):
-        distance[:] = np.inf
-        found[v] = 0
         apart[:] = 0.0
         for d in range(points.shape[1]):
             at = points[v, d]
             for p in range(pilots.shape[1]):
                 apart[p] += (at - pilots[d, p]) ** 2
-        for p in range(pilots.shape[1]):
-            if apart[p] < distance[k - 1]:
-                place = k - 1
-                while place > 0 and apart[p] < distance[place - 1]:
-                    distance[place], found[v, place] = distance[place - 1], found[v, place - 1]
-                    place -= 1
-                distance[place], found[v, place] = apart[p], p
+        farthest = 0.0  # of those of the point before: k pilots are no farther, so that few need to be sorted
+        for p in found[v - 1] if v > 0 else found[:0, 0]:
+            farthest = max(farthest, apart[p])
+        _sorted_within(apart, farthest if v > 0 else np.inf, distance, found[v])
+        if v > 0 and distance[k - 1] == np.inf:
+            _sorted_within(apart, np.inf, distance, found[v])
+
+
+@piece
+def _sorted_within(apart, farthest, distance, found):
+    """found (k,): numbers of the least of ``apart`` (P,) that are no more than ``farthest``; distance (k,): these."""
+    k = found.size
+    distance[:] = np.inf
+    found[:] = 0
+    for p in range(apart.size):
+        if apart[p] <= farthest and apart[p] < distance[k - 1]:
+            place = k - 1
+            while place > 0 and apart[p] < distance[place - 1]:
+                distance[place], found[place] = distance[place - 1], found[place - 1]
+                place -= 1
+            distance[place], found[place] = apart[p], p
 
 
 @piece
@@ -45,17 +57,12 @@ def worst_but_one(held, rung, near, limit):
 def cheapest(held, worth, neighbours, limit, found):
     """found (V,): the first rung that holds by `worst_but_one` of a variant's neighbours (V, k) with its ``limit``
     (V,); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
-    rungs, spared = held.shape[2], 1 if neighbours.shape[1] > 1 else 0
-    missed = np.empty(rungs, dtype=np.int64)  # by so many neighbours
+    missed = np.empty(AT_ONCE, dtype=np.int64)
     for v in range(neighbours.shape[0]):
-        missed[:] = 0
-        for p in neighbours[v]:
-            for rung in range(rungs):
-                missed[rung] += (held[p, 0, rung] > limit[v]) | (held[p, 1, rung] > 1.0)
         found[v] = -1
-        for rung in range(rungs):
-            if missed[rung] <= spared:
-                found[v] = rung
+        for first in range(0, held.shape[2], AT_ONCE):
+            found[v] = _first_held(held, first, neighbours[v], limit[v], missed)
+            if found[v] >= 0:
                 break
         if found[v] < 0:
             least = np.inf
@@ -68,6 +75,22 @@ def cheapest(held, worth, neighbours, limit, found):
             found[v] = worth - 1 if found[v] < 0 else found[v]
 
 
+@piece
+def _first_held(held, first, near, limit, missed):
+    """The first of AT_ONCE rungs, from ``first`` on, that all but one of the pilots ``near`` (k,) hold, all if k = 1; -1
+    where there is none. missed (AT_ONCE,): room for by how many each is missed."""
+    missed[:] = 0
+    for p in near:
+        following, own = held[p, 0][first : first + AT_ONCE], held[p, 1][first : first + AT_ONCE]
+        for rung in range(following.size):
+            missed[rung] += (following[rung] > limit) | (own[rung] > 1.0)
+    for rung in range(min(AT_ONCE, held.shape[2] - first)):
+        if missed[rung] <= (1 if near.size > 1 else 0):
+            return first + rung
+    return -1
+
+
+AT_ONCE = 64  # rungs that are looked at together: most variants find theirs among the first
 ALIKE = 1.25  # times the least error: as good as that, where none is small enough
 
 

@@ -39,10 +39,11 @@ def cheapest_by_numpy(held: Array, worth: int, neighbours: Any, limit: Array) ->
 
 
 def given_numbers(seed: int) -> tuple[Array, Array, Array, Array]:
-    """Points on a coarse lattice, so that many distances are equal, and errors, some of them unknown."""
+    """Points on a coarse lattice, so that many distances are equal, and errors on 150 rungs, more than are looked at
+    together, the cheaper ones the larger, some of them unknown."""
     random = np.random.default_rng(seed)
     points, pilots = (random.integers(0, 6, (size, 3)) / 4.0 for size in (50, 20))
-    held = np.exp(random.normal(0.0, 2.0, (20, 2, 15)) - np.array([0.0, 1.0])[:, None])
+    held = np.exp(random.normal(0.0, 1.5, (20, 2, 150)) + np.linspace(6.0, 0.0, 150) - np.array([[0.0], [1.0]]))
     held[random.random(held.shape) < 0.1] = np.inf
     return points, pilots, held, np.exp(random.normal(0.0, 1.0, 50))
 
@@ -51,7 +52,7 @@ def by_kernels(seed: int) -> tuple[Any, Any]:
     points, pilots, held, limit = given_numbers(seed)
     neighbours, rung = np.empty((50, 4), dtype=np.int32), np.empty(50, dtype=np.int32)
     nearest(points, np.ascontiguousarray(pilots.T), neighbours)
-    cheapest(held, 9, neighbours, limit, rung)
+    cheapest(held, 90, neighbours, limit, rung)
     return neighbours, rung
 
 
@@ -60,7 +61,7 @@ def test_kernels_are_their_numpy_twins(seed: int) -> None:
     points, pilots, held, limit = given_numbers(seed)
     neighbours, rung = by_kernels(seed)
     np.testing.assert_array_equal(neighbours, near_by_numpy(points, pilots, 4))
-    np.testing.assert_array_equal(rung, cheapest_by_numpy(held, 9, neighbours, limit))
+    np.testing.assert_array_equal(rung, cheapest_by_numpy(held, 90, neighbours, limit))
     assert len(np.unique(rung)) > 3
 
 
