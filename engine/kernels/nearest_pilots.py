@@ -77,8 +77,8 @@ def cheapest(held, worth, neighbours, limit, found):
 
 @piece
 def _first_held(held, first, near, limit, missed):
-    """The first of AT_ONCE rungs, from ``first`` on, that all but one of the pilots ``near`` (k,) hold, all if k = 1; -1
-    where there is none. missed (AT_ONCE,): room for by how many each is missed."""
+    """The first of AT_ONCE rungs, from ``first`` on, that all but one of the pilots ``near`` (k,) hold, all if k = 1;
+    -1 where there is none. missed (AT_ONCE,): room for by how many each is missed."""
     missed[:] = 0
     for p in near:
         following, own = held[p, 0][first : first + AT_ONCE], held[p, 1][first : first + AT_ONCE]
