@@ -106,15 +106,15 @@ def told_errors(error, march, rung, neighbours, found):
     """found (R, V): the largest but one, the only one if k = 1, of the errors (M, R) of the marches (rungs, P) that
     tell a variant's neighbours (V, k) of its rung (V,); NaN where that is not finite: NaN counts as the largest."""
     few = neighbours.shape[1] == 1
+    worst, second = np.empty(error.shape[1]), np.empty(error.shape[1])
     for v in range(neighbours.shape[0]):
-        for r in range(error.shape[1]):
-            worst = second = -np.inf
-            for p in neighbours[v]:
-                own = error[march[rung[v], p], r]
-                own = own if np.isfinite(own) else np.inf
-                if own > worst:
-                    worst, second = own, worst
-                elif own > second:
-                    second = own
-            told = worst if few else second
+        worst[:] = second[:] = -np.inf
+        for p in neighbours[v]:
+            of_march = error[march[rung[v], p]]
+            for r in range(worst.size):
+                own = of_march[r] if np.isfinite(of_march[r]) else np.inf
+                second[r] = max(second[r], min(worst[r], own))
+                worst[r] = max(worst[r], own)
+        for r in range(worst.size):
+            told = worst[r] if few else second[r]
             found[r, v] = told if np.isfinite(told) else np.nan
