@@ -67,13 +67,16 @@ def neighbour_errors_of(
     decisive = deciding(results, asked.study.solver.tolerance)
     follow = tuple(r if r.follows else r._replace(tolerance=np.nan) for r in decisive)
     parts = follow, tuple(r._replace(tolerance=np.nan) if r.follows else r for r in decisive)
-    margin, held_margin = _margins(measured, others, len(results), (TELLING[0] * span[0], TELLING[1] * span[1]))
-    margin = np.where(np.isfinite(tolerances(decisive)), held_margin, margin)
+    telling = TELLING[0] * span[0], TELLING[1] * span[1]
+    whole = worst_held(measured.error.T, decisive)[measured.march]  # with what the study fixes
+    margin, worst_margin = _margins(measured, whole, others, telling)
+    margin = np.where(np.isfinite(tolerances(decisive)), worst_margin, margin)
     error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
     if measured.free:  # what is told is what decides
         wanted = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
         held, wanted = (_by_rung([worst_held(e.T, part)[measured.march] for part in parts]) for e in (error, wanted))
     else:
+        _, held_margin = _margins(measured, measured.held, others, telling)
         held = _by_rung(
             [np.where(np.isfinite(tolerances(part)).any(), held_margin * measured.held, 0.0) for part in parts]
         )
@@ -108,17 +111,19 @@ def _by_rung(held: Sequence[Array]) -> Array:
     return np.ascontiguousarray(np.moveaxis(found, -1, 0))
 
 
-def _margins(measured: Measured, others: Numbers, results: int, telling: tuple[float, float]) -> tuple[Array, float]:
+def _margins(measured: Measured, worst: Array, others: Numbers, telling: tuple[float, float]) -> tuple[Array, float]:
     """(R,) what a pilot's neighbours tell of its errors must be multiplied with to be no less than these, for all but a
-    few; and the same of what is held, for errors about the tolerance."""
+    few; and the same of the ``worst`` (columns, cuts, P) of some of them, where these matter on rungs that variants may
+    take."""
     if not others.shape[1]:
-        return np.ones(results), 1.0
-    held, march = measured.held[measured.marched], measured.march[measured.marched]
-    most = worst_but_one(held[:, others], axis=2)
-    near = np.nonzero(np.isfinite(most) & np.isfinite(held) & (most > telling[0]) & (most < telling[1]))
+        return np.ones(measured.error.shape[1]), 1.0
+    worst, held, march = worst[measured.marched], measured.held[measured.marched], measured.march[measured.marched]
+    most, most_held = (worst_but_one(part[:, others], axis=2) for part in (worst, held))
+    matter = np.isfinite(most) & np.isfinite(worst) & (most > telling[0])
+    near = np.nonzero(matter & (most_held < telling[1]))
     own = measured.error[march[near]]
     tell = worst_but_one(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
-    return np.array([_quantile(own[:, r], tell[:, r]) for r in range(results)]), _quantile(held[near], most[near])
+    return np.array([_quantile(*pair) for pair in zip(own.T, tell.T, strict=True)]), _quantile(worst[near], most[near])
 
 
 def _quantile(own: Array, told: Array) -> float:

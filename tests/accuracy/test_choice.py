@@ -13,7 +13,7 @@ from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, NEIGHBOURS, PILOT
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
-from engine.kernels.nearest_pilots import ALIKE, cheapest, held_errors, nearest, told_errors
+from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
 from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.accuracy.chosen import SPEEDS, STUDIES, TOLERANCE, executed, observed, run_of
@@ -63,26 +63,6 @@ def test_kernels_are_their_numpy_twins(seed: int) -> None:
     np.testing.assert_array_equal(neighbours, near_by_numpy(points, pilots, 4))
     np.testing.assert_array_equal(rung, cheapest_by_numpy(held, 90, neighbours, limit))
     assert len(np.unique(rung)) > 3
-
-
-@pytest.mark.parametrize("near", (4, 1))
-def test_errors_told_are_the_largest_but_one_of_the_neighbours(near: int) -> None:
-    random = np.random.default_rng(near)
-    error = np.exp(random.normal(size=(60, 3)))
-    error[random.random(error.shape) < 0.2], error[0] = np.nan, np.inf
-    march, neighbours = random.integers(0, 60, (7, 20)).astype(np.int32), random.integers(0, 20, (50, near))
-    rung, told = random.integers(0, 7, 50).astype(np.int32), np.empty((3, 50))
-    told_errors(error, march, rung, neighbours.astype(np.int32), told)
-    of_marches = error[march[rung[:, None], neighbours]]
-    expected = np.sort(np.where(np.isnan(of_marches), np.inf, of_marches), axis=1)[:, max(0, near - 2)].T
-    assert np.isinf(expected).any() and np.isfinite(expected).any()
-    np.testing.assert_array_equal(told, np.where(np.isinf(expected), np.nan, expected))
-
-    held, limit, worst = np.exp(random.normal(size=(20, 2, 7))), np.exp(random.normal(size=50)), np.empty(50)
-    held_errors(held, rung, neighbours.astype(np.int32), limit, worst)
-    own = held[neighbours, :, rung[:, None]]
-    both = np.maximum(own[..., 0] / limit[:, None], own[..., 1])
-    np.testing.assert_array_equal(worst, np.sort(both, axis=1)[:, max(0, near - 2)])
 
 
 def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
