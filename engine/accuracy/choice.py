@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
+from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
 from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
@@ -188,7 +188,7 @@ class Pilots(NamedTuple):
     grids: Sequence[SceneGrid]
     span: tuple[float, float]
 
-    def measured(self, pilots: Counts, scene: int, share: Share) -> tuple[int, Counts, Measured]:
+    def measured(self, pilots: Counts, share: Share, scene: int) -> tuple[int, Counts, Measured]:
         """What some pilots of a scene find; with its number and theirs. Raises Halted, and Crashed."""
         grid = self.grids[scene]
         # Pilots serve the tightest that has them for neighbours.
@@ -197,10 +197,6 @@ class Pilots(NamedTuple):
             return scene, pilots, Climb(grid.of_pilots(), values, self.ladder(scene), share, self.span).go()
         except Crashed as crashed:
             raise Crashed(pilots[crashed.lanes]) from None
-
-    def measured_in_turn(self, pilots: Counts, halted: Halted, scene: int) -> tuple[int, Counts, Measured]:
-        """The same as a job of its own."""
-        return self.measured(pilots, scene, InTurn(halted))
 
     def ladder(self, scene: int) -> Ladder:
         """The ladder of a scene."""
@@ -234,19 +230,11 @@ class Kept(Protocol):
 
 def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Found:
     """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find. Raises Halted, and Crashed
-    by flat numbers of pilots.
-
-    The marches of a single scene are shared out, several scenes are as wholes, as jobs that wait for jobs would hold
-    threads."""
+    by flat numbers of pilots."""
     parts = [drawn[np.isin(drawn, part)] for part in members]
-    of_scenes = [(scene, own) for scene, own in enumerate(parts) if own.size]
-    if len(of_scenes) == 1:
-        found = [pilots.measured(of_scenes[0][1], of_scenes[0][0], share)]
-    else:
-        jobs = [Job(partial(Pilots.measured_in_turn, scene=scene), own) for scene, own in of_scenes]
-        found = sorted(share(pilots, jobs), key=lambda one: (one[0], one[1][0]))
+    found = sorted(over_scenes(share, pilots, Pilots.measured, parts), key=lambda one: (one[0], one[1][0]))
     order = np.concatenate([own for _, own, _ in found])
-    return Found(of_scenes[0][0], order, _joined([measured for *_, measured in found]))
+    return Found(found[0][0], order, _joined([measured for *_, measured in found]))
 
 
 class _Neighbours(NamedTuple):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from engine.kernels.schemes import SCHEMES
-from engine.march.envelopes import with_companions
+from engine.march.envelopes import envelope_tables
 from engine.march.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
 from engine.march.tables import SceneTables
 from engine.model.numerics import open_bodies
@@ -57,15 +57,7 @@ class SceneGrid:
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process makes the same of: without what was built meanwhile."""
-        return {
-            "asked": self.asked,
-            "scene": self.scene,
-            "values": self.values,
-            "unit": self.unit,
-            "places": self.places,
-            "_models": {},
-            "_readings": {},
-        }
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {"_models": {}, "_readings": {}}
 
     @cached_property
     def grid(self) -> Grid:
@@ -147,7 +139,8 @@ class SceneGrid:
         free_by = self.free_by(model, by * stride) // stride
         found.timeline = refined(self.grid.timeline(by, free_by), stride)
         found.statics = self._statics(model, (by * stride, free_by * stride), found.timeline)
-        return with_companions(found, self.places)
+        found.companions = envelope_tables(found, self.places)
+        return found
 
     def _statics(self, model: SceneModel, by: tuple[int, int], timeline: Timeline) -> Statics:
         """Static readings along a timeline of so many steps in one of the grid's and of its free vibration: where all

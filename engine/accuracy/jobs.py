@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 from results_schema.arrays import Counts
@@ -36,6 +37,23 @@ class Crashed(Exception):
     def __init__(self, lanes: Counts) -> None:
         super().__init__(lanes)
         self.lanes = lanes
+
+
+def over_scenes(share: Share, subject: Any, function: Callable[..., T], parts: Sequence[Counts]) -> list[T]:
+    """What a function of the subject, some variants, what shares their jobs out and their scene finds of every scene's
+    part of the variants, in any order.
+
+    The marches of a single scene are shared out, several scenes are as wholes, as jobs that wait for jobs would hold
+    threads."""
+    scenes = [(scene, part) for scene, part in enumerate(parts) if part.size]
+    if len(scenes) == 1:
+        return [function(subject, part, share, scene) for scene, part in scenes]
+    jobs = [Job(partial(_whole_scene, function=function, scene=scene), part) for scene, part in scenes]
+    return list(share(subject, jobs))
+
+
+def _whole_scene(subject: Any, lanes: Counts, halted: Halted, function: Callable[..., T], scene: int) -> T:
+    return function(subject, lanes, InTurn(halted), scene)
 
 
 @dataclass(frozen=True)

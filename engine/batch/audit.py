@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, USED
-from engine.accuracy.jobs import Crashed, Halted, InTurn, Job, Share
+from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
 from engine.accuracy.ladder import REFERENCE_PART
 from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, usual_work
 from engine.accuracy.results import differences, results_of
@@ -115,10 +115,7 @@ def audit(plan: Plan, variants: Counts, share: Share = IN_TURN) -> Audit:
     """Compute some variants again, by jobs that ``share`` does: the marches of a single scene, or scenes as wholes.
     Raises Halted, and Crashed by flat numbers of variants."""
     parts = [variants[_among(variants, members, plan.size)] for members in plan.members]
-    of_scenes = [(scene, own) for scene, own in enumerate(parts) if own.size]
-    if len(of_scenes) == 1:
-        return joined(_of_scene(plan, *of_scenes[0], share), plan, variants.size)
-    found = share(plan, [Job(partial(_in_turn, scene=scene), own) for scene, own in of_scenes])
+    found = over_scenes(share, plan, _of_scene, parts)
     return joined([one for ones in found for one in ones], plan, variants.size)
 
 
@@ -129,12 +126,7 @@ def _among(some: Counts, variants: Counts, size: int) -> Mask:
     return np.asarray(held[some])
 
 
-def _in_turn(plan: Plan, own: Counts, halted: Halted, scene: int) -> list[Audit]:
-    """The audit of some variants of a scene as one job."""
-    return _of_scene(plan, scene, own, InTurn(halted))
-
-
-def _of_scene(plan: Plan, scene: int, own: Counts, share: Share) -> list[Audit]:
+def _of_scene(plan: Plan, own: Counts, share: Share, scene: int) -> list[Audit]:
     """The audit of some variants of a scene, group by group."""
     grid = plan.grids[scene]
     values = VariantValues.of(grid.scene.study, plan.cases, own)

@@ -255,7 +255,8 @@ def make_plan(
     check_moves(study)
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"
-    asked = Asked(study, reduction, window, reads_accelerations(results))
+    accelerated = "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
+    asked = Asked(study, reduction, window, accelerated)
     check_memory(study, cases.size, min(IN_MEMORY, 8 * cases.size * numbers_per_variant(asked)))
     grids, members = [], []
     for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):
@@ -277,7 +278,8 @@ def _grids(
     if scene.fidelity is Fidelity.STATIC or not values.has_fixed_steps:
         if scene.fidelity is not Fidelity.STATIC:
             check_slowest(scene, values)
-            check_springs(scene)
+            if scene.springs:
+                check_free_vibration(scene)
         yield SceneGrid(asked, scene, values, unit_steps(scene)), variants
         return
     steps = values.steps
@@ -287,12 +289,6 @@ def _grids(
     for lanes in split(np.arange(variants.size), steps):
         unit = int(steps[lanes[0]]) // scene.scheme.stride
         yield SceneGrid(asked, scene, values.part(lanes), unit), variants[lanes]
-
-
-def check_springs(scene: SceneModel) -> None:
-    """Refuse free vibration with springs by a conditionally stable scheme. Raises BadInput."""
-    if scene.springs:
-        check_free_vibration(scene)
 
 
 def check_readings(scene: SceneModel, window: Window) -> None:
@@ -314,11 +310,6 @@ def check_readings(scene: SceneModel, window: Window) -> None:
         if not seen:
             what = "the carriage is off its body for all of the recorded part, so the sensor reads nothing"
             raise scene.study.source.fault(f"sensor.{sensor.name}.under", what, expected="a carriage on its body")
-
-
-def reads_accelerations(results: str) -> bool:
-    """Whether the results of this kind include the accelerations of the carriages."""
-    return "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
 
 
 def numbers_per_variant(asked: Asked) -> int:

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.march.tables import SceneTables
-from engine.model.timeline import coarsened
 from engine.observation.readings import Sensor
-from engine.scene.sensors import MOST_PLACES
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
@@ -91,25 +89,10 @@ class EnvelopeTables(SceneTables):
             place.together.known.clear()
         return found
 
-    @cached_property
-    def coarser(self) -> SceneTables:
-        """The same with half the steps, for a Richardson pair."""
-        found = EnvelopeTables(
-            self.model, self.steps // 2, self.window, refinement=self.refinement // 2, places=self.places
-        )
-        found.timeline = coarsened(self.timeline, 2)
-        return found
 
-
-def with_companions(tables: SceneTables, most: int = MOST_PLACES) -> SceneTables:
-    """Tables together with those of the marches that watch the envelopes, at so many places of each."""
-    tables.companions = envelope_tables(tables, most)
-    return tables
-
-
-def envelope_tables(tables: SceneTables, most: int = MOST_PLACES) -> tuple[EnvelopeTables, ...]:
-    """The tables of the marches that watch the envelopes of a scene: one, or several for groups of places where the
-    histories are long."""
+def envelope_tables(tables: SceneTables, most: int) -> tuple[EnvelopeTables, ...]:
+    """The tables of the marches that watch the envelopes of a scene, at so many places of each: one, or several for
+    groups of places where the histories are long."""
     model, count = tables.model, sum(min(most, e.places) for e in tables.model.study.envelope.values())
     if not count:
         return ()

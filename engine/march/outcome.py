@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -78,13 +79,7 @@ class Outcome:
 
     def replaced(self, lanes: Counts, other: Outcome) -> Outcome:
         """The same with the outcome of other marches for some of the variants, at the same stations."""
-        found = Outcome(
-            {name: array.copy() for name, array in self.numbers.items()},
-            self.history.copy(),
-            self.status.copy(),
-            self.diverged_step.copy(),
-            self.scale.copy(),
-        )
+        found = deepcopy(self)
         for name, array in found.numbers.items():
             array[lanes] = other.numbers[name]
         found.history[..., lanes] = other.history

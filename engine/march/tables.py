@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -63,10 +63,10 @@ class SceneTables:
     stops: Literal["events", "kinks"] = "events"
     companions: tuple[SceneTables, ...] = ()
     kept_bytes: int = KEPT_BYTES
-    _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
-    _next: dict[SegmentKey, SegmentTable] = field(default_factory=dict)
-    _missed: dict[SegmentKey, Missed] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict, init=False)
+    _next: dict[SegmentKey, SegmentTable] = field(default_factory=dict, init=False)
+    _missed: dict[SegmentKey, Missed] = field(default_factory=dict, init=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     @cached_property
     def timeline(self) -> Timeline:
@@ -93,7 +93,8 @@ class SceneTables:
         """The same with half the steps, for a Richardson pair; ``refinement`` must be even."""
         if self.refinement % 2:
             raise ValueError(f"refinement: expected an even number, received {self.refinement}")
-        found = SceneTables(self.model, self.steps // 2, self.window, self.readings, self.refinement // 2)
+        half = self.steps // 2, self.refinement // 2
+        found = replace(self, steps=half[0], refinement=half[1], companions=(), kept_bytes=KEPT_BYTES)
         found.timeline = coarsened(self.timeline, 2)
         return found
 

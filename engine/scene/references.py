@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
@@ -21,28 +21,18 @@ if TYPE_CHECKING:
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 
+NO_RESULTS = ("body", "load", "spring", "arm", "robot")  # tables whose names stand in no result
+NAMED = (*NO_RESULTS, "train", "carriage", "sensor", "envelope", "sweep")
+
 
 def check_names(study: Study) -> None:
     """Names that can stand in an archive, and results that do not collide. Raises BadInput."""
-    tables: dict[str, Iterable[str]]
-    tables = {
-        "body": study.body,
-        "load": study.load,
-        "spring": study.spring,
-        "arm": study.arm,
-        "robot": study.robot,
-        "train": study.train,
-        "carriage": study.carriage,
-        "sensor": study.sensor,
-        "envelope": study.envelope,
-        "sweep": study.sweep.axes,
-    }
-    for table, names in tables.items():
-        for name in names:
+    for table in NAMED:
+        for name in getattr(study, table) if table != "sweep" else study.sweep.axes:
             where = study.source.where(f"{table}.{name}")
             if not NAME.fullmatch(name):
                 raise BadInput("not a usable name", where=where, expected="letters, digits and _, a letter first")
-            if table not in ("body", "load", "spring", "arm", "robot") and name in RESERVED:
+            if table not in NO_RESULTS and name in RESERVED:
                 raise BadInput("this name is reserved for results", where=where, remedy="choose another name")
     study.results("march")
 

@@ -117,14 +117,19 @@ def full_body(study: Study, name: str) -> FullBody:
     raise study.source.fault(f"body.{name}.kind", what, expected='"frame", "beam" or "rigid"', received=received)
 
 
-def _whole_beam(study: Study, name: str, beam: Beam) -> FullBody:
+def _full_beam(study: Study, name: str, beam: Beam) -> FullBody:
     frame = frame_of_beam(study, name, beam)
-    return _full_frame(study, name, frame, _only_bending(assemble(frame)))
+    return _assembled(study, name, frame, _only_bending(assemble(frame)))
 
 
-def _whole_frame(study: Study, name: str, frame: Frame) -> FullBody:
-    _check(study, name, frame)
-    return _full_frame(study, name, frame, assemble(frame))
+def _full_frame(study: Study, name: str, frame: Frame) -> FullBody:
+    """The reduced body must be a reduction of this very model."""
+    given = {"mass_matrix": frame.mass_matrix, "rigid_body_modes": frame.rigid_body_modes}
+    for key, wanted in (("mass_matrix", "consistent"), ("rigid_body_modes", "keep")):
+        if given[key] != wanted:
+            what = "the unreduced model cannot be marched so"
+            raise study.source.fault(f"body.{name}.{key}", what, expected=f'"{wanted}"', received=f'"{given[key]}"')
+    return _assembled(study, name, frame, assemble(frame))
 
 
 def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEMENTS) -> Frame:
@@ -143,13 +148,14 @@ def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEM
         for index, (before, after) in enumerate(pairwise(places))
     }
     held = {"pinned": ["x", "z"], "clamped": ["x", "z", "ry"], "free": ["x"]}
+    keys = ("area", "second_moment", "youngs_modulus", "density", "fibre_distance")
     left, right = beam.ends
     return Frame.model_validate(
         {
             "kind": "frame",
             "plane": "xz",
             "node": {number[place]: [place, 0.0] for place in places},
-            "section": {"all": _section(beam)},
+            "section": {"all": {key: getattr(beam, key) for key in keys if getattr(beam, key) is not None}},
             "member": members,
             "supports": {number[0.0]: held[left], number[beam.length]: held[right]},
             "spring": {f"s{index}": _spring(spring, number[spring.at]) for index, spring in enumerate(beam.springs)},
@@ -157,11 +163,6 @@ def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEM
             "modes": beam.modes,
         }
     )
-
-
-def _section(beam: Beam) -> dict[str, float]:
-    keys = ("area", "second_moment", "youngs_modulus", "density", "fibre_distance")
-    return {key: getattr(beam, key) for key in keys if getattr(beam, key) is not None}
 
 
 def _spring(spring: Spring, node: str) -> dict[str, Any]:
@@ -187,18 +188,7 @@ def _only_bending(assembly: Assembly) -> Assembly:
     )
 
 
-def _check(study: Study, name: str, frame: Frame) -> None:
-    """The reduced body must be a reduction of this very model."""
-    for key, given, wanted in (
-        ("mass_matrix", frame.mass_matrix, "consistent"),
-        ("rigid_body_modes", frame.rigid_body_modes, "keep"),
-    ):
-        if given != wanted:
-            what = "the unreduced model cannot be marched so"
-            raise study.source.fault(f"body.{name}.{key}", what, expected=f'"{wanted}"', received=f'"{given}"')
-
-
-def _full_frame(study: Study, name: str, frame: Frame, assembly: Assembly) -> FullBody:
+def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> FullBody:
     flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
     track, ends = track_of(frame, assembly.mesh)
     gravity = unit(frame.gravity)
@@ -279,7 +269,7 @@ def _full_rigid(study: Study, name: str, body: Rigid) -> FullBody:
 
 #: How the whole model of each kind of body is made.
 _FULL: Mapping[str, Callable[[Study, str, Any], FullBody]] = {
-    "beam": _whole_beam,
-    "frame": _whole_frame,
+    "beam": _full_beam,
+    "frame": _full_frame,
     "rigid": _full_rigid,
 }

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from engine.model.timeline import Rider
 from engine.scene.sensors import Sensor
-from engine.scene.study import Study
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
 from engine.unreduced.track import WIDTH, Rows, no_rows
 from results_schema.arrays import Array, Counts, Mask
@@ -67,14 +66,15 @@ def nowhere(model: Unreduced) -> Along:
 def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
     """(S, T, 12) d^j/ds^j of the deflection under every tie (of a push the track's motion along itself), zero where it
     is off the body."""
-    index, values = [np.zeros((len(along.s), 0, WIDTH), dtype=np.int64)], [np.zeros((len(along.s), 0, WIDTH))]
-    for tie in model.ties:
+    shape = len(along.s), len(model.ties), WIDTH
+    found = Rows(np.zeros(shape, dtype=np.int64), np.zeros(shape))
+    for j, tie in enumerate(model.ties):
         body = model.bodies[tie.body]
         track = body.along if tie.link == "push" and body.along is not None else body.track
         rows = track.rows(along.s[:, tie.rider], derivative)
-        index.append((rows.freedoms + model.firsts[tie.body])[:, None])
-        values.append((rows.values * along.on[:, tie.rider, None])[:, None])
-    return Rows(np.concatenate(index, axis=1), np.concatenate(values, axis=1))
+        found.freedoms[:, j] = rows.freedoms + model.firsts[tie.body]
+        found.values[:, j] = rows.values * along.on[:, tie.rider, None]
+    return found
 
 
 def softness(model: Unreduced, along: Along) -> Array:
@@ -181,24 +181,17 @@ class _Parts(NamedTuple):
 def readings(model: Unreduced, along: Along) -> Readings:
     """Rows of all sensors of the study; those on bodies that ride, and of sprung masses, count from the unstressed
     place."""
-    count, ties = len(along.s), len(model.ties)
-    found = []
-    for name, sensor in model.study.sensor.items():
-        parts = _parts(model, name, sensor, along)
-        forces, added = np.zeros((count, ties)), np.zeros(count)
+    shape = len(along.s), len(model.study.sensor)
+    index, (on_u, on_v, on_a) = np.zeros((*shape, WIDTH), dtype=np.int64), np.zeros((3, *shape, WIDTH))
+    on_force, added = np.zeros((*shape, len(model.ties))), np.zeros(shape)
+    for j, (name, sensor) in enumerate(model.study.sensor.items()):
+        rows, on_v[:, j], on_a[:, j] = _parts(model, name, sensor, along)
+        index[:, j], on_u[:, j] = rows
         if sensor.reads.of_contact:
-            forces[:] = [_counts(tie, sensor) for tie in model.ties]
+            on_force[:, j] = [_counts(tie, sensor) for tie in model.ties]
         elif sensor.carriage is None and not sensor.reads.rate:
-            forces, added = _between_ends(model, name, sensor, along)
-        found.append((parts.u.freedoms, parts.u.values, parts.v, parts.a, forces, added))
-    columns = zip(*found, strict=True) if found else [[]] * 6
-    shapes = ((WIDTH,), (WIDTH,), (WIDTH,), (WIDTH,), (ties,), ())
-    kinds = (np.int64, *(np.float64,) * 5)
-    stacked = [
-        np.stack(list(part), axis=1) if found else np.zeros((count, 0, *shape), dtype=kind)
-        for part, shape, kind in zip(columns, shapes, kinds, strict=True)
-    ]
-    return Readings(*stacked)
+            on_force[:, j], added[:, j] = _between_ends(model, name, sensor, along)
+    return Readings(index, on_u, on_v, on_a, on_force, added)
 
 
 def _place(model: Unreduced, sensor: Sensor, along: Along) -> tuple[Array, int | None]:
@@ -268,12 +261,8 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
         if tie.rides == body and tie.at is not None:
             forces[:, j] -= adds(np.full(len(place), tie.at))
     added = np.zeros(len(place))
-    if _weighs(model.study, body):
+    # That of a body that rides cancels, as it counts from its rest.
+    if model.study.body[body].own_weight and body not in model.loose:
         spread = track.under_weight(place, sensor.quantity) if gauge is None else gauge.under_weight
         added += spread * model.study.gravity
     return forces, added
-
-
-def _weighs(study: Study, body: str) -> bool:
-    """Whether own weight on the body's elements counts; it cancels where a body that rides counts from its rest."""
-    return study.body[body].own_weight and all(carriage.riding_body != body for carriage in study.carriage.values())

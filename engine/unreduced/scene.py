@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from engine.model.timeline import Rider
-from engine.scene.carriages import Carriage, Contact, Suspension
+from engine.scene.carriages import Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, full_body
 from results_schema.arrays import Array
@@ -58,7 +58,7 @@ class Unreduced:
     """All bodies of a scene as one system M x'' + C x' + K x = f + ties.
 
     bodies by name, firsts: where their degrees of freedom begin; sprung: that of every sprung mass by its carriage's
-    name; riders: the ways of the carriages, then of all contacts; weight (n,): N, constant loads.
+    name; riders: the ways of the carriages, then of all contacts.
     """
 
     study: Study
@@ -66,13 +66,27 @@ class Unreduced:
     firsts: Mapping[str, int]
     sprung: Mapping[str, int]
     riders: tuple[Rider, ...]
-    ties: tuple[Tie, ...]
-    weight: Array
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Degrees of freedom of the whole scene."""
-        return int(self.weight.size)
+        return sum(body.size for body in self.bodies.values()) + len(self.sprung)
+
+    @cached_property
+    def ties(self) -> tuple[Tie, ...]:
+        """All ties: of the carriages themselves, then of contacts."""
+        return (*_own_ties(self), *_contact_ties(self))
+
+    @cached_property
+    def weight(self) -> Array:
+        """(n,) N: of sprung masses, of bodies that ride, and of those whose own weight acts."""
+        found = np.zeros(self.size)
+        for name, body in self.bodies.items():
+            if name in self.loose or self.study.body[name].own_weight:
+                found[self.part(name)] = body.pull * self.study.gravity
+        for name, suspension in suspensions_of(self.study).items():
+            found[self.sprung[name]] = suspension.mass * self.study.gravity
+        return found
 
     @property
     def loose(self) -> tuple[str, ...]:
@@ -149,20 +163,12 @@ def unreduced_model(
     bodies = {name: full_body(study, name) for name in study.body if name in used}
     _check_weights(study, bodies)
     _check_quantities(study)
+    _check_points(study, bodies)
     firsts, first = {}, 0
     for name, body in bodies.items():
         firsts[name], first = first, first + body.size
     sprung = {name: first + index for index, name in enumerate(suspensions_of(study))}
-    scene = _Scene(study, bodies, firsts, sprung, first + len(sprung))
-    return Unreduced(
-        study=study,
-        bodies=bodies,
-        firsts=firsts,
-        sprung=sprung,
-        riders=tuple(_riders(study, bodies, paces or {}, delays or {})),
-        ties=tuple(scene.ties()),
-        weight=scene.weight(),
-    )
+    return Unreduced(study, bodies, firsts, sprung, tuple(_riders(study, bodies, paces or {}, delays or {})))
 
 
 def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
@@ -187,6 +193,20 @@ def _check_quantities(study: Study) -> None:
                 "the unreduced model does not have this quantity",
                 expected="displacement, velocity, acceleration, a section force, stress, strain or contact_force",
                 received=f'"{sensor.quantity}"',
+            )
+
+
+def _check_points(study: Study, bodies: Mapping[str, FullBody]) -> None:
+    """Contacts are at points that the body has."""
+    for name, word, contact in contacts_of(study):
+        points = bodies[str(study.carriage[name].riding_body)].points
+        if contact.at is None and contact.place not in points:
+            names = [point.removeprefix("point.") for point in points if point.startswith("point.")]
+            raise study.source.fault(
+                f"carriage.{name}.contacts.{word}.point",
+                "no such point of the body that rides",
+                expected=f"one of {', '.join(names)}" if names else "a contact with `at`",
+                received=f'"{contact.point}"',
             )
 
 
@@ -221,25 +241,9 @@ def suspensions_of(study: Study) -> dict[str, Suspension]:
     return {name: suspension for name, suspension in found.items() if suspension is not None}
 
 
-@dataclass(frozen=True, eq=False)
-class _Scene:
-    """What the ties of a scene are made from."""
-
-    study: Study
-    bodies: Mapping[str, FullBody]
-    firsts: Mapping[str, int]
-    sprung: Mapping[str, int]
-    size: int
-
-    def ties(self) -> Iterator[Tie]:
-        """All ties: of the carriages themselves, then of contacts."""
-        for number, (name, carriage) in enumerate(self.study.carriage.items()):
-            yield from self._own(number, name, carriage)
-        for rider, (name, word, contact) in enumerate(contacts_of(self.study), start=len(self.study.carriage)):
-            yield self._contact(rider, name, word, contact)
-
-    def _own(self, number: int, name: str, carriage: Carriage) -> Iterator[Tie]:
-        none = np.zeros(self.size)
+def _own_ties(model: Unreduced) -> Iterator[Tie]:
+    for number, (name, carriage) in enumerate(model.study.carriage.items()):
+        none = np.zeros(model.size)
         if carriage.forces:
             yield Tie(name, name, "force", number, carriage.on, none, force=carriage.sum_of(carriage.forces))
         touching, suspension = carriage.sum_of(carriage.touching), carriage.suspension
@@ -247,53 +251,35 @@ class _Scene:
             yield Tie(name, name, "mass", number, carriage.on, none, mass=touching)
         if suspension is not None:
             mass = none.copy()
-            mass[self.sprung[name]] = -1.0
+            mass[model.sprung[name]] = -1.0
             k, c = suspension.stiffness, suspension.damping
             yield Tie(name, name, "spring", number, carriage.on, mass, stiffness=k, damping=c)
         if carriage.pushes_along:
             yield Tie(name, name, "push", number, carriage.on, none, mass=carriage.moving_mass)
 
-    def _contact(self, rider: int, name: str, word: str, contact: Contact) -> Tie:
-        carriage = self.study.carriage[name]
+
+def _contact_ties(model: Unreduced) -> Iterator[Tie]:
+    for rider, (name, word, contact) in enumerate(contacts_of(model.study), start=len(model.study.carriage)):
+        carriage = model.study.carriage[name]
         rides = str(carriage.riding_body)
-        body, first = self.bodies[rides], self.firsts[rides]
-        row = np.zeros(self.size)
-        row[first : first + body.size] = -self._row(name, word, contact, body)
-        return Tie(
+        other = np.zeros(model.size)
+        other[model.part(rides)] = -_row(contact, model.bodies[rides])
+        yield Tie(
             name=f"{name}_{word}",
             carriage=name,
             link="rigid" if contact.is_rigid else "spring",
             rider=rider,
             body=contact.on or carriage.on,
-            other=row,
+            other=other,
             stiffness=contact.spring,
             damping=contact.damping,
             rides=rides,
             at=contact.at,
         )
 
-    def _row(self, name: str, word: str, contact: Contact, body: FullBody) -> Array:
-        """(n of the body,) what moves the contact."""
-        if contact.at is not None:
-            return body.track.rows(np.array([contact.at])).columns(body.size)[:, 0]
-        found = body.points.get(str(contact.place))
-        if found is None:
-            names = [point.removeprefix("point.") for point in body.points if point.startswith("point.")]
-            raise self.study.source.fault(
-                f"carriage.{name}.contacts.{word}.point",
-                "no such point of the body that rides",
-                expected=f"one of {', '.join(names)}" if names else "a contact with `at`",
-                received=f'"{contact.point}"',
-            )
-        return found
 
-    def weight(self) -> Array:
-        """(n,) N: of sprung masses, of bodies that ride, and of those whose own weight acts."""
-        found = np.zeros(self.size)
-        riding = [carriage.riding_body for carriage in self.study.carriage.values()]
-        for name, body in self.bodies.items():
-            if name in riding or self.study.body[name].own_weight:
-                found[self.firsts[name] : self.firsts[name] + body.size] = body.pull * self.study.gravity
-        for name, suspension in suspensions_of(self.study).items():
-            found[self.sprung[name]] = suspension.mass * self.study.gravity
-        return found
+def _row(contact: Contact, body: FullBody) -> Array:
+    """(n of the body,) what moves the contact."""
+    if contact.at is None:
+        return body.points[str(contact.place)]
+    return body.track.rows(np.array([contact.at])).columns(body.size)[:, 0]

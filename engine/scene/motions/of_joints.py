@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, create_model, model_validator
 
 from engine.study_file.spec import KindOf, Spec, kinds
 from engine.study_file.units import Angle, AngularRate, Dimensionless, Frequency, Length, Rate, Speed, Time, fault
@@ -18,6 +18,7 @@ from results_schema.arrays import Array
 #: amplitude, rate (rad/s) and phase of a sine.
 START, CONSTANT, AMPLITUDE, RATE, PHASE, COLUMNS = 0, 1, 7, 8, 9, 10
 
+SEVERAL = Field(min_length=2, max_length=1000)
 Number = Callable[[str], Array]  # (V,) of a key of the motion, for every variant
 
 
@@ -101,8 +102,8 @@ class Points(TimeMotion):
     """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
 
     kind: Literal["waypoints"]
-    times: Annotated[tuple[Time, ...], Strict(False), Field(min_length=2, max_length=1000)]
-    values: Annotated[tuple[Dimensionless, ...], Strict(False), Field(min_length=2, max_length=1000)]
+    times: Annotated[tuple[Time, ...], Strict(False), SEVERAL]
+    values: Annotated[tuple[Dimensionless, ...], Strict(False), SEVERAL]
 
     @model_validator(mode="after")
     def _ascending(self) -> Points:
@@ -117,79 +118,27 @@ class Points(TimeMotion):
         return spline_pieces(number, len(self.times), "values")
 
 
-class SteadyTurn(Steady):
-    """Of a joint that turns."""
-
-    start: Angle = 0.0
-    rate: AngularRate
-
-
-class SteadySlide(Steady):
-    """Of a joint that slides."""
-
-    start: Length = 0.0
-    rate: Speed
+def _of_a_joint(base: type[TimeMotion], way: Literal["Turn", "Slide"], **fields: Any) -> type[TimeMotion]:
+    """The same motion of a joint that turns or slides, with the dimensions (and defaults, `...` for none) of that."""
+    words = {"Turn": "Of a joint that turns.", "Slide": "Of a joint that slides."}
+    return create_model(f"{base.__name__}{way}", __base__=base, __module__=__name__, __doc__=words[way], **fields)
 
 
-class SwingTurn(Swing):
-    """Of a joint that turns."""
+SteadyTurn = _of_a_joint(Steady, "Turn", start=(Angle, 0.0), rate=(AngularRate, ...))
+SwingTurn = _of_a_joint(Swing, "Turn", centre=(Angle, 0.0), amplitude=(Angle, ...))
+SpinUpTurn = _of_a_joint(SpinUp, "Turn", rate=(AngularRate, ...))
+PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[tuple[Angle, ...], Strict(False), SEVERAL], ...))
+SteadySlide = _of_a_joint(Steady, "Slide", start=(Length, 0.0), rate=(Speed, ...))
+SwingSlide = _of_a_joint(Swing, "Slide", centre=(Length, 0.0), amplitude=(Length, ...))
+SpinUpSlide = _of_a_joint(SpinUp, "Slide", rate=(Speed, ...))
+PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[tuple[Length, ...], Strict(False), SEVERAL], ...))
 
-    centre: Angle = 0.0
-    amplitude: Angle
-
-
-class SwingSlide(Swing):
-    """Of a joint that slides."""
-
-    centre: Length = 0.0
-    amplitude: Length
-
-
-class SpinUpTurn(SpinUp):
-    """Of a joint that turns."""
-
-    rate: AngularRate
-
-
-class SpinUpSlide(SpinUp):
-    """Of a joint that slides."""
-
-    rate: Speed
-
-
-class PointsTurn(Points):
-    """Of a joint that turns."""
-
-    values: Annotated[tuple[Angle, ...], Strict(False), Field(min_length=2, max_length=1000)]
-
-
-class PointsSlide(Points):
-    """Of a joint that slides."""
-
-    values: Annotated[tuple[Length, ...], Strict(False), Field(min_length=2, max_length=1000)]
-
-
-TURNING = kinds(
-    "motion of a joint that turns",
-    "wanderlast.turning_motions",
-    TimeMotion,
-    SteadyTurn,
-    SwingTurn,
-    SpinUpTurn,
-    PointsTurn,
-)
-SLIDING = kinds(
-    "motion of a joint that slides",
-    "wanderlast.sliding_motions",
-    TimeMotion,
-    SteadySlide,
-    SwingSlide,
-    SpinUpSlide,
-    PointsSlide,
-)
+_TURNING, _SLIDING = "motion of a joint that turns", "motion of a joint that slides"
+TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn)
+SLIDING = kinds(_SLIDING, "wanderlast.sliding_motions", TimeMotion, SteadySlide, SwingSlide, SpinUpSlide, PointsSlide)
 COURSES = kinds("course of a load", "wanderlast.courses", TimeMotion, Steady, Swing, Points)
-AnyTurning = Annotated[TimeMotion, KindOf("motion of a joint that turns", TURNING)]
-AnySliding = Annotated[TimeMotion, KindOf("motion of a joint that slides", SLIDING)]
+AnyTurning = Annotated[TimeMotion, KindOf(_TURNING, TURNING)]
+AnySliding = Annotated[TimeMotion, KindOf(_SLIDING, SLIDING)]
 AnyCourse = Annotated[TimeMotion, KindOf("course of a load", COURSES)]
 
 
