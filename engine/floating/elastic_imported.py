@@ -10,9 +10,8 @@ import numpy as np
 
 from engine.bodies.imported.body import motion_of_nodes
 from engine.bodies.imported.imported import Imported
-from engine.bodies.imported.line import LineShapes
+from engine.bodies.imported.line import LineShapes, spline_slopes
 from engine.bodies.imported.model import HeldModel
-from engine.bodies.imported.rows import spline_slopes
 from engine.floating.elastic import (
     ABOUT_Y,
     ABOUT_Z,

@@ -16,9 +16,8 @@ from engine.bodies.beam.beam import Beam, Spring
 from engine.bodies.frame.assembly import Assembly, assemble
 from engine.bodies.frame.body import frame_modes, kept_modes
 from engine.bodies.frame.frame import Frame
-from engine.bodies.frame.gauges import FrameSpot
+from engine.bodies.frame.gauges import FrameSpot, point_loads
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.points import point_loads
 from engine.bodies.frame.track import track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
 from engine.bodies.modal.flexibility import Flexibility, factorised

@@ -13,6 +13,7 @@ from engine.bodies.frame.body import interface_freedoms
 from engine.bodies.frame.frame import Frame
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.flexibility import factorised
+from engine.bodies.modal.modal_body import gauge_at
 from results_schema.errors import BadInput
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, RAIL, beam, body, straight
 
@@ -120,7 +121,7 @@ def test_points_at_the_track_are_places_of_it() -> None:
     moment = frame.sections.influence_at("bending_moment", x[:-1], LENGTH)
     np.testing.assert_allclose(frame.points.section_influence("bending_moment", "point.tip", x[:-1]), moment, atol=1e-9)
     assert frame.points.between("point.tip", "point.tip") == pytest.approx(frame.influence_at([LENGTH], [LENGTH])[0])
-    assert frame.points.own_weight("point.tip") == pytest.approx(frame.own_weight_deflection([LENGTH])[0])
+    assert gauge_at(frame.points, "point.tip").own_weight() == pytest.approx(frame.own_weight_deflection([LENGTH])[0])
     assert frame.points.between("point.side", "point.side") == pytest.approx(LENGTH**3 / (3.0 * 2.1e11 * 3e-6))
     # The spring's upward elongation is the axis's deflection, downwards and without twist.
     assert frame.points.between("spring.prop.z", "point.tip") == pytest.approx(

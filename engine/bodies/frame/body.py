@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
-from engine.bodies.frame.gauges import Read, frame_gauge
+from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, point_loads
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.points import frame_points, point_loads
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import along_shapes, mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics, track_statics

@@ -1,4 +1,5 @@
-"""Places of a frame that sensors read off its track, or on it in another direction.
+"""Places of a frame that sensors read off its track, or on it in another direction; and its points off the track, where
+shoes, sensors and dampers stand: a node's displacement in a direction, or the elongation of a spring's direction.
 
 A node, or a place of a member between its nodes, is one number v = r . u of the frame's motion (r from the element's
 static shapes), so that by Maxwell's theorem the load r tells what a load on the track moves it by. Where both stand on
@@ -13,14 +14,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.bodies.frame.assembly import MASSES, Assembly
-from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.assembly import MASSES, Assembly, spring_rows
+from engine.bodies.frame.geometry import DIRECTIONS, unit
+from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, elements_of, line_of
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
-from engine.bodies.modal.modal_body import Array, Gauge, held_weight
+from engine.bodies.modal.modal_body import Array, Gauge, Points
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
@@ -119,9 +121,54 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
         row=place.mode_row(read.omega, read.shapes),
         along=partial(_along, statics, response, place),
         points={name: float(loads[:, number] @ moved[:, 0]) for name, number in names.items()},
-        own_weight=partial(held_weight, statics.rigid, weight),
+        rigid=statics.rigid,
+        weight=weight,
     )
 
 
 def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -> Array:
     return statics.under_response(response, s) + place.within(s)
+
+
+def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:
+    """Names with their numbers, and loads (n, P): the points of the study, then all directions of all springs."""
+    nodes = {name: index for index, name in enumerate(frame.node)}
+    total = len(assembly.mesh.points)
+    rows: dict[str, Array] = {}
+    for name, point in frame.point.items():
+        direction = unit(frame.gravity if point.direction is None else point.direction)
+        row = np.zeros((total, 6))
+        row[nodes[point.node]] = np.concatenate([direction, np.cross(point.offset, direction)])
+        rows[f"point.{name}"] = row.reshape(-1)
+    for name in frame.spring:
+        for word, row in zip(DIRECTIONS, spring_rows(frame, name, nodes, assembly.mesh), strict=True):
+            rows[f"spring.{name}.{word}"] = row
+    numbers = {name: index for index, name in enumerate(rows)}
+    return numbers, np.array(list(rows.values())).reshape(len(rows), 6 * total).T[assembly.free]
+
+
+def frame_points(
+    loads: tuple[dict[str, int], Array],
+    assembly: Assembly,
+    flexibility: Flexibility,
+    sections: TrackSections,
+    points: TrackPoints,
+    shapes: Array,
+    pull: Array,
+) -> Points:
+    """Points from their loads (n, P), the modes' shapes (n, N) and own weight per unit gravity (n,)."""
+    numbers, rows = loads
+    moved = flexibility.solve(rows)
+    statics = sections.statics
+    response = points.of(assembly.whole(moved)).reshape(statics.weight.size, -1)
+    return Points(
+        numbers=numbers,
+        shapes=rows.T @ shapes,
+        flexibility=rows.T @ moved,
+        response=response,
+        section_response=response,
+        weight=moved.T @ pull,
+        rigid=statics.rigid,
+        statics=statics,
+        sections=sections,
+    )

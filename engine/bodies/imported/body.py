@@ -10,12 +10,21 @@ import numpy as np
 
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.line import LineRecovered, LineShapes, LineStatics, NoSections
+from engine.bodies.imported.line import (
+    SPLINE_NODES,
+    LineRecovered,
+    LineShapes,
+    LineStatics,
+    NoSections,
+    by_rotations,
+    node_rows,
+    spline_slopes,
+    track_rows,
+)
 from engine.bodies.imported.model import HeldModel, held_model
-from engine.bodies.imported.rows import SPLINE_NODES, by_rotations, node_rows, spline_slopes, track_rows
 from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility, solving
-from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, Sections, held_weight
+from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, Sections
 from results_schema.errors import BadInput
 from results_schema.late import sparse
 
@@ -75,6 +84,7 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
     parts = shapes, rows, slopes, pull, loads
     sections, stresses = _sections(body, held, statics, parts)
     read = [(name, _node_load(body, held, spot.node, spot.direction)) for name, spot in spots]
+    motion = node_rows(held, body.line.nodes, body.line.tangent, 0).T @ shapes  # of the track's nodes along it
     found = ModalBody(
         length=body.length,
         mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
@@ -89,18 +99,10 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
         sections=sections,
         points=_points(names, held, (statics, sections, stresses), parts) if names else None,
         gauges={name: _gauge(held, statics, load, parts, names) for name, load in read},
-        along=LineShapes(places, _along_ends(body, held, shapes)),
+        along=LineShapes(places, np.stack([motion, spline_slopes(places) @ motion], axis=1).reshape(ends.shape)),
         checks=findings(body, held, along),
     )
     return found, statics
-
-
-def _along_ends(body: Imported, held: HeldModel, shapes: Array) -> Array:
-    """(2 P, N) motion of the track's nodes along it, and its slopes by the smooth curve through them."""
-    found = np.zeros((2 * len(body.line.nodes), shapes.shape[1]))
-    found[::2] = node_rows(held, body.line.nodes, body.line.tangent, 0).T @ shapes
-    found[1::2] = spline_slopes(body.line.places) @ found[::2]
-    return found
 
 
 def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) -> tuple[Array, Array, Array]:
@@ -195,7 +197,8 @@ def _gauge(held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, na
         row=load @ shapes,
         along=partial(statics.under_response, response, derivative=0),
         points={name: float(loads[:, number] @ moved) for name, number in names.items()},
-        own_weight=partial(held_weight, statics.rigid, float(moved @ pull)),
+        rigid=statics.rigid,
+        weight=float(moved @ pull),
     )
 
 
@@ -251,27 +254,21 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
     file = held.file
     modal = int(np.count_nonzero(file.owner < 0))
     rows = f"{len(held.free)} free of {file.size}" + (f", {modal} of them modal coordinates" if modal else "")
+    massless, rigid = int(np.count_nonzero(held.mass.diagonal() == 0.0)), held.flexibility.rigid.shape[1]
     return (
         ("nodes, degrees of freedom", f"{len(file.nodes)}, {rows}"),
         ("matrices", "symmetric; stiffness positive where held, mass not negative"),
-        ("massless degrees of freedom", _massless(held)),
-        ("rigid-body modes", _rigid(held)),
+        (
+            "massless degrees of freedom",
+            f"{massless} of {len(held.free)}: they follow statically" if massless else "none",
+        ),
+        ("rigid-body modes", f"{rigid}" if rigid else "none: the supports hold the body"),
         ("rigid motions by the coordinates", _grounding(held)),
         ("mass by rigid motions", _mass(held)),
         ("centre of mass", _centre(body, held)),
         ("track", _track(body, held)),
         ("slope between nodes", _slopes(body, held, along)),
     )
-
-
-def _massless(held: HeldModel) -> str:
-    count = int(np.count_nonzero(held.mass.diagonal() == 0.0))
-    return f"{count} of {len(held.free)}: they follow statically" if count else "none"
-
-
-def _rigid(held: HeldModel) -> str:
-    count = held.flexibility.rigid.shape[1]
-    return str(count) if count else "none: the supports hold the body"
 
 
 def _grounding(held: HeldModel) -> str:

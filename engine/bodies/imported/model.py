@@ -142,20 +142,15 @@ def _factorised(file: FileModel, free: Counts, stiffness: Any, mass: Any, motion
     _refuse_massless(mass, rigid)
     found = _solvable(file, free, stiffness, mass, rigid)
     while rigid.shape[1]:
-        first = _first_elastic(found)
-        energy = rigid.T @ (stiffness @ rigid)
-        squares, turn = _pencil(energy, rigid.T @ (mass @ rigid))
+        omega, _ = found.modes(rigid.shape[1] + 1)
+        first = min(omega[omega > 0.0] ** 2, default=np.inf)
+        energy, inertia = rigid.T @ (stiffness @ rigid), rigid.T @ (mass @ rigid)
+        squares, turn = linalg.eigh(0.5 * (energy + energy.T), 0.5 * (inertia + inertia.T))
         if squares[-1] < RIGID * first:
             return found
         rigid = rigid @ turn[:, :-1]
         found = _solvable(file, free, stiffness, mass, rigid)
     return found
-
-
-def _first_elastic(found: Flexibility) -> float:
-    omega, _ = found.modes(found.rigid.shape[1] + 1)
-    elastic = omega[omega > 0.0]
-    return float(elastic[0]) ** 2 if len(elastic) else np.inf
 
 
 def _unstrained(stiffness: Any, motion: Array) -> Array:
@@ -177,12 +172,6 @@ def _refuse_massless(mass: Any, rigid: Array) -> None:
         if values[0] < MASSLESS * max(values[-1], 1e-300):
             what = "nothing holds the body in a motion that moves no mass"
             raise BadInput(what, where="supports", expected="supports against it")
-
-
-def _pencil(stiffness: Array, mass: Array) -> tuple[Array, Array]:
-    """Eigenvalues, ascending, and vectors of a small pair."""
-    values, vectors = linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-    return values, vectors
 
 
 def _solvable(file: FileModel, free: Counts, stiffness: Any, mass: Any, rigid: Array) -> Flexibility:

@@ -94,10 +94,6 @@ class Points:
         """Motion of a point per unit force at another one, m/N."""
         return float(self.flexibility[self.numbers[name], self.numbers[other]])
 
-    def own_weight(self, name: str) -> float:
-        """Motion of a point under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
-        return held_weight(self.rigid, float(self.weight[self.numbers[name]]))
-
 
 def frozen(values: Array) -> Array:
     """The array, which nobody can change from now on."""
@@ -122,29 +118,31 @@ class Gauge:
     """A place that a sensor reads in one direction.
 
     row (N,): what every mode moves it by, kg^(-1/2); along: its motion per unit force at places (S,) of the track, m/N;
-    points: the same at points, by name; own_weight: its motion under the body's own weight per unit gravity.
+    points: the same at points, by name; weight: its motion under the body's own weight per unit gravity; rigid: number
+    of rigid-body modes.
     """
 
     row: Array
     along: Callable[[Array], Array]
     points: Mapping[str, float]
-    own_weight: Callable[[], float]
+    rigid: int
+    weight: float
 
     def influence(self, loaded: Array | str) -> Array:
         """Its motion per unit force at places (S,) of the track, or at a point (1,); m/N."""
         return np.array([self.points[loaded]]) if isinstance(loaded, str) else self.along(loaded)
 
-
-def held_weight(rigid: int, weight: float) -> float:
-    """The motion under own weight of a place of a body. Raises BadInput where this has rigid-body modes."""
-    refuse_loose(rigid)
-    return weight
+    def own_weight(self) -> float:
+        """Its motion under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
+        refuse_loose(self.rigid)
+        return self.weight
 
 
 def gauge_at(points: Points, name: str) -> Gauge:
     """A sensor at a point."""
     between = {other: points.between(name, other) for other in points.numbers}
-    return Gauge(points.row(name), partial(points.influence, name), between, partial(points.own_weight, name))
+    weight = float(points.weight[points.numbers[name]])
+    return Gauge(points.row(name), partial(points.influence, name), between, points.rigid, weight)
 
 
 @dataclass(frozen=True, eq=False)
