@@ -162,4 +162,4 @@ class _PartOfKernels(CompilerBase):
 
 def chosen_for(stub: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorate what picks, by the types of a call's arguments, the piece that stands for ``stub`` inside kernels."""
-    return cast(Callable[[Callable[..., Any]], Callable[..., Any]], overload(stub, inline="always"))
+    return cast(Callable[[Callable[..., Any]], Callable[..., Any]], overload(stub, inline="always", strict=False))

@@ -121,11 +121,6 @@ def _type_put_lanes(context):
     return lambda array, index, row: types.none if _holds_rows(array, index) and row == ROW else None
 
 
-@type_callable(all_lanes)
-def _type_all_lanes(context):
-    return lambda number: ROW if number == types.float64 else None
-
-
 def _pointer(context, builder, kinds, values):
     """Pointer to the row of an array at an index; checked where numba checks indices."""
     array = context.make_array(kinds[0])(context, builder, values[0])
@@ -163,11 +158,6 @@ def _lower_all_lanes(context, builder, called, values):
     return _spread(builder, values[0])
 
 
-@type_callable(two_to)
-def _type_two_to(context):
-    return lambda row: ROW if row == ROW else None
-
-
 @lower_builtin(two_to, Row)
 def _lower_two_to(context, builder, called, values):
     """A sum with 1.5 2^52 holds a whole number in its lowest bits: they become the exponent."""
@@ -178,20 +168,10 @@ def _lower_two_to(context, builder, called, values):
     return builder.bitcast(builder.shl(bits, ir.Constant(whole, [_MANTISSA] * LANES)), _ROW)
 
 
-@type_callable(root)
-def _type_root(context):
-    return lambda row: ROW if row == ROW else None
-
-
 @lower_builtin(root, Row)
 def _lower_root(context, builder, called, values):
     kind = ir.FunctionType(_ROW, [_ROW])
     return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f64", (), kind), values)
-
-
-@type_callable(total)
-def _type_total(context):
-    return lambda row: types.float64 if row == ROW else None
 
 
 @lower_builtin(total, Row)
@@ -203,11 +183,6 @@ def _lower_total(context, builder, called, values):
         halves = [ir.Constant(whole, list(range(first, first + count))) for first in (0, count)]
         row = builder.fadd(*(builder.shuffle_vector(row, nowhere, half) for half in halves))
     return builder.extract_element(row, ir.Constant(ir.IntType(32), 0))
-
-
-@type_callable(everywhere)
-def _type_everywhere(context):
-    return lambda truths: types.boolean if truths == TRUTHS else None
 
 
 @lower_builtin(everywhere, Truths)
@@ -232,15 +207,28 @@ def _rows(builder, kinds, values):
     return [value if kind == ROW else _spread(builder, value) for kind, value in zip(kinds, values, strict=True)]
 
 
-def _between_rows(operation, result, build):
-    """Make an operation known between rows, and between a row and a number."""
+def _known(operation, result, *arguments):
+    """Tell numba the type of what an operation makes of arguments of some types."""
 
     class Template(ConcreteTemplate):
-        cases: ClassVar = [
-            signature(result, *kinds) for kinds in ((ROW, ROW), (types.float64, ROW), (ROW, types.float64))
-        ]
+        cases: ClassVar = [signature(result, *kinds) for kinds in arguments]
 
     infer_global(operation)(Template)
+
+
+for _function, _result, _argument in (
+    (all_lanes, ROW, types.float64),
+    (two_to, ROW, ROW),
+    (root, ROW, ROW),
+    (total, types.float64, ROW),
+    (everywhere, types.boolean, TRUTHS),
+):
+    _known(_function, _result, (_argument,))
+
+
+def _between_rows(operation, result, build):
+    """Make an operation known between rows, and between a row and a number."""
+    _known(operation, result, (ROW, ROW), (types.float64, ROW), (ROW, types.float64))
 
     def lower(context, builder, called, values):
         return build(builder, *_rows(builder, called.args, values))
@@ -251,11 +239,7 @@ def _between_rows(operation, result, build):
 
 def _between_truths(operation, instruction):
     """Make an operation known between truths."""
-
-    class Template(ConcreteTemplate):
-        cases: ClassVar = [signature(TRUTHS, TRUTHS, TRUTHS)]
-
-    infer_global(operation)(Template)
+    _known(operation, TRUTHS, (TRUTHS, TRUTHS))
     lower_builtin(operation, Truths, Truths)(
         lambda context, builder, called, values: getattr(builder, instruction)(*values)
     )

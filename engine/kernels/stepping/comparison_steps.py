@@ -45,20 +45,8 @@ def remembered(scheme, x, e):
     return _REMEMBERED[isinstance(scheme, Alpha)](scheme, x, e)
 
 
-def _nothing(scheme, x, e):
-    return 0.0
-
-
-def _memory(scheme, x, e):
-    return (scheme.kappa - 1.0) * x + e
-
-
-_REMEMBERED = (_nothing, _memory)
-
-
-@chosen_for(remembered)
-def _choose_remembered(scheme, x, e):
-    return _REMEMBERED[scheme.instance_class is Alpha]
+_REMEMBERED = (lambda scheme, x, e: 0.0, lambda scheme, x, e: (scheme.kappa - 1.0) * x + e)
+chosen_for(remembered)(lambda scheme, *others: _REMEMBERED[scheme.instance_class is Alpha])
 
 
 @piece

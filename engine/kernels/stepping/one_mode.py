@@ -91,18 +91,6 @@ def _corrected_alpha(scheme, work, b, k, j, x):
     return q, v * b[RATE_1, j], x * b[RATE_2, j], memory * b[RATE_2, j]
 
 
-def _fields_newmark(scheme):
-    return FIELDS
-
-
-def _fields_alpha(scheme):
-    return FIELDS + 1
-
-
-def _remember_newmark(scheme, work, k, j, e):
-    pass
-
-
 def _remember_alpha(scheme, work, k, j, e):
     work[k, E, j] = e
 
@@ -117,34 +105,19 @@ class Family(NamedTuple):
     corrected: Callable[..., Any]
 
 
-_NEWMARK = Family(_fields_newmark, _first_newmark, _remember_newmark, _advance_newmark, _corrected_newmark)
-_ALPHA = Family(_fields_alpha, _first_alpha, _remember_alpha, _advance_alpha, _corrected_alpha)
+_NEWMARK = Family(
+    lambda scheme: FIELDS,
+    _first_newmark,
+    lambda scheme, work, k, j, e: None,
+    _advance_newmark,
+    _corrected_newmark,
+)
+_ALPHA = Family(lambda scheme: FIELDS + 1, _first_alpha, _remember_alpha, _advance_alpha, _corrected_alpha)
 
 
 def _family(coefficients: type) -> Family:
     return _ALPHA if coefficients is Alpha else _NEWMARK
 
 
-@chosen_for(fields_of)
-def _choose_fields(scheme):
-    return _family(scheme.instance_class).fields
-
-
-@chosen_for(remember)
-def _choose_remember(scheme, work, k, j, e):
-    return _family(scheme.instance_class).remember
-
-
-@chosen_for(first_predictors)
-def _choose_first(scheme, q, v, a, memory):
-    return _family(scheme.instance_class).first
-
-
-@chosen_for(advance)
-def _choose_advance(scheme, work, k, x):
-    return _family(scheme.instance_class).advance
-
-
-@chosen_for(corrected)
-def _choose_corrected(scheme, work, b, k, j, x):
-    return _family(scheme.instance_class).corrected
+for _stub, _name in zip((fields_of, first_predictors, remember, advance, corrected), Family._fields, strict=True):
+    chosen_for(_stub)(lambda scheme, *others, name=_name: getattr(_family(scheme.instance_class), name))
