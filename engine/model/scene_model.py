@@ -14,9 +14,9 @@ import numpy as np
 
 from engine.bodies.build import build_body
 from engine.model.numerics import Numerics
+from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
-from engine.model.timeline import Rider
 from engine.scene.variants import SpringKeys, keys_of_carriage
 from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput

@@ -16,8 +16,9 @@ from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
+    from engine.model.rider import Rider
     from engine.model.scene_model import SceneModel
-    from engine.model.timeline import Rider, Segment, Timeline
+    from engine.model.timeline import Segment, Timeline
 
 
 NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end

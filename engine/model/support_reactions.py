@@ -17,8 +17,8 @@ from results_schema.errors import BadInput
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.numerics import Numerics
+    from engine.model.rider import Rider
     from engine.model.ties import CarriageTie
-    from engine.model.timeline import Rider
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
 

@@ -11,7 +11,7 @@ from results_schema.arrays import Array
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
-    from engine.model.timeline import Rider
+    from engine.model.rider import Rider
     from engine.scene.variants import SpringKeys
 
 

@@ -11,10 +11,11 @@ from engine.observation.readings import Sensor
 from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:
+    from engine.model.rider import Rider
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
     from engine.model.ties import Attachment
-    from engine.model.timeline import Rider, Timeline
+    from engine.model.timeline import Timeline
     from engine.observation.readings import Channel
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 
 from engine.scene.settings import SweepAxis
 from engine.scene.study import FIXED, Scene, Study, value_in, with_value
-from engine.study_file.spec import bad_input, nearest
+from engine.study_file.refusals import bad_input
+from engine.study_file.spec import nearest
 from results_schema.errors import BadInput, shortened
 
 CHECKED_ONE_BY_ONE = 1000  # longer lists of plain numbers are checked at their ends: every field's limits are intervals

@@ -24,7 +24,8 @@ from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
-from engine.study_file.spec import Keys, Noun, Spec, field_at, one_of, refuse
+from engine.study_file.refusals import Keys, field_at, refuse
+from engine.study_file.spec import Noun, Spec, one_of
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.status import Status, label

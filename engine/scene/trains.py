@@ -13,7 +13,8 @@ from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.scene.motions.base import Motion
 from engine.study_file.document import Document
-from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form, refuse
+from engine.study_file.refusals import refuse
+from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
 from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, fault
 from results_schema.arrays import Array
 

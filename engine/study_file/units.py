@@ -114,7 +114,7 @@ def unit_of(dimension: Any) -> Unit:
 
 
 def fault(what: str, *, expected: str = "", received: str = "", remedy: str = "") -> PydanticCustomError:
-    """A refusal raised inside a pydantic validator; `engine.study_file.spec` turns it into BadInput."""
+    """A refusal raised inside a pydantic validator; `engine.study_file.refusals` turns it into BadInput."""
     context = {"what": what, "expected": expected, "received": received, "remedy": remedy}
     return PydanticCustomError("wanderlast", "{what}", context)
 

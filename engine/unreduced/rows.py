@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine.model.timeline import Rider
+from engine.model.rider import Rider
 from engine.scene.sensors import Sensor
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
 from engine.unreduced.track import WIDTH, Rows, no_rows

@@ -183,7 +183,8 @@ def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
     """
     from pydantic import ValidationError, create_model
 
-    from engine.study_file.spec import Spec, refuse
+    from engine.study_file.refusals import refuse
+    from engine.study_file.spec import Spec
 
     data = {"question": study.question}
     whole = create_model("Whole", __base__=Spec, question=(settings, ...))

@@ -7,7 +7,8 @@ import pytest
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
-from engine.model.timeline import Rider, build_timeline
+from engine.model.rider import Rider
+from engine.model.timeline import build_timeline
 from engine.observation.histories import counts_reduced
 from tests.engine.build import beam, cruise, force, study, swing
 from tests.engine.kept_cycles import Kept

@@ -9,7 +9,8 @@ import pytest
 
 from engine.batch.execution import run
 from engine.batch.plan import make_plan
-from engine.model.timeline import Rider, build_timeline
+from engine.model.rider import Rider
+from engine.model.timeline import build_timeline
 from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal
 from engine.scene.study import Study
 from results_schema.errors import BadInput

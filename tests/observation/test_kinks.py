@@ -9,7 +9,7 @@ from engine.batch.execution import run
 from engine.batch.plan import make_plan
 from engine.march.outcome import outcome
 from engine.march.tables import SceneTables
-from engine.model.timeline import Rider
+from engine.model.rider import Rider
 from studies import kind_named
 from tests.engine.build import beam, cruise, fixed, force, shuttle, study
 
