@@ -1,4 +1,4 @@
-"""What all parts of a study file share: the strict base class, the choice by `kind`, and validators of words and lists."""
+"""What all parts of a study file share: the strict base class, the choice by `kind`, validators of words and lists."""
 
 from __future__ import annotations
 

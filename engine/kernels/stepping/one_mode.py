@@ -119,5 +119,6 @@ def _family(coefficients: type) -> Family:
     return _ALPHA if coefficients is Alpha else _NEWMARK
 
 
-for _stub, _name in zip((fields_of, first_predictors, remember, advance, corrected), Family._fields, strict=True):
+_STUBS: tuple[Callable[..., Any], ...] = (fields_of, first_predictors, remember, advance, corrected)
+for _stub, _name in zip(_STUBS, Family._fields, strict=True):
     chosen_for(_stub)(lambda scheme, *others, name=_name: getattr(_family(scheme.instance_class), name))
