@@ -4,7 +4,7 @@ they report stays where it is."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +15,7 @@ from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
+from engine.robots.modes import MODES, MOST_MISSED, MOST_TIMES, missed_part, open_bodies, with_open_modes
 from engine.robots.results import differences, outcome, results_of, times_apart, without_values
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from engine.robots.results import Outcome
     from engine.scene.study import Study
 
-#: Modes of each rail where these are open: first, refined, and in audits. 24 leave 2e-3 to 8e-3 of errors on the portal
-#: with limits of acceleration from 0.3 to 2, 48 leave 6e-4 to 1.2e-3 beside 64, more than which no frame gives.
-MODES = (24, 48, 64)
 #: Steps per first period of the rails, doubled so often at most. 12 leave 1e-3 to 3e-2 there, 24 an eighth of that.
 FIRST_STEPS, REFINED, MOST_STEPS = 12, 6, 2_000_000
 #: Of a change, at least told to be left after it: twice the modes left 0.17 to 0.6 of the largest there (0.96 from 10
@@ -60,13 +58,14 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """Levels from coarse to fine over a time (s); step: the longest of the coarsest (s). Stations are the same on all
-    levels."""
+    """Levels from coarse to fine over a time (s); step: the longest of the coarsest (s); times: so many times `MODES`.
+    Stations are the same on all levels."""
 
     study: Study
     coarsest: RobotModel
     duration: float
     step: float
+    times: int = 1
 
     @classmethod
     def of(cls, study: Study, duration: float | None, after: float) -> Ladder:
@@ -74,7 +73,11 @@ class Ladder:
         model, fixed = build(with_open_modes(study)), study.solver.steps
         until = float(model.done.max()) + after if duration is None else duration
         step = 2.0 * np.pi / model.first_omega / FIRST_STEPS if fixed == "auto" else until / int(fixed)
-        return cls(study, model, until, step)
+        ladder = cls(study, model, until, step)
+        while open_bodies(study) and ladder.times < MOST_TIMES and ladder.missed_by(ladder.coarsest) > MOST_MISSED:
+            times = 2 * ladder.times
+            ladder = replace(ladder, coarsest=build(with_open_modes(study, times * MODES[0])), times=times)
+        return ladder
 
     @property
     def most(self) -> Rung:
@@ -86,7 +89,7 @@ class Ladder:
         """The march of a rung."""
         model, every = self.coarsest, 2**rung.steps
         if rung.modes:
-            model = build(with_open_modes(self.study, rung.modes))
+            model = build(with_open_modes(self.study, self.times * MODES[rung.modes]))
         return Level(model, stretches(model, self.duration, self.step / every, every), self.resting[0])
 
     @cached_property
@@ -94,6 +97,10 @@ class Ladder:
         """Where all would rest, at the stations of all levels, by the coarsest model: what modes miss at rest is
         added."""
         return rest(self.coarsest, stretches(self.coarsest, self.duration, self.step, 1))
+
+    def missed_by(self, model: RobotModel) -> float:
+        """Of what robots at rest bend, the part that the modes of a model miss."""
+        return missed_part(model, self.resting[0])
 
     def finer(self, rung: Rung, told: tuple[float, float]) -> Rung | None:
         """The next rung by the errors told of modes and of steps: the larger one is refined where it can be, else the
@@ -138,17 +145,6 @@ def scheme_of(study: Study) -> NewmarkScheme:
     )
 
 
-def open_bodies(study: Study) -> list[str]:
-    """Bodies whose number of modes is open."""
-    return [name for name, body in study.body.items() if body.modes == "auto"]
-
-
-def with_open_modes(study: Study, refined: int = 0) -> Study:
-    """The study with the modes of a rung for all bodies whose number is open."""
-    own = {f"body.{name}.modes": MODES[refined] for name in open_bodies(study)}
-    return study.with_values(own) if own else study
-
-
 def converge(
     study: Study, duration: float | None, after: float, zero: str, halted: Callable[[], bool] = lambda: False
 ) -> Converged:
@@ -181,6 +177,8 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         apart = differences(level.model, before, now)
         apart = np.maximum(apart, ALIKE * apart.max())
         told[axis] = left(apart, change[axis], least[axis])
+        if axis == 0:
+            told[0] = np.maximum(told[0], ladder.missed_by(level.model))
         rung, change[axis], when[axis] = finer, apart, times_apart(level.model, before, now)
     error = told[0] + told[1] + now.missed
     judged = Status.UNRESOLVED

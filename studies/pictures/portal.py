@@ -253,8 +253,8 @@ def _beside(foot: tuple[float, float]) -> float:
 
 def _worst_move(results: Results, index: Index) -> Figure | None:
     """The move in which a tool of its robot is off the most, in motion; None where nothing moves."""
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.robots.results import ways
     from engine.scene.sweep import expand
 

@@ -96,8 +96,8 @@ def _statics(results: Results) -> Iterator[str]:
 
 def _causes(results: Results) -> Iterator[str]:
     """What moves where the error is longest, and what is left of it when one robot stands still."""
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.robots.results import moving_at
 
     dataset = results.dataset

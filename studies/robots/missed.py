@@ -70,8 +70,8 @@ def _in_words(results: Results, one: _Missed) -> str:
 
 def _model(results: Results, at: Index) -> RobotModel:
     """That of a variant."""
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.scene.sweep import expand
 
     flat = int(np.ravel_multi_index(at, results.shape)) if at else 0

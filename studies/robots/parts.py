@@ -141,8 +141,8 @@ def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
 
 def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
     """Everything, labelled."""
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.robots.results import results_of
     from engine.scene.sweep import expand
 

@@ -34,8 +34,8 @@ NUMBERS = 16  # of every robot or rail
 
 def tables(study: Study) -> Iterator[TextTable]:
     """Robots, and when they move; of the scene without sweep, cycle times of the sweep."""
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.robots.plans import plans_of, reach
     from engine.robots.results import ways
     from engine.scene.sweep import expand
@@ -66,7 +66,9 @@ def tables(study: Study) -> Iterator[TextTable]:
 def foreseen(study: Study, question: Question, threads: int, audited: int) -> Foreseen:
     """What a run takes, by some of its variants, which are marched as it does."""
     from engine.batch.places import run_jobs
-    from engine.robots.converge import Ladder, climb, converge, with_open_modes
+    from engine.bodies.modal.description import MAX_MODES
+    from engine.robots.converge import Ladder, climb, converge
+    from engine.robots.modes import MODES, open_bodies
     from engine.scene.sweep import expand
 
     cases, base = expand(study), study.without_sweep()
@@ -90,8 +92,9 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     each = took / len(found) if found else UNFINISHED * took / len(some)
     marches = cases.size + (len(study.robot) if question.one_at_a_time and len(study.robot) > 1 else 0)
     again = AUDIT * threads * np.ceil(audited / threads)
-    refined = max((one.rung.modes for one in found.values()), default=0)
-    fuller = with_open_modes(study, refined)
+    marched = [one.model.study.body[name].modes for one in found.values() for name in open_bodies(study)]
+    most = min(max(map(int, marched), default=MODES[0]), MAX_MODES)  # no study file may fix more
+    fuller = study.with_values({f"body.{name}.modes": most for name in open_bodies(study)})
     less = "" if found else f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
     table = _taken(cases, {variant: found[variant] for variant in sorted(found)})
     return Foreseen(fuller, table, float(each * (marches + again)), _bytes(study, cases), less)
@@ -118,8 +121,8 @@ def _taken(cases: Cases, found: dict[int, Converged]) -> TextTable:
 def _bytes(study: Study, cases: Cases) -> int:
     """What an archive has: mostly its histories."""
     from engine.batch.plan import shown
-    from engine.robots.converge import with_open_modes
     from engine.robots.model import build
+    from engine.robots.modes import with_open_modes
     from engine.robots.results import KEPT
 
     model: RobotModel = build(with_open_modes(study.without_sweep()))

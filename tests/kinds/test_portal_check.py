@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import studies
-from engine.robots.converge import with_open_modes
 from engine.robots.march import march, stretches
 from engine.robots.model import build
+from engine.robots.modes import with_open_modes
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
