@@ -15,7 +15,15 @@ from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
-from engine.robots.modes import MODES, MOST_MISSED, MOST_TIMES, missed_part, open_bodies, with_open_modes
+from engine.robots.modes import (
+    MODES,
+    MOST_MISSED,
+    MOST_TIMES,
+    missed_part,
+    open_bodies,
+    with_finer_modes,
+    with_open_modes,
+)
 from engine.robots.results import differences, outcome, results_of, times_apart, without_values
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -120,7 +128,8 @@ class Ladder:
 @dataclass(frozen=True, eq=False)
 class Converged:
     """What a variant reports: its outcome with the model, the error of every result, and the time (s) at which that
-    changed the most by what the larger part of its error is told of; steps, its rung, status."""
+    changed the most by what the larger part of its error is told of, but for modes that the study fixes; steps, its
+    rung; status, which these modes leave as it is."""
 
     model: RobotModel
     outcome: Outcome
@@ -155,9 +164,10 @@ def converge(
 
 def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False) -> Converged:
     """March rung by rung until what is held stays. Raises Halted."""
-    rung, tolerance = Rung(0, 0), ladder.study.solver.tolerance
+    rung = coarser = Rung(0, 0)
+    tolerance = ladder.study.solver.tolerance
     level = ladder.level(rung)
-    now = marched(level, zero)
+    now = before = marched(level, zero)
     unknown = np.full(len(results_of(level.model)), np.nan)
     least = LEFT_BY_MODES, LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
     when, change, told = (
@@ -172,7 +182,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
             break
         if halted():
             raise Halted
-        axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
+        axis, before, coarser, level = int(finer.steps > rung.steps), now, rung, ladder.level(finer)
         now = marched(level, zero)
         apart = differences(level.model, before, now)
         apart = np.maximum(apart, ALIKE * apart.max())
@@ -186,7 +196,24 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         judged = Status.OK if error.max() <= tolerance else Status.TOLERANCE_MISSED
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
     reported, times = now if whole.values_kept else without_values(now), np.where(told[0] > told[1], *when)
+    error = error + by_fixed_modes(ladder, coarser, before, zero, halted)
     return Converged(level.model, reported, error, times, int(level.times.steps.sum()), rung, whole)
+
+
+def by_fixed_modes(
+    ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted: Callable[[], bool]
+) -> Array | float:
+    """(results,) the error by modes that a study fixes, at a rung: what twice as many change, and what these miss.
+    Raises Halted."""
+    study = with_finer_modes(ladder.study)
+    if study is None:
+        return 0.0
+    if halted():
+        raise Halted
+    finer = replace(ladder, study=study, coarsest=build(with_open_modes(study, ladder.times * MODES[0])))
+    level = finer.level(rung)
+    apart = differences(level.model, found, marched(level, zero))
+    return np.maximum(apart, ALIKE * apart.max()) + finer.missed_by(level.model)
 
 
 def left(change: Array, before: Array, least: float) -> Array:

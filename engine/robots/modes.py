@@ -33,6 +33,12 @@ def with_open_modes(study: Study, modes: int = MODES[0]) -> Study:
     return study.model_copy(update={"body": {**study.body, **own}}) if own else study
 
 
+def with_finer_modes(study: Study) -> Study | None:
+    """The study with twice the modes of bodies that fix theirs; None where none does."""
+    own = {name: body.with_more_modes(2) for name, body in study.body.items() if not body.modes_are_open}
+    return study.model_copy(update={"body": {**study.body, **own}}) if own else None
+
+
 def missed_part(model: RobotModel, resting: Record) -> float:
     """Of the elastic energy that robots give a rail where all rest, the largest part that its modes miss, over rails.
 

@@ -46,7 +46,8 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
     study = swept()
     cases = expand(study)
     assert found["error_moving"].dims == ("acceleration", "payload", "robot")
-    assert (found["status"] == Status.OK).all() and (found["error_estimate"] <= 1e-2).all()
+    assert (found["status"] == Status.OK).all()  # without what its fixed modes leave, all are told 1e-2 at most
+    assert np.isfinite(found["error_estimate"]).all()
     alone = converge(cases.study_of(study, 4), None, 0.5, "start")
     for name in ("cycle_time", "error_moving", "error_largest", "beyond_rest_working", "deflection_largest"):
         np.testing.assert_array_equal(found[name].values[2, 0], alone.outcome.numbers[name])
@@ -74,16 +75,17 @@ def test_statics_do_for_all_of_the_time_where_robots_crawl(found: Any) -> None:
 
 @pytest.mark.parametrize("modes", [6, "auto"])
 def test_estimated_errors_are_no_smaller_than_true_ones(modes: int | str) -> None:
-    """Against a march with eight times the steps, and with all modes of the rails where these are open."""
+    """Against a march with eight times the steps and all modes of the rails."""
     study = swept()
     cases = expand(study)
     for variant in (1, 4):
         own = cases.study_of(study, variant).with_values({f"body.{name}.modes": modes for name in study.body})
         found = converge(own, None, 0.5, "start")
-        whole = own.with_values({f"body.{name}.modes": 6 if modes == 6 else 64 for name in study.body})
+        whole = own.with_values({f"body.{name}.modes": 64 for name in study.body})
         finest = Ladder.of(whole, None, 0.5).level(Rung(0, found.rung.steps + 3))
         true = differences(found.model, found.outcome, marched(finest, "start"))
-        assert (true <= found.error).all() and found.error.max() <= 1e-2 and (true > 1e-5).all()
+        assert (true <= found.error).all() and found.status == Status.OK and (true > 1e-5).all()
+        assert modes == 6 or found.error.max() <= 1e-2
         many = own.with_values({f"body.{name}.modes": 20 for name in own.body})
         fuller = marched(Ladder.of(many, None, 0.5).level(Rung(0, found.rung.steps + 3)), "start")
         assert (differences(found.model, found.outcome, fuller)[:2] < 2e-2).all()

@@ -80,6 +80,16 @@ def test_what_modes_miss_is_told_where_no_level_has_more(monkeypatch: pytest.Mon
     assert (true <= found.error).all() and true.min() > 3e-2
 
 
+@pytest.mark.parametrize("modes", [2, 4, 6, 12, 24])
+def test_errors_by_modes_that_a_study_fixes_are_told_and_miss_nothing(modes: int) -> None:
+    """Against all modes of the rails; what is told is a few times what is true."""
+    study = scene({"modes": modes}, solver={"tolerance": 1e-2})
+    found = climb(Ladder.of(study, None, 0.5), "start")
+    true = off(study, found, 64)
+    assert (true <= found.error).all() and found.error.max() < 8.0 * true.max()
+    assert found.status == Status.OK and found.model.modes == 2 * modes
+
+
 @pytest.mark.parametrize("modes", [4, 12, 30])
 def test_what_modes_miss_is_of_all_that_robots_bend(modes: int) -> None:
     """A robot that stands on the axis of a rail: by how much less this goes down by its modes alone."""
