@@ -37,7 +37,8 @@ ROOMS = (
     *("engine.batch", "engine.methods", "engine.unreduced"),
     *("studies.results", "studies.protocol", "studies.findings", "studies.at_rest", "studies.precision"),
     *("studies.moving", "studies.robots"),
-    *("studies.maps", "studies.runs", "studies.pictures.common", "studies.pictures", "studies.kinds"),
+    *("studies.maps", "studies.runs", "studies.pictures.common", "studies.pictures.passages"),
+    *("studies.pictures", "studies.kinds"),
     *("studies.reporting", "studies.commands", "studies"),
 )
 # What every room may know of those above it: the public names of a package, by which users know it.

@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from engine.study_file.spec import Spec
-from engine.study_file.units import Acceleration, Length, Pressure, Speed, Torque
+from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
 from results_schema.arrays import Array, Mask
+from studies.findings.amplification import largest, sizes
 from studies.results.formatting import counted, listed
 from studies.results.results import VARIANT, Axis, Results
 
@@ -32,6 +33,32 @@ class Limits(Spec):
     def limit(self, name: str) -> float | None:
         """What is named for a quantity."""
         return getattr(self, name) if name in LIMITED else None
+
+
+class AskedOfPassages(Limits):
+    """The table [question] of a passage. amplification: dynamic over static, of which is told at which speeds it is
+    exceeded; the limits: of absolute values, of which the same is told for every sensor of that quantity; residual: of
+    residual vibrations."""
+
+    amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
+    residual: Limits = Limits()
+
+
+def ranked(results: Results, limits: Limits) -> list[str]:
+    """Sensors by what they say: those with a limit, what is the largest part of it first; then the first of every other
+    quantity, the second of every one, and so on."""
+    parts: dict[str, float] = {}
+    turns: dict[str, tuple[int, int]] = {}
+    seen: list[str] = []
+    for place, (name, sensor) in enumerate(results.study.sensor.items()):
+        if (limit := limits.limit(sensor.quantity)) is not None:
+            values = sizes(results, name)
+            top = largest(results, values)
+            parts[name] = 0.0 if top is None else float(values[top]) / limit
+        turns[name] = (seen.count(sensor.quantity), place)
+        seen.append(sensor.quantity)
+    rest = [name for name in sorted(turns, key=turns.__getitem__) if name not in parts]
+    return [*sorted(parts, key=lambda name: -parts[name]), *rest]
 
 
 def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:

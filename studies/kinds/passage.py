@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from engine.scene.study import Study
-from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
-from studies.findings.beyond import MOST_TOLD, Limits, where_beyond
+from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
 from studies.findings.residual import check_residual, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
@@ -28,29 +25,20 @@ BEYOND = "The equations assume contact: beyond, they say no more."
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
 
-class Asked(Limits):
-    """The table [question]. amplification: dynamic over static, of which is told at which speeds it is exceeded; the
-    limits: of absolute values, of which the same is told for every sensor of that quantity; residual: of residual
-    vibrations."""
-
-    amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
-    residual: Limits = Limits()
-
-
 class Passage(Kind):
     """The kind "passage"."""
 
     name = "passage"
     summary = "largest and smallest of every sensor and of the contact force, dynamic amplification"
     question = "How large does the response get, and does the contact hold?"
-    settings = Asked
+    settings = AskedOfPassages
     drawn_by = "studies.pictures.passage"
 
     def check(self, study: Study) -> None:
         """Something moves and something is measured."""
         first_carriage(study)
         check_sensors(study)
-        check_residual(study, question_of(study, Asked).residual)
+        check_residual(study, question_of(study, AskedOfPassages).residual)
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return with_amplification(dataset, study)
@@ -61,7 +49,7 @@ class Passage(Kind):
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
-        residual = residuals(results, question_of(results.study, Asked).residual)
+        residual = residuals(results, question_of(results.study, AskedOfPassages).residual)
         first = [*residual[:1], *said[:1], *lifted]
         return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
@@ -76,7 +64,7 @@ KIND = Passage()
 
 def _told(results: Results) -> list[str]:
     """The sensors that the answer is about."""
-    return list(results.sensors)[:MOST_SENSORS]
+    return ranked(results, question_of(results.study, AskedOfPassages))[:MOST_SENSORS]
 
 
 def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
@@ -112,14 +100,14 @@ def _amplified(results: Results, sensor: str) -> str:
     gain = results.numbers("dynamic_amplification", sensor)
     if results.size < 2 or not np.isfinite(np.where(results.with_values, gain, np.nan)).any():
         return ""
-    threshold = question_of(results.study, Asked).amplification
+    threshold = question_of(results.study, AskedOfPassages).amplification
     where = where_beyond(results, gain, threshold, results.axis(*PACES))
     return f" The dynamic amplification exceeds {number(threshold)} {where}."
 
 
 def _limited(results: Results, sensor: str) -> str:
     """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
-    limit = question_of(results.study, Asked).limit(results.study.sensor[sensor].quantity)
+    limit = question_of(results.study, AskedOfPassages).limit(results.study.sensor[sensor].quantity)
     if limit is None:
         return ""
     said, values = quantity(limit, results.sensors[sensor]), sizes(results, sensor)

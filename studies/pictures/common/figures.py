@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -186,6 +186,18 @@ def is_logarithmic(values: Array) -> bool:
 def zero_line(axes: Axes) -> None:
     """A thin line at zero."""
     axes.axhline(0.0, color=MUTED, linewidth=0.7, zorder=1.5)
+
+
+def limit_line(axes: Axes, value: float, words: str, side: Literal["left", "right"]) -> None:
+    """A line at a limit, in the axis's unit, with words on it at the side where curves are low."""
+    axes.axhline(value, color=VERMILION, linewidth=1.1, zorder=2.5)
+    across, at = axes.get_yaxis_transform(), {"left": 0.01, "right": 0.99}[side]
+    axes.text(at, value, words, transform=across, ha=side, va="bottom", color=VERMILION, fontsize=8.0)
+
+
+def limit_far(axes: Axes, words: str) -> None:
+    """Words on a limit that lies outside the plot."""
+    axes.set_title(words, loc="right", color=VERMILION, fontsize=8.0)
 
 
 def widen(axes: Axes, values: Sequence[Array]) -> None:

@@ -1,0 +1,125 @@
+"""Figures of a passage's largest values, one for each quantity, with the limit that the study names for it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from studies.findings.amplification import largest, size_errors, sizes
+from studies.pictures.common.figures import Figure, draw, limit_far, limit_line
+from studies.pictures.common.sweep_view import Curve, View, along_axis, draw_curves, one_legend, ratio_above
+from studies.results.findings_common import LOOSE, in_words
+from studies.results.formatting import counted, listed, percent, quantity, scale_for
+from studies.results.results import Index, Results
+
+MOST_SENSORS = 4  # of one quantity
+FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves would be flat under it
+
+
+def gain(results: Results, sensor: str) -> Any:
+    """The dynamic amplification of a sensor, over the sweep."""
+    return results.of_sensor("dynamic_amplification", sensor)
+
+
+def speed_ratio(axes: Any, seen: View) -> None:
+    """A scale above of the speed over the critical one, where that is known."""
+    ratio_above(axes, seen, seen.results.dataset.coords.get("speed_ratio"), "speed over the critical speed ω₁ L/π")
+
+
+def sizes_of(seen: View, sensors: list[str], limit: float | None, top: Index) -> Figure:
+    """The largest absolute values of sensors of one quantity, those with the largest where they are many, beside their
+    amplification where statics know it. top: the variant with the largest value of the first sensor."""
+    results = seen.results
+    shown = sorted(sensors, key=lambda name: -peak(results, name))[:MOST_SENSORS]
+    shown = [name for name in sensors if name in shown]
+    fewer = len(sensors) - len(shown)
+    amplified = any(np.isfinite(seen.plane(gain(results, sensor))).any() for sensor in shown)
+    loose = [sensor.replace("_", " ") for sensor in shown if _is_loose(seen, sensor)]
+    caption = seen.caption(
+        f"{'Left: l' if amplified else 'L'}argest absolute values"
+        f"{'; right: over the largest absolute static value of the same model' if amplified else ''}.",
+        "" if limit is None else "Red: the limit that the study names.",
+        f"Dashed: {listed(loose)} estimated to within more than {percent(LOOSE)}." if loose else "",
+        "Displacements point down." if any(map(results.hangs, shown)) else "",
+        "While the contact holds the answer counts; lines go on beyond." if not results.held.all() else "",
+        f"{counted(fewer, 'more sensor')} with smaller values." if fewer else "",
+    )
+    fill = partial(_draw, seen, shown, limit, 1 + amplified)
+    name = f"largest-{results.noun(shown[0])}"
+    return draw(name, _title(results, sensors[0], limit, top), caption, 0.9 + 1.9 * len(shown), fill)
+
+
+def peak(results: Results, sensor: str) -> float:
+    """The largest value of a sensor that has values."""
+    values = sizes(results, sensor)
+    top = largest(results, values)
+    assert top is not None
+    return float(values[top])
+
+
+def _title(results: Results, sensor: str, limit: float | None, top: Index) -> str:
+    units, size = results.sensors[sensor], peak(results, sensor)
+    against = ""
+    if limit is not None:
+        against = f", {'beyond' if size > limit else 'within'} the limit of {quantity(limit, units)}"
+    said = f"The largest {results.noun(sensor)} {results.place(sensor)} is {quantity(size, units)}"
+    return f"{said}{against},{in_words(results, top)}"
+
+
+def _is_loose(seen: View, sensor: str) -> bool:
+    """Whether curves of a sensor's largest values are dashed anywhere; sampled points are not."""
+    return not seen.is_sampled and any((curve.y > LOOSE).any() for curve in seen.curves(_errors(seen, sensor)))
+
+
+def _errors(seen: View, sensor: str) -> Any:
+    return seen.results.dataset["status"].copy(data=size_errors(seen.results, sensor))
+
+
+def _curves(seen: View, sensor: str, values: Any) -> list[Curve]:
+    """Curves of a sensor's largest values, or of what is proportional to them."""
+    pairs = zip(seen.curves(values), seen.curves(_errors(seen, sensor)), strict=True)
+    return [curve._replace(loose=error.y > LOOSE) for curve, error in pairs]
+
+
+def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, drawing: Drawing) -> None:
+    results = seen.results
+    grid = drawing.subplots(len(sensors), columns, squeeze=False, sharex=True)
+    for row, sensor in zip(grid, sensors, strict=True):
+        _draw_sizes(row[0], seen, sensor, limit)
+        if columns == 1:
+            continue
+        if np.isfinite(seen.plane(gain(results, sensor))).any():
+            draw_curves(row[1], seen, _curves(seen, sensor, gain(results, sensor)))
+            row[1].set_ylabel(f"dynamic amplification\n{results.place(sensor)}")
+        else:
+            row[1].set_visible(False)
+    one_legend([axes for row in grid for axes in row[::-1]])
+    for column in grid.T:
+        lowest = [axes for axes in column if axes.get_visible()][-1]
+        lowest.tick_params(labelbottom=True)
+        along_axis(lowest, seen)
+    for axes in grid[0]:
+        speed_ratio(axes, seen)
+    drawing.align_ylabels()
+
+
+def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
+    """The largest values of a sensor, and its limit."""
+    results = seen.results
+    size = results.dataset["status"].copy(data=sizes(results, sensor))
+    largest_shown = float(np.nanmax(seen.plane(size), initial=0.0))
+    scale = scale_for(largest_shown, results.sensors[sensor])
+    draw_curves(axes, seen, [curve._replace(y=curve.y * scale.factor) for curve in _curves(seen, sensor, size)])
+    axes.set_ylabel(results.label(sensor, scale.unit, "largest"))
+    axes.set_title(sensor.replace("_", " "))
+    if limit is not None and limit <= FAR * largest_shown:
+        limit_line(axes, limit * scale.factor, f"limit {quantity(limit, results.sensors[sensor])}", "left")
+    elif limit is not None:
+        limit_far(axes, f"limit {quantity(limit, results.sensors[sensor])}, beyond this panel")
+    axes.set_ylim(0.0, None)
+    if results.hangs(sensor):
+        axes.invert_yaxis()

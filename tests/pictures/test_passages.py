@@ -1,0 +1,85 @@
+"""Pages of passages draw every quantity, and what the question asks for first, with its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+
+from studies.pictures.common.figures import VERMILION, Figure
+from studies.reporting import answers
+from studies.reporting.report import MOST_OPEN
+from studies.results.results import Results
+from tests.studies import scenes
+
+PLACES = (1.0, 2.0, 3.0, 4.0, 6.0)
+SENSORS = "\n".join(f'[sensor.place_{at:g}]\nbody = "bed"\nat = {at}' for at in PLACES)
+SHAKEN = '[sensor.shaken]\nbody = "bed"\nat = 5.0\nquantity = "acceleration"'
+MASS = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+
+
+def run(question: str) -> xr.Dataset:
+    """Seven sensors of three quantities; the acceleration stands last."""
+    return scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}", extra=f"{SENSORS}\n{SHAKEN}\n{question}")
+
+
+def figures(dataset: xr.Dataset) -> dict[str, Figure]:
+    """The figures of the question by name, in their order."""
+    return {figure.name: figure for figure in answers.figures(dataset) if not figure.on_method}
+
+
+def panels(figure: Figure) -> dict[str, Axes]:
+    """The panels that tell a sensor, by its title."""
+    return {title: axes for axes in figure.drawing.axes if (title := axes.get_title("left"))}
+
+
+def limits(axes: Axes) -> list[float]:
+    """The heights of the lines of limits."""
+    lines = [line for line in axes.get_lines() if to_hex(line.get_color()) == VERMILION]
+    return [float(np.asarray(line.get_ydata())[0]) for line in lines]
+
+
+def test_every_quantity_is_drawn_and_the_largest_of_many_sensors() -> None:
+    found = figures(run(""))
+    assert next(iter(found)) == "largest-displacement"
+    assert {"largest-acceleration", "largest-bending-moment"} <= set(found)
+    drawn = panels(found["largest-displacement"])
+    assert list(drawn) == ["midspan", "place 3", "place 4", "place 6"]
+    assert "2 more sensors with smaller values." in found["largest-displacement"].caption
+    assert {"midspan", "moment", "shaken"} < set(panels(found["response"]))
+    assert not [line for figure in found.values() for axes in panels(figure).values() for line in limits(axes)]
+
+
+def test_what_has_a_limit_comes_first_with_its_limit_as_a_line_and_in_words() -> None:
+    dataset = run('[question]\nacceleration = 0.1\ndisplacement = "11 mm"')
+    found, results = figures(dataset), Results.of(dataset)
+    first = list(found)[:2]
+    assert set(first) == {"largest-acceleration", "largest-displacement"}
+    for name, sensor, line, words in (
+        ("largest-acceleration", "shaken", 0.1, "limit 0.1 m/s²"),
+        ("largest-displacement", "midspan", 11.0, "limit 11 mm"),
+    ):
+        for own in (found[name], found["response"]):
+            axes = panels(own)[sensor]
+            assert np.abs(limits(axes)) == pytest.approx(line) and words in [text.get_text() for text in axes.texts]
+        size = max(np.abs(dataset[f"{sensor}_{end}"].values).max() for end in ("max", "min"))
+        beyond = size > line * (1e-3 if sensor == "midspan" else 1.0)
+        assert f"{'beyond' if beyond else 'within'} the limit of" in found[name].title
+    told = [sentence.partition(":")[0] for sentence in answers.answer(dataset)]
+    assert "shaken" in told and results.sensors["shaken"] == "m s-2"
+
+
+def test_a_limit_far_off_is_told_and_does_not_flatten_the_curves() -> None:
+    found = figures(run("[question]\ndisplacement = 2.0"))
+    for name in ("largest-displacement", "response"):
+        axes = panels(found[name])["midspan"]
+        assert not limits(axes) and "limit 2 m, beyond this panel" in axes.get_title("right")
+    assert "within the limit of 2 m" in found["largest-displacement"].title
+
+
+def test_limited_quantities_stand_unfolded() -> None:
+    found = list(figures(run('[question]\nbending_moment = "1 kN m"\nacceleration = 1.0')))
+    assert {"largest-bending-moment", "largest-acceleration"} <= set(found[:2])
+    assert set(found[:2]) <= set(found[:MOST_OPEN])
