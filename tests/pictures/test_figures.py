@@ -8,6 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Drawing
 
 import engine
 import studies
@@ -164,6 +166,16 @@ def test_svg_has_no_script_and_identifiers_of_its_own() -> None:
         assert used and all((first or second) in defined for first, second in used)
         assert text == figures.svg(figure)
         assert "<script" not in text and "<!--" not in text and "DOCTYPE" not in text
+
+
+def test_every_file_takes_one_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing is what takes the time of a report."""
+    figure, drawn, draw = answers.figures(scenes.run("passage"))[0], [], Drawing.draw
+    monkeypatch.setattr(Drawing, "draw", lambda own, renderer: (drawn.append(own), draw(own, renderer)))
+    first = figures.svg(figure), figures.png(figure)
+    assert len(drawn) == 2
+    assert (figures.svg(figure), figures.png(figure)) == first
+    assert figure.drawing.dpi == 100.0 and isinstance(figure.drawing.canvas, FigureCanvasAgg)
 
 
 @pytest.mark.fault(39)
