@@ -200,9 +200,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     return Converged(level.model, reported, error, times, int(level.times.steps.sum()), rung, whole)
 
 
-def by_fixed_modes(
-    ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted: Callable[[], bool]
-) -> Array | float:
+def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted: Callable[[], bool]) -> Array | float:
     """(results,) the error by modes that a study fixes, at a rung: what twice as many change, and what these miss.
     Raises Halted."""
     study = with_finer_modes(ladder.study)
