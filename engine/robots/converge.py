@@ -211,7 +211,8 @@ def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted
     finer = replace(ladder, study=study, coarsest=build(with_open_modes(study, ladder.times * MODES[0])))
     level = finer.level(rung)
     apart = differences(level.model, found, marched(level, zero))
-    return np.maximum(apart, ALIKE * apart.max()) + finer.missed_by(level.model)
+    changed: Array = np.maximum(apart, ALIKE * apart.max())
+    return changed + finer.missed_by(level.model)
 
 
 def left(change: Array, before: Array, least: float) -> Array:
