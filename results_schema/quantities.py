@@ -32,7 +32,8 @@ class Quantity:
     unit: CF. derivative: its order by the place; rate: by time, of the point that a sensor reads, wherever that moves.
     factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
-    of_contact: no motion, but the force between a carriage and its body. told: its error makes no status, as forces
+    of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
+    carries. told: its error makes no status, as forces
     that enter excite every mode. meant: other words for it.
     """
 
@@ -45,6 +46,7 @@ class Quantity:
     needs_fibre: bool = False
     of_mass: bool = False
     of_contact: bool = False
+    of_support: bool = False
     told: bool = False
     meant: tuple[str, ...] = ()
 
@@ -68,16 +70,17 @@ _ROWS = (
     Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
     Quantity("bending_moment", "N m", 2, factor=_bending, of_section=True, meant=("moment",)),
     Quantity("shear_force", "N", 3, factor=_bending, of_section=True, meant=("shear",)),
-    Quantity("axial_force", "N", 1, of_section=True, meant=("normal_force",)),
+    Quantity("axial_force", "N", 1, of_section=True, meant=("normal-force",)),
     Quantity("stress", "Pa", 2, factor=_stress, of_section=True, needs_fibre=True),
     Quantity("strain", "1", 2, factor=lambda section: -section.fibre_distance, of_section=True, needs_fibre=True),
     Quantity("contact_force", "N", of_contact=True, told=True),
+    Quantity("support_reaction", "N", of_support=True, meant=("reaction", "support-force", "bearing-force")),
 )
 
 
 def _missing(piece: Any) -> list[str]:
     """What bodies and carriages tell by name is the program's own."""
-    own = ("of_section", "of_contact")
+    own = ("of_section", "of_contact", "of_support")
     return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
 
 

@@ -54,6 +54,8 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
 def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     """Refuse a sensor of another place or quantity."""
     fault, here = study.source.fault, f"sensor.{name}"
+    if sensor.reads.of_support:
+        raise fault(f"{here}.quantity", "supports of bodies in frames that move are not read", expected="displacement")
     if sensor.spot is not None or sensor.carriage is not None:
         raise fault(here, "this place is not read in frames that move", expected="at, or under")
     if sensor.under is not None and sensor.quantity != "displacement":

@@ -228,10 +228,18 @@ class Sensor:
 
 @dataclass(frozen=True, eq=False)
 class SpotSensor(Sensor):
-    """The motion of a place of a body off its track, which the modal body knows by the sensor's name; ``at`` is NaN."""
+    """The motion of a place of a body off its track, or what one of its supports carries, which the modal body knows by
+    the sensor's name; ``at`` is NaN."""
 
     def shape(self, model: SceneModel, along: Along, derivative: int) -> Array:
         return self._gauge(model).row[None]
+
+    def missed(self, model: SceneModel, along: Along) -> Array:
+        found, dampers = super().missed(model, along), self._gauge(model).dampers
+        for r, tie in enumerate(model.dampers, start=len(model.carriages)):
+            if tie.body == self.body:
+                found[:, r] -= dampers.get(tie.at, 0.0)  # whose force pushes the body back
+        return found
 
     def offset(self, model: SceneModel, along: Along) -> Array:
         weighs = model.bodies[self.body].own_weight and self.offset_order == 0
@@ -241,7 +249,7 @@ class SpotSensor(Sensor):
         """Whether no load on the track moves it, nor its body as a rigid one."""
         modal = self._modal(model)
         places = np.linspace(0.0, modal.length, PLACES)
-        usual = np.abs(modal.influence_at(places, places)).max()
+        usual = 1.0 if self.reads.of_support else np.abs(modal.influence_at(places, places)).max()
         return bool(not modal.rigid_modes and self.largest_influence(model, places) <= SILENT * usual)
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:

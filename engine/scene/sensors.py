@@ -20,10 +20,10 @@ PLACES = 6  # ways to say where a sensor stands
 EXPECTED = 'at = metres, node, member or point = "its name", under = "a carriage", or carriage = "a carriage"'
 
 
-def _of_a_body(word: str) -> str:
-    if word in QUANTITIES and not QUANTITIES[word].of_contact:
+def _along_a_body(word: str) -> str:
+    if word in QUANTITIES and not (QUANTITIES[word].of_contact or QUANTITIES[word].of_support):
         return word
-    return one_of(*quantities_of_a_body(), meant=MEANT)(word)
+    return one_of(*(name for name in quantities_of_a_body() if not QUANTITIES[name].of_support), meant=MEANT)(word)
 
 
 def _of_anything(word: str) -> str:
@@ -49,8 +49,8 @@ NodeName = Annotated[Annotated[str, Tag(WORD)] | Annotated[int, Tag(NUMBER)], by
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
     m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
-    of a carriage's own sprung mass (`carriage`), or the contact force of a carriage (of a body that rides, that at one
-    `contact`).
+    of a carriage's own sprung mass (`carriage`), the contact force of a carriage (of a body that rides, that at one
+    `contact`), or what a support at a place of a beam or at a node carries.
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -79,10 +79,12 @@ class Sensor(Spec):
             raise fault("a sensor at a fixed place needs its body", expected='body = "a body"')
         if self.member is not None and self.at is None:
             raise fault("a sensor on a member needs its place", expected="at = metres from the member's first node")
+        if self.reads.of_support and (self.rides, self.member, self.point) != (None, None, None):
+            raise fault("a support is a place of a beam, or a node", expected="at = metres, or node = its name")
         if self.direction is not None and self.node is None and self.member is None:
             raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
-            known = ", ".join(name for name, q in QUANTITIES.items() if not q.derivative and not q.of_contact)
+            known = ", ".join(name for name in quantities_of_a_body() if not QUANTITIES[name].derivative)
             expected, remedy = f"quantity: one of {known}", "at = metres along the track"
             raise fault(f"only a track has {self.quantity}", expected=expected, remedy=remedy)
         if self.carriage is not None and not (self.reads.of_mass or self.reads.of_contact):
@@ -106,13 +108,13 @@ class Sensor(Spec):
 
     @property
     def spot(self) -> Spot | None:
-        """The place that it reads off its body's track, if it does."""
-        if (self.node, self.member, self.point) == (None, None, None):
+        """The place that it reads off its body's track, or its support, if it does."""
+        if (self.node, self.member, self.point) == (None, None, None) and not self.reads.of_support:
             return None
         way = self.direction
         if isinstance(way, str):
             way = (float(way == "x"), float(way == "y"), float(way == "z"))
-        return Spot(self.node, self.member, self.at or 0.0, self.point, way)
+        return Spot(self.node, self.member, self.at or 0.0, self.point, way, self.reads.of_support)
 
 
 class Envelope(Spec):
@@ -124,7 +126,7 @@ class Envelope(Spec):
     """
 
     body: str
-    quantity: Annotated[str, AfterValidator(_of_a_body)] = "displacement"
+    quantity: Annotated[str, AfterValidator(_along_a_body)] = "displacement"
     places: int = Field(default=51, ge=2, le=MOST_PLACES)
     from_: Length | None = Field(default=None, alias="from", ge=0)
     to: Length | None = Field(default=None, gt=0)

@@ -326,9 +326,15 @@ def checks(study: Study) -> Iterator[Check]:
     for name, carriage in study.carriage.items():
         yield from carriage.checks(f"carriage.{name}")
     for name, sensor in study.sensor.items():
-        if sensor.at is not None and sensor.spot is None:
-            here = f"sensor.{name}.at"
-            yield on_body(here, (here, f"body.{sensor.body}.length"), "a sensor off its body")
+        here, read = f"sensor.{name}", f"body.{sensor.body}"
+        if sensor.spot is not None:
+            yield from study.body[str(sensor.body)].spot_checks(sensor.spot, here, read)
+        elif sensor.at is not None:
+            yield on_body(f"{here}.at", (f"{here}.at", f"{read}.length"), "a sensor off its body")
+    yield from _envelope_checks(study)
+
+
+def _envelope_checks(study: Study) -> Iterator[Check]:
     for name, envelope in study.envelope.items():
         for key, field in (("from", "from_"), ("to", "to")):
             if getattr(envelope, field) is not None:

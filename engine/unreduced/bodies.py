@@ -16,7 +16,7 @@ from engine.bodies.beam.beam import Beam, Spring
 from engine.bodies.frame.assembly import Assembly, assemble
 from engine.bodies.frame.body import frame_modes, kept_modes
 from engine.bodies.frame.frame import Frame
-from engine.bodies.frame.gauges import FrameSpot, point_loads
+from engine.bodies.frame.gauges import point_loads
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.track import track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
@@ -24,7 +24,8 @@ from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.rigid.rigid import Rigid
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
-from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, rows_of
+from engine.unreduced.gauges import FullGauge, FullRead, full_gauge
+from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.late import sparse
@@ -65,15 +66,6 @@ class Damping(NamedTuple):
     viscous: sparse.csc_array
     loads: Array
     rates: Array
-
-
-class FullGauge(NamedTuple):
-    """A place that a sensor reads off the track: rows (1,) on the degrees of freedom of the body; what a unit force at
-    places (S,) of the track, and own weight per unit gravity, add between the ends of its element."""
-
-    rows: Rows
-    within: Callable[[Array], Array]
-    under_weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +184,7 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
     track, ends = track_of(frame, assembly.mesh)
     gravity = unit(frame.gravity)
     numbers, loads = point_loads(frame, assembly)
-    spots = ((sensor, FrameSpot(frame, assembly, track, spot)) for sensor, spot in study.spots(name))
+    read = FullRead(frame, assembly, track, ends)
     return FullBody(
         name=name,
         length=float(track.places[-1]),
@@ -205,16 +197,9 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
         track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
         points={word: loads[:, number] for word, number in numbers.items()},
         along=AlongTrack.of(track, ends, assembly),
-        gauges={sensor: _gauge(place, loads, numbers) for sensor, place in spots},
+        gauges={sensor: full_gauge(read, spot) for sensor, spot in study.spots(name)},
         gravity_share=float(track.direction @ gravity),
     )
-
-
-def _gauge(place: FrameSpot, loads: Array, numbers: Mapping[str, int]) -> FullGauge:
-    """What a sensor reads; loads (n, P): of the points with these numbers."""
-    if place.spot.point is not None:
-        return FullGauge(rows_of(loads[:, numbers[f"point.{place.spot.point}"]]), np.zeros_like, 0.0)
-    return FullGauge(rows_of(place.row), place.within, place.under_weight)
 
 
 def _damping(study: Study, name: str, frame: Frame, assembly: Assembly, flexibility: Flexibility) -> Damping:

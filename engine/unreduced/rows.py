@@ -215,7 +215,11 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     body = model.study.body_of(name)
     track, first = model.bodies[body].track, model.firsts[body]
     if sensor.spot is not None:
-        return _of_rate(model.bodies[body].gauges[name].rows.moved(first).repeated(count), sensor)
+        gauge = model.bodies[body].gauges[name]
+        rows = gauge.rows.moved(first).repeated(count)
+        if gauge.rates is None:
+            return _of_rate(rows, sensor)
+        return _Parts(rows, *np.repeat(gauge.rates[:, None], count, axis=1))
     place, rider = _place(model, sensor, along)
     rate = sensor.reads.rate
     if sensor.reads.of_section:

@@ -257,10 +257,10 @@ def _sensors(scene: Layout) -> Table:
         spot = sensor.spot
         if sensor.rides is not None:
             where = f"moves with {sensor.rides}"
-        elif spot is None:
+        elif spot is None or spot.key == "at":
             where = f"at {number(sensor.at or 0.0, 4)} m of its track"
         else:
             place = study.body[str(sensor.body)].spot_place(spot)
-            where = f"{spot.key} {getattr(spot, spot.key)}" + ("" if place is None else f" at {_place(place)}")
+            where = f"{spot.key} {getattr(spot, spot.key):}" + ("" if place is None else f" at {_place(place)}")
         rows.append((name, sensor.quantity.replace("_", " "), study.body_of(name), where))
     return Table("Sensors", ("sensor", "quantity", "body", "where"), rows)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag
 
-from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh, Spot, Spots
+from engine.bodies.modal.modal_body import SAME_PLACE, Array, ModalBody
 from engine.bodies.modal.outline import ALONG, HELD_AT, Elastic, Held, Outline, straight
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.checks import Check, on_body
@@ -24,6 +25,7 @@ from engine.study_file.units import (
     SecondMoment,
     Stiffness,
 )
+from results_schema.errors import BadInput
 
 __all__ = ["MAX_MODES", "Beam", "Body", "Rayleigh", "Spring"]
 
@@ -123,9 +125,44 @@ class Beam(Body):
         return self
 
     def build(self) -> ModalBody:
-        from engine.bodies.beam.modes import uniform_beam
+        return self.read_at(())
 
-        return uniform_beam(self, AUTO_MODES if self.modes == "auto" else int(self.modes))
+    def read_at(self, spots: Spots) -> ModalBody:
+        from engine.bodies.beam.modes import restraints_of, uniform_beam
+        from engine.bodies.beam.supports import support_gauge
+
+        modal = uniform_beam(self, AUTO_MODES if self.modes == "auto" else int(self.modes))
+        if not spots:
+            return modal
+        held = restraints_of(self)
+        return replace(modal, gauges={name: support_gauge(modal, held, modal.dampers, s.at) for name, s in spots})
+
+    def spot_place(self, spot: Spot) -> Array:
+        return np.asarray(spot.at * ALONG)
+
+    def check_spot(self, spot: Spot) -> None:
+        if not spot.support:
+            super().check_spot(spot)
+        if spot.node is not None:
+            raise BadInput("supports of a uniform beam have no nodes", where="node", expected="at = metres along it")
+
+    def spot_checks(self, spot: Spot, sensor: str, here: str) -> list[Check]:
+        """A support that carries something stands where its reaction is read."""
+        at, length = f"{sensor}.at", f"{here}.length"
+        springs = [f"{here}.supports.{number}" for number in range(len(self.springs))]
+        keys = [f"{spring}.{key}" for spring in springs for key in ("at", "stiffness")]
+        held = [end != "free" for end in self.ends]
+        places = [s.at for s in self.springs if s.stiffness > 0.0]
+        places += [place for place, end in zip((0.0, self.length), held, strict=True) if end]
+
+        def stands(x: Any, length: Any, *springs: Any) -> Any:
+            found = (held[0] & (x == 0.0)) | (held[1] & (x == length))
+            for place, stiffness in zip(springs[::2], springs[1::2], strict=True):
+                found = found | ((np.abs(x - place) <= SAME_PLACE * length) & (stiffness > 0.0))
+            return found
+
+        expected = " or ".join(f"{place:.10g} m" for place in places) or "a body with supports"
+        return [Check(at, (at, length, *keys), stands, "no support stands here", expected)]
 
     def outline(self, modal: ModalBody) -> Outline:
         ends = zip(self.ends, (0.0, self.length), (-ALONG, ALONG), strict=True)

@@ -26,12 +26,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine.bodies.modal.modal_body import Array, frozen, refuse_loose
+from engine.bodies.modal.modal_body import SAME_PLACE, Array, frozen, refuse_loose
 from engine.kernels.influence import Functionals, functionals, influence
 from results_schema.errors import BadInput
 
 HIGHEST_DERIVATIVE = 3
-_SAME_PLACE = 1e-9  # lengths; a lever this short resists no rotation that a beam could feel
 _ON_BODY = 1e-12  # stations this far off the ends (in lengths) are taken as the ends
 
 
@@ -56,8 +55,8 @@ def merge(restraints: Iterable[Restraint]) -> tuple[Restraint, ...]:
     found: dict[tuple[float, int], float] = {}
     place = 0.0
     for one in sorted(restraints):
-        if one.at - place > _SAME_PLACE:
-            place = one.at if 1.0 - one.at > _SAME_PLACE else 1.0
+        if one.at - place > SAME_PLACE:
+            place = one.at if 1.0 - one.at > SAME_PLACE else 1.0
         compliance, other = one.compliance, found.get((place, one.order), np.inf)
         if other < np.inf:
             compliance = 0.0 if 0.0 in (compliance, other) else 1.0 / (1.0 / compliance + 1.0 / other)
@@ -196,13 +195,34 @@ class BeamStatics:
     def _functionals(self) -> Functionals:
         return _functionals(self.restraints, self.rigid)
 
+    @property
+    def _under_even_load(self) -> Array:
+        """(n,) reactions, and the rigid motion, under a unit load per length, dimensionless."""
+        load = [*(_even_load(one.at, one.order)[0] for one in self.restraints), -1.0, -0.5]
+        return np.asarray(self.inverse @ np.array(load))
+
+    def support_at(self, place: float) -> int:
+        """Number of the restraint of the deflection at a place, m. Raises BadInput where there is none."""
+        x = place / self.length
+        for number, one in enumerate(self.restraints):
+            if one.order == 0 and abs(one.at - x) <= SAME_PLACE:
+                return number
+        raise BadInput("no support here", where="at", expected="the place of a support", received=f"{place:.10g} m")
+
+    def reaction_at(self, support: int, s: ArrayLike) -> Array:
+        """(S,) what a support carries of a unit force at `s` (S,)."""
+        rows = _at(self._functionals, stations(s, self.length, 0), 0)
+        return np.asarray(np.sum(rows * self.inverse[support], axis=1))
+
+    def reaction_of_own_weight(self, support: int) -> float:
+        """What it carries of the beam's own weight per unit gravity, kg, where the supports hold that."""
+        return float(self._under_even_load[support] * self.mass_per_length * self.length)
+
     def own_weight_deflection(self, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under the beam's own weight per unit gravity, m^(1-j)/(m/s^2)."""
         refuse_loose(len(self.rigid))
         place = stations(x, self.length, derivative)
-        of = self._functionals
-        load = [*(_even_load(one.at, one.order)[0] for one in self.restraints), -1.0, -0.5]
-        reactions, unit = self.inverse @ np.array(load), _even_load(place, derivative)
-        for row, reaction in zip(_at(of, place, derivative).T, reactions, strict=True):
+        unit = _even_load(place, derivative)
+        for row, reaction in zip(_at(self._functionals, place, derivative).T, self._under_even_load, strict=True):
             unit = unit - row * reaction
         return unit * self.mass_per_length * self.length ** (4 - derivative) / self.bending_stiffness

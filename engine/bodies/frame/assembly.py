@@ -65,7 +65,8 @@ class Mesh:
 class Assembly:
     """A frame as matrices on its free degrees of freedom.
 
-    free (n,): their numbers among all 6 P; stiffness, mass (n, n) sparse; drag (n, 3): inertia forces of a unit
+    free (n,): their numbers among all 6 P; stiffness, mass (n, n) sparse; all_stiffness, all_mass (6 P, 6 P) sparse:
+    with those that are held; drag (n, 3): inertia forces of a unit
     acceleration of everything along x, y, z, kg; springs (k, 6 P): their elongations; rigid (n, r): motions without
     strain, any basis; total_mass kg.
     """
@@ -74,6 +75,8 @@ class Assembly:
     free: Counts
     stiffness: sparse.csc_array
     mass: sparse.csc_array
+    all_stiffness: sparse.csr_array
+    all_mass: sparse.csr_array
     drag: Array
     springs: Array
     rigid: Array
@@ -125,6 +128,8 @@ def _assemble(content: Content) -> Assembly:
         free=free,
         stiffness=stiff[free][:, free].tocsc(),
         mass=mass[free][:, free].tocsc(),
+        all_stiffness=stiff.tocsr(),
+        all_mass=mass.tocsr(),
         drag=mass[free] @ np.tile(np.eye(6)[:, :3], (len(mesh.points), 1)),
         springs=rows,
         rigid=rigid_motions(mesh, held, rows)[free],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
-from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, point_loads
+from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, loads_everywhere
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import along_shapes, mode_forces, track_shapes
@@ -76,7 +76,8 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
-    loads, pull = point_loads(frame, assembly), assembly.drag @ gravity
+    (numbers, everywhere), pull = loads_everywhere(frame, assembly), assembly.drag @ gravity
+    loads = numbers, everywhere[assembly.free]
     points = frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None
     read = Read(frame, assembly, flexibility, statics, whole.ends, omega, shapes)
     bending = track.bending
@@ -94,7 +95,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         sections=sections,
         points=points,
         along=along_shapes(track, moved, forces),
-        gauges={name: frame_gauge(read, spot, loads) for name, spot in spots},
+        gauges={name: frame_gauge(read, spot, (numbers, everywhere)) for name, spot in spots},
     )
 
 

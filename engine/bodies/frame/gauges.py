@@ -19,6 +19,7 @@ from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics
+from engine.bodies.frame.supports import frame_support
 from engine.bodies.frame.track import TrackBeams, TrackPoints, elements_of, line_of
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
@@ -109,7 +110,9 @@ class FrameSpot:
 
 
 def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) -> Gauge:
-    """A place that a sensor reads; points: names and loads (n, P) of the frame's points."""
+    """A place or support that a sensor reads; points: names and loads (6 P, P) of the frame's points."""
+    if spot.support:
+        return frame_support(read, spot, points)
     statics, assembly = read.statics, read.assembly
     place = FrameSpot(read.frame, assembly, statics.track, spot)
     row = place.row
@@ -120,7 +123,7 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
     return Gauge(
         row=place.mode_row(read.omega, read.shapes),
         along=partial(_along, statics, response, place),
-        points={name: float(loads[:, number] @ moved[:, 0]) for name, number in names.items()},
+        points={name: float(loads[assembly.free, number] @ moved[:, 0]) for name, number in names.items()},
         rigid=statics.rigid,
         weight=weight,
     )
@@ -132,6 +135,12 @@ def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -
 
 def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:
     """Names with their numbers, and loads (n, P): the points of the study, then all directions of all springs."""
+    numbers, loads = loads_everywhere(frame, assembly)
+    return numbers, loads[assembly.free]
+
+
+def loads_everywhere(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:
+    """The same on all degrees of freedom, (6 P, P)."""
     nodes = {name: index for index, name in enumerate(frame.node)}
     total = len(assembly.mesh.points)
     rows: dict[str, Array] = {}
@@ -144,7 +153,7 @@ def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array
         for word, row in zip(DIRECTIONS, spring_rows(frame, name, nodes, assembly.mesh), strict=True):
             rows[f"spring.{name}.{word}"] = row
     numbers = {name: index for index, name in enumerate(rows)}
-    return numbers, np.array(list(rows.values())).reshape(len(rows), 6 * total).T[assembly.free]
+    return numbers, np.array(list(rows.values())).reshape(len(rows), 6 * total).T
 
 
 def frame_points(

@@ -217,11 +217,31 @@ def check_spot(frame: Frame, spot: Spot) -> None:
         if spot.at > length:
             expected = f"0 to {length:.10g} m, from its first node"
             raise BadInput("a sensor off its member", where="at", expected=expected, received=f"{spot.at:.10g} m")
+    if spot.support:
+        _check_support(frame, spot)
+        return
     held = frame.still if spot.node is None else (*frame.still, *frame.holds(str(spot.node)))
     way = unit(frame.gravity if spot.direction is None else spot.direction)
     if spot.point is None and not any(way[axis] for axis, word in enumerate("xyz") if word not in held):
         what = "nothing moves here in this direction"
         raise BadInput(what, where="direction", expected="a direction that is not held", remedy=f"{spot.key} elsewhere")
+
+
+def _check_support(frame: Frame, spot: Spot) -> None:
+    """Something holds the node in the direction that is read."""
+    to_ground = {name: spring for name, spring in frame.spring.items() if spring.to is None}
+    nodes = dict.fromkeys((*frame.supports, *(spring.node for spring in to_ground.values())))
+    expected = f"one of {', '.join(nodes)}" if nodes else "a frame with supports"
+    if spot.node not in nodes:
+        remedy = "node = its name, of a support or of a spring to ground"
+        raise BadInput("no support stands here", where=spot.key, expected=expected, remedy=remedy)
+    way = unit(frame.gravity if spot.direction is None else spot.direction)
+    springs = [spring.stiffness for spring in to_ground.values() if spring.node == spot.node]
+    held = frame.holds(str(spot.node))
+    holds = [word in held or any(rates[axis] > 0.0 for rates in springs) for axis, word in enumerate("xyz")]
+    if not any(way[axis] and holds[axis] for axis in range(3)):
+        what = f"nothing holds node {spot.node} in this direction"
+        raise BadInput(what, where="direction", expected="a direction that is held")
 
 
 def _check_modes(frame: Frame) -> None:

@@ -68,10 +68,7 @@ class TrackStatics:
     def under_response(self, response: Array, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) where the track's points move by `response` (6 (E + 1),)."""
         place = track_places(x, self.length, derivative)
-        ends = response.reshape(-1, 6)
-        element, _ = self.track.at(place)
-        moved = np.concatenate([ends[element], ends[element + 1]], axis=1)
-        return np.asarray(np.sum(self.track.to_ends(place, derivative) * moved, axis=1))
+        return self.track.where_ends_move(response.reshape(-1, 6), place, derivative)
 
     def moved(self, element: Counts, s: Array) -> Array:
         """(S, 12) displacements and rotations of an element's ends under a unit load at s, pair by pair."""

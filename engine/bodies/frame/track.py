@@ -85,6 +85,12 @@ class TrackBeams:
             found[:, end, 3:] += (bar[end] * self.torque[element])[:, None] * axes[:, 0]
         return found.reshape(-1, 12)
 
+    def where_ends_move(self, ends: Array, s: Array, derivative: int = 0) -> Array:
+        """(S,) d^j/ds^j of the deflection where the ends of the elements move by (E + 1, 6)."""
+        element, _ = self.at(s)
+        moved = np.concatenate([ends[element], ends[element + 1]], axis=1)
+        return np.asarray(np.sum(self.to_ends(s, derivative) * moved, axis=1))
+
     def within(self, x: Array, s: Array, derivative: int = 0) -> Array:
         """(S,) d^j/dx^j of the deflection at x of an element with held ends under a unit load at s, pair by pair.
 

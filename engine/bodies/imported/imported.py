@@ -180,6 +180,8 @@ class Imported(Body):
         return self
 
     def check_spot(self, spot: Spot) -> None:
+        if spot.support:
+            super().check_spot(spot)
         if spot.member is not None:
             remedy = "node = its number, or at = metres along its track"
             raise BadInput("a body out of files has no members", where="member", expected="a node", remedy=remedy)

@@ -40,18 +40,20 @@ Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)],
 @dataclass(frozen=True)
 class Spot:
     """A place that a sensor reads off the track: a node (its name or number), a member with metres from its first node,
-    or a point; and the direction that it reads, along gravity unless given."""
+    or a point; and the direction that it reads, along gravity unless given. support: what the support at a node, or at
+    metres along the track, carries is read there, not the motion."""
 
     node: str | int | None = None
     member: str | None = None
     at: float = 0.0
     point: str | None = None
     direction: tuple[float, float, float] | None = None
+    support: bool = False
 
     @property
     def key(self) -> str:
         """The key of the sensor that names it."""
-        return next(key for key in ("node", "member", "point") if getattr(self, key) is not None)
+        return next((key for key in ("node", "member", "point") if getattr(self, key) is not None), "at")
 
 
 Spots = tuple[tuple[str, Spot], ...]  # by the names of sensors
@@ -153,8 +155,15 @@ class Body(Spec):
         """Its numbers at the dotted key `here` that are likely only within limits."""
         return []
 
+    def spot_checks(self, spot: Spot, sensor: str, here: str) -> list[Check]:
+        """Conditions between the numbers of the sensor at the dotted key `sensor` and those of this body at `here`."""
+        return []
+
     def check_spot(self, spot: Spot) -> None:
         """Raise BadInput, with the key within the sensor as its place, for a place that cannot be read."""
+        if spot.support:
+            what, expected = "this body does not tell what its supports carry", "a uniform beam, or a frame"
+            raise BadInput(what, where="quantity", expected=expected, remedy="section forces beside it")
         what, remedy = f"this body has no {spot.key} to read", "at = metres along its track"
         raise BadInput(what, where=spot.key, expected="a place on its track", remedy=remedy)
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 # an end whose modes all move by less than this part of the largest at some places along the track does not move
 HELD, PROBED = 1e-9, 9
+# of the length, within which supports are one: a lever this short resists no rotation that a beam could feel
+SAME_PLACE = 1e-9
 
 
 class Shapes(Protocol):
@@ -115,11 +117,11 @@ def refuse_loose(rigid: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """A place that a sensor reads in one direction.
+    """A place that a sensor reads in one direction, or what a support carries: N in place of m.
 
     row (N,): what every mode moves it by, kg^(-1/2); along: its motion per unit force at places (S,) of the track, m/N;
     points: the same at points, by name; weight: its motion under the body's own weight per unit gravity; rigid: number
-    of rigid-body modes.
+    of rigid-body modes; dampers: by the places of those at a support, the part of their force that it carries too.
     """
 
     row: Array
@@ -127,6 +129,7 @@ class Gauge:
     points: Mapping[str, float]
     rigid: int
     weight: float
+    dampers: Mapping[float | str, float] = field(default_factory=dict)
 
     def influence(self, loaded: Array | str) -> Array:
         """Its motion per unit force at places (S,) of the track, or at a point (1,); m/N."""

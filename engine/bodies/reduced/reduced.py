@@ -67,6 +67,8 @@ class Reduced(Body):
         return self
 
     def check_spot(self, spot: Spot) -> None:
+        if spot.support:
+            super().check_spot(spot)
         if spot.point is None:
             what, remedy = f"a reduced body has no {spot.key}s", "save it with a point there, and read point = its name"
             raise BadInput(what, where=spot.key, expected="one of its points", remedy=remedy)
