@@ -58,6 +58,8 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         raise fault(f"{here}.quantity", "supports of bodies in frames that move are not read", expected="displacement")
     if sensor.spot is not None or sensor.carriage is not None:
         raise fault(here, "this place is not read in frames that move", expected="at, or under")
+    if sensor.frequency_limit is not None:
+        raise fault(f"{here}.frequency_limit", "sensors in frames that move read all modes", expected="no such key")
     if sensor.under is not None and sensor.quantity != "displacement":
         what = "under a carriage only the displacement is read here"
         raise fault(f"{here}.quantity", what, expected="displacement")

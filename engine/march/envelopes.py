@@ -156,5 +156,6 @@ def _places(model: SceneModel, part: slice, most: int) -> tuple[Place, ...]:
         own = np.array([at for of, at in numbered if of == name])
         reads = (name, envelope.quantity, bodies.index(envelope.body))
         together = Places(*reads, 0.0, None, own)
-        found += [Place(*reads, at, None, number, together) for number, at in enumerate(own.tolist())]
+        limit = envelope.frequency_limit
+        found += [Place(*reads, at, None, number, together, limit=limit) for number, at in enumerate(own.tolist())]
     return tuple(found)

@@ -8,7 +8,7 @@ Velocity and acceleration are those of the kept modes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -38,13 +38,17 @@ class Channel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A quantity on a body, at a fixed place or under a carriage (its number)."""
+    """A quantity on a body, at a fixed place or under a carriage (its number).
+
+    limit: Hz, up to which modes of its body count in a velocity or an acceleration at a fixed place.
+    """
 
     name: str
     quantity: str
     body: int
     at: float
     under: int | None
+    limit: float | None = field(default=None, kw_only=True)
 
     is_summed: ClassVar[bool] = True  # its squares
 
@@ -74,7 +78,7 @@ class Sensor:
             return [Channel("q", 0, _spread(model, part, self._rows(model, along)))]
         shape = self.shape(model, along, 0)
         if self.under is None:
-            return [Channel("qva"[order], order, _spread(model, part, shape))]
+            return [Channel("qva"[order], order, _spread(model, part, shape * self._counts(model)))]
         way = along[self.under]
         ds, dds = way.ds[:, None], way.dds[:, None]
         slope = self.shape(model, along, 1)
@@ -131,6 +135,7 @@ class Sensor:
             rows = sections.rows(self.quantity, places)
         else:
             rows = modal.shape(places, self.reads.derivative)
+        rows[0] = rows[0] * self._counts(model)
         here, *elsewhere = np.abs(rows).max(axis=1)
         return bool(here <= SILENT * max(elsewhere))
 
@@ -152,6 +157,11 @@ class Sensor:
             for attachment in attachments:
                 if attachment.body == self.body and holds(attachment, along):
                     yield r, attachment
+
+    def _counts(self, model: SceneModel) -> Array:
+        """(modes of its body,) 1 for those that it reads, 0 for those beyond its limit."""
+        omega = self._modal(model).omega
+        return np.ones_like(omega) if self.limit is None else (omega <= 2.0 * np.pi * self.limit).astype(np.float64)
 
     def _modal(self, model: SceneModel) -> ModalBody:
         return model.bodies[self.body].modal

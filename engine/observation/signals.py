@@ -40,10 +40,10 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     under = None if spec.rides is None else carriages.index(spec.rides)
     body = [part.name for part in model.bodies].index(study.body_of(name))
     if spec.spot is not None:
-        return SpotSensor(name, spec.quantity, body, np.nan, None)
+        return SpotSensor(name, spec.quantity, body, np.nan, None, limit=spec.frequency_limit)
     at = 0.0 if spec.at is None else spec.at
     if spec.carriage is None or under is None:
-        return Sensor(name, spec.quantity, body, at, under)
+        return Sensor(name, spec.quantity, body, at, under, limit=spec.frequency_limit)
     springs = model.springs_of(under)
     if spec.reads.of_contact:
         chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from engine.bodies.frame.frame import Vector
 from engine.bodies.modal.description import Spot
 from engine.study_file.spec import LIST, NUMBER, WORD, Spec, by_form, form_of_amount, one_of
-from engine.study_file.units import Dimensionless, Length, fault
+from engine.study_file.units import Dimensionless, Frequency, Length, fault
 from results_schema.quantities import MEANT, QUANTITIES, Quantity
 
 AXES = ("x", "y", "z")
@@ -46,6 +46,15 @@ Direction = Annotated[Annotated[_Axis, Tag(WORD)] | Annotated[Vector, Tag(LIST)]
 NodeName = Annotated[Annotated[str, Tag(WORD)] | Annotated[int, Tag(NUMBER)], by_form]
 
 
+Limit = Annotated[Frequency, Field(gt=0)]
+
+
+def _check_limit(limit: float | None, reads: Quantity) -> None:
+    if limit is not None and not reads.rate:
+        known = ", ".join(name for name, quantity in QUANTITIES.items() if quantity.rate)
+        raise fault(f"a frequency_limit of {reads.name} is not told", expected=f"quantity: one of {known}")
+
+
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
     m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
@@ -54,7 +63,7 @@ class Sensor(Spec):
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
-    forces where nothing is given.
+    forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration.
     """
 
     body: str | None = None
@@ -68,6 +77,7 @@ class Sensor(Spec):
     contact: str | None = None
     quantity: Annotated[str, AfterValidator(_of_anything)] = "displacement"
     tolerance: OwnTolerance | None = None
+    frequency_limit: Limit | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:
@@ -92,6 +102,9 @@ class Sensor(Spec):
             raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {known}")
         if self.reads.of_contact and self.carriage is None:
             raise fault("a contact force is that of a carriage", expected='carriage = "a carriage"')
+        if self.frequency_limit is not None and self.rides is not None:
+            raise fault("a frequency_limit counts modes at a fixed place", expected="at, node, member or point")
+        _check_limit(self.frequency_limit, self.reads)
         if self.contact is not None and not self.reads.of_contact:
             raise fault("only contact forces are read at a contact", expected='quantity = "contact_force"')
         return self
@@ -119,7 +132,7 @@ class Sensor(Spec):
 
 class Envelope(Spec):
     """The extremes of a quantity at equally spaced places of a body: from `from` to `to`, both included, m along its
-    track, or its ends where they are not given.
+    track, or its ends where they are not given. frequency_limit: as of sensors.
 
     >>> Envelope(body="bed", places=5).along(8.0).tolist()
     [0.0, 2.0, 4.0, 6.0, 8.0]
@@ -127,6 +140,7 @@ class Envelope(Spec):
 
     body: str
     quantity: Annotated[str, AfterValidator(_along_a_body)] = "displacement"
+    frequency_limit: Limit | None = None
     places: int = Field(default=51, ge=2, le=MOST_PLACES)
     from_: Length | None = Field(default=None, alias="from", ge=0)
     to: Length | None = Field(default=None, gt=0)
@@ -136,6 +150,7 @@ class Envelope(Spec):
         if self.from_ is not None and self.to is not None and self.from_ >= self.to:
             received = f"from = {self.from_:.10g}, to = {self.to:.10g}"
             raise fault("an envelope goes forward along its body", expected="from < to", received=received)
+        _check_limit(self.frequency_limit, QUANTITIES[self.quantity])
         return self
 
     def along(self, length: float) -> NDArray[np.float64]:

@@ -185,8 +185,11 @@ def _check_weights(study: Study, bodies: Mapping[str, FullBody]) -> None:
 
 
 def _check_quantities(study: Study) -> None:
-    """What sensors read is a motion, its rates, or what sections carry."""
+    """What sensors read is a motion, its rates, or what sections carry, of all modes."""
     for name, sensor in study.sensor.items():
+        if sensor.frequency_limit is not None:
+            what = "the unreduced model has no modes up to a limit"
+            raise study.source.fault(f"sensor.{name}.frequency_limit", what, expected="no such key, or unreduced = 0")
         if sensor.reads.derivative and not sensor.reads.of_section:
             raise study.source.fault(
                 f"sensor.{name}.quantity",

@@ -51,7 +51,8 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     plan = parts.plan
     seen = forecast(plan, threads)
     tables = (
-        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _sweep(plan.study, plan.cases), _ratios(plan)),
+        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _limits(plan.base)),
+        *(_sweep(plan.study, plan.cases), _ratios(plan)),
         *_in_step(plan),
         TextTable(seen.title, chosen.HEADINGS, seen.rows),
     )
@@ -172,6 +173,21 @@ def _checks(base: SceneModel) -> Iterator[TextTable]:
     """One table per body that was checked when it was imported."""
     for part in base.bodies:
         yield TextTable(f"Import of {part.name}", ("looked at", "found"), part.modal.checks)
+
+
+def _limits(base: SceneModel) -> TextTable:
+    """How many of the modes above every sensor with a frequency limit counts."""
+    rows, study = [], base.study
+    frequencies = {part.name: part.modal.omega / (2.0 * np.pi) for part in base.bodies}
+    limits = [(name, one.body, one.frequency_limit) for name, one in study.sensor.items()]
+    limits += [(name, one.body, one.frequency_limit) for name, one in study.envelope.items()]
+    for name, body, limit in limits:
+        if limit is not None:
+            own = frequencies[str(body)]
+            count = int(np.count_nonzero(own <= limit))
+            which = f"{count} of {own.size}" if count < own.size else f"all {count}, and more where more are computed"
+            rows.append((name, f"{number(limit)} Hz", which if count else "none: it reads 0"))
+    return TextTable("Frequency limits", ("sensor or envelope", "up to", "modes that count"), rows)
 
 
 def _sweep(study: Study, cases: Cases) -> TextTable:

@@ -15,7 +15,7 @@ from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
 from studies.results.cells import counts_of
-from studies.results.formatting import Scale, axis_title, quantity, spanned, swept_quantity, typed_unit
+from studies.results.formatting import Scale, axis_title, number, quantity, spanned, swept_quantity, typed_unit
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
@@ -202,8 +202,11 @@ class Results:
         return output.percentiles if output.keeps_variants or self.size == 1 else ()
 
     def noun(self, sensor: str) -> str:
-        """What a sensor measures, as a word."""
-        return self.study.sensor[sensor].quantity.replace("_", " ")
+        """What a sensor measures, in words."""
+        own = self.study.sensor[sensor]
+        swept = any(f"sensor.{sensor}.frequency_limit" in axis.paths for axis in self.axes)
+        counted = f" of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
+        return f"{own.quantity.replace('_', ' ')}{counted}"
 
     def place(self, sensor: str) -> str:
         """Where a sensor reads, in words."""

@@ -109,6 +109,7 @@ REVOLUTE = {"kind": "revolute", "axis": [0, 1, 0]}
 PRISMATIC = {"kind": "prismatic", "axis": [0, 1, 0]}
 STEADY = {"kind": "steady", "rate": "1 deg/s"}
 TOP = {"position": [0, 0, 1]}
+SENSOR = {"body": "beam", "at": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -139,6 +140,8 @@ TOP = {"position": [0, 0, 1]}
         ({"spring": {"s": {"ends": [{"on": "that"}, TOP], "length": 1.0}}}, "no such body"),
         ({"frame": {"beam": {"lateral_modes": 2}}}, "lateral_second_moment"),
         ({"sensor": {"under": {"under": "load", "quantity": "velocity"}}}, "only the displacement"),
+        ({"sensor": {"low": SENSOR | {"quantity": "velocity", "frequency_limit": 3.0}}}, "read all modes"),
+        ({"sensor": {"foot": SENSOR | {"quantity": "support_reaction"}}}, "supports of bodies in frames that move"),
     ],
 )
 def test_what_cannot_be_is_refused(tables: dict[str, object], words: str) -> None:
