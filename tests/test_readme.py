@@ -74,9 +74,21 @@ def test_study_files_run() -> None:
     whole = [load(block) for _, block in examples("toml") if "schema_version" in block]
     marched = [study for study in whole if not study.frame]
     sizes = [make_plan(s, reduction=kind_of(s).reduction(s), results=s.kind).size for s in marched]
-    assert sizes == [160, 1, 5, 156, 8]
+    assert sizes == [160, 1, 1, 5, 156, 8]
     (moving,) = (study for study in whole if study.frame)
     assert studies.run(moving)["status"].size == 1
+
+
+def test_the_jib_sinks_as_by_hand() -> None:
+    """Its own bending, and the turn and shortening of the column, whose sides `up` turns; the arm is at its face."""
+    (jib,) = (load(block) for _, block in examples("toml") if "[body.jib]" in block)
+    weight, youngs = 500.0 * 9.80665, 2.1e11
+    for up, second_moment in (([1, 0, 0], 4e-5), ([0, 1, 0], 1e-5)):
+        given = jib.with_values({"body.jib.member.column.up": up, "solver.fidelity": "static"})
+        found = studies.run(given)
+        bends, turns = weight * 2.0**3 / (3.0 * youngs * 2e-5), 2.3**2 * weight * 3.0 / (youngs * second_moment)
+        assert float(found.end_max) == pytest.approx(bends + turns + weight * 3.0 / (youngs * 0.01), rel=1e-9)
+        assert float(found.foot_max) == pytest.approx(weight, rel=1e-9)
 
 
 def test_pieces_of_study_files_are_toml() -> None:

@@ -187,7 +187,7 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
     read = FullRead(frame, assembly, track, ends)
     return FullBody(
         name=name,
-        length=float(track.places[-1]),
+        length=frame.length,
         stiffness=assembly.stiffness,
         mass=assembly.mass,
         rigid=flexibility.rigid,

@@ -82,7 +82,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     read = Read(frame, assembly, flexibility, statics, whole.ends, omega, shapes)
     bending = track.bending
     return ModalBody(
-        length=statics.length,
+        length=frame.length,
         mass=assembly.total_mass,
         omega=omega,
         participation=frozen(shapes.T @ pull),

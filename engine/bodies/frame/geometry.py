@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
 
+ROUNDING = 1e-15  # of a length
 PARALLEL = 1e-6  # sine of the angle below which two directions are one
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  # of a node's degrees of freedom
 SAME_PLACE = 1e-9  # distance over length below which two points are one
@@ -35,7 +36,17 @@ class TrackLine:
     @property
     def length(self) -> float:
         """Of the track, m."""
-        return float(self.places[-1])
+        return as_meant(float(self.places[-1]))
+
+
+def as_meant(length: float) -> float:
+    """A length made of coordinates, without their rounding: a sensor at 2 m is on a track from 0.3 m to 2.3 m.
+
+    >>> 2.3 - 0.3, as_meant(2.3 - 0.3)
+    (1.9999999999999998, 2.0)
+    """
+    round_one = float(f"{length:.12g}")
+    return round_one if abs(round_one - length) <= ROUNDING * length else length
 
 
 def unit(vector: ArrayLike) -> Array:
