@@ -121,11 +121,11 @@ def outcome(
 def used(tables: SceneTables, size: int) -> Flat:
     """What so many variants were computed with, by the names of the archive."""
     marched = 0 if _rests(tables) else tables.steps
-    modes = 0 if _knows_all(tables) else tables.model.body_modes
+    knows_all = _rests(tables) and tables.model.numerics.static_correction  # statics of the whole body
     return {
         "fidelity_used": np.full(size, int(tables.model.fidelity), dtype=np.int8),
         "scheme_used": np.full(size, int(number_of(tables.model.scheme)), dtype=np.int8),
-        "modes_used": np.full(size, modes, dtype=np.int32),
+        "modes_used": np.full(size, 0 if knows_all else tables.model.body_modes, dtype=np.int32),
         "steps_used": np.full(size, marched, dtype=np.int32),
         "work": np.full(size, float(marched * tables.model.body_modes)),
     }
@@ -134,11 +134,6 @@ def used(tables: SceneTables, size: int) -> Flat:
 def number_of(scheme: Scheme) -> SchemeUsed:
     """A scheme as archives number it."""
     return SchemeUsed.__members__.get(scheme.name.upper().replace("-", "_"), SchemeUsed.OTHER)
-
-
-def _knows_all(tables: SceneTables) -> bool:
-    """Whether these are statics of the whole body, whatever modes it keeps."""
-    return _rests(tables) and tables.model.numerics.static_correction
 
 
 def _rests(tables: SceneTables) -> bool:

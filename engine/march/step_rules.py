@@ -42,7 +42,7 @@ def least_steps(model: SceneModel, values: VariantValues) -> Array:
     """(V,) the fewest steps per unit of scene time that a march may take whatever its accuracy: inside the scheme's
     stability limit, by the alias rule, and none longer than a period of a contact on its spring."""
     scale = values.scene_time_scale
-    found = limit_steps(model, float(model.omega.max()), scale)
+    found = np.asarray(LIMIT_MARGIN * float(model.omega.max()) * scale / model.scheme.stability_limit)
     found = np.maximum(found, LEAST_MARGIN * _alias(model, scale))
     if model.springs:
         found = np.maximum(found, model.scheme.stride * contact_omega(model, values) * scale / (2.0 * np.pi))
@@ -57,11 +57,6 @@ def _alias(model: SceneModel, scale: Array) -> Array:
         return np.zeros_like(scale)
     cells, inverse = np.unique(np.ceil(np.log(scale) / ALIAS_CELL), return_inverse=True)
     return np.asarray(alias_steps(model, np.exp(ALIAS_CELL * cells))[inverse.reshape(-1)])
-
-
-def limit_steps(model: SceneModel, highest: float, time_scale: Array) -> Array:
-    """(V,) steps that stay inside the scheme's stability limit with a highest frequency, rad/s; 0 without a limit."""
-    return np.asarray(LIMIT_MARGIN * highest * time_scale / model.scheme.stability_limit)
 
 
 def free_steps(model: SceneModel) -> int:
@@ -96,14 +91,6 @@ def _alias_root(scheme: Scheme, wave: float, angle: Array) -> Array:
         short = wave / steps + scheme.phase(angle / steps) >= math.pi
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.exp(high)
-
-
-def check_fixed_steps(model: SceneModel, time_scale: Array, steps: Array | Counts) -> None:
-    """Refuse fixed steps beyond the scheme's stability limit (fault 12), or too few for the alias rule where the scheme
-    does not damp enough. Raises BadInput with limit and suggestion."""
-    _check_limit(model, time_scale, steps)
-    if not is_damped(model.scheme):
-        _check_alias(model, time_scale, steps)
 
 
 def allow_any_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
@@ -216,9 +203,13 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
 
 
 def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:
-    """Refuse fixed steps (V,) that cannot be right. Raises BadInput with limit and suggestion."""
+    """Refuse fixed steps (V,) that cannot be right: beyond the scheme's stability limit (fault 12), too few for the
+    alias rule where the scheme does not damp enough, or longer than a contact's period. Raises BadInput with limit and
+    suggestion."""
     time_scale = values.scene_time_scale
-    check_fixed_steps(model, time_scale, steps)
+    _check_limit(model, time_scale, steps)
+    if not is_damped(model.scheme):
+        _check_alias(model, time_scale, steps)
     if not model.springs:
         return
     check_free_vibration(model)

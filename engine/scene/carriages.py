@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
-from pydantic import Discriminator, Field, Strict, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, form_of_amount, kinds
+from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, SpecOfKind, Three, form_of_amount, kinds
 from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
@@ -24,7 +24,7 @@ class Suspension(NamedTuple):
     damping: float
 
 
-class Carriage(Spec):
+class Carriage(SpecOfKind):
     """Base of all carriages.
 
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
@@ -35,11 +35,6 @@ class Carriage(Spec):
     masses: ClassVar[tuple[str, ...]] = ()
     touching: ClassVar[tuple[str, ...]] = ()
     forces: ClassVar[tuple[str, ...]] = ()
-    if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """As in the study file."""
 
     on: Annotated[str, Noun("the name of a body")]
     motion: AnyMotion
@@ -159,7 +154,7 @@ class MassCarriage(Carriage):
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
     inertia_along: bool = False
-    inertia: Annotated[tuple[Inertia, Inertia, Inertia], Strict(False)] | None = None
+    inertia: Three[Inertia] | None = None
     height: Length = 0.0
 
     @property

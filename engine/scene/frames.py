@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, model_validator
 
 from engine.scene.motions.of_joints import AnySliding, AnyTurning, TimeMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import KindOf, Noun, Spec, kinds
+from engine.study_file.spec import KindOf, Noun, Several, Spec, SpecOfKind, Three, kinds
 from engine.study_file.units import (
     Angle,
     AngularRate,
@@ -30,27 +30,19 @@ from results_schema.arrays import Array
 GROUND = "ground"
 MOST_JOINTS = 6
 
-Direction = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False)]
-RotationVector = Annotated[tuple[Angle, Angle, Angle], Strict(False)]
-Spin = Annotated[tuple[AngularRate, AngularRate, AngularRate], Strict(False)]
-Velocity = Annotated[tuple[Speed, Speed, Speed], Strict(False)]
-Place = Annotated[tuple[Length, Length, Length], Strict(False)]
-Inertias = Annotated[
-    tuple[Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)], Annotated[Inertia, Field(gt=0)]],
-    Strict(False),
-]
+Direction = Three[Dimensionless]
+RotationVector = Three[Angle]
+Spin = Three[AngularRate]
+Velocity = Three[Speed]
+Place = Three[Length]
+Inertias = Three[Annotated[Inertia, Field(gt=0)]]
 
 
-class Joint(Spec):
+class Joint(SpecOfKind):
     """Base of all joints. freedoms: how many coordinates it has; turns: whether it turns what it holds."""
 
     freedoms: ClassVar[int] = 1
     turns: ClassVar[bool] = True
-    if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """As in the study file."""
 
     @property
     def turned_about(self) -> Direction | None:
@@ -163,7 +155,7 @@ class Frame(Spec):
     at: Length | None = Field(default=None, ge=0)
     position: Place = (0.0, 0.0, 0.0)
     turned: RotationVector = (0.0, 0.0, 0.0)
-    joints: Annotated[tuple[AnyJoint, ...], Strict(False), Field(max_length=MOST_JOINTS)] = ()
+    joints: Annotated[Several[AnyJoint], Field(max_length=MOST_JOINTS)] = ()
     inertia: Inertias | None = None
     lateral_second_moment: SecondMoment | None = Field(default=None, gt=0)
     lateral_modes: int = Field(default=0, ge=0, le=32)

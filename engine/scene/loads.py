@@ -10,7 +10,7 @@ from pydantic import Field, Strict, model_validator
 from engine.scene.frames import GROUND, Place
 from engine.scene.motions.of_joints import AnyCourse
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import Noun, Spec
+from engine.study_file.spec import Noun, Spec, Three
 from engine.study_file.units import (
     Damping,
     Force,
@@ -22,10 +22,10 @@ from engine.study_file.units import (
     fault,
 )
 
-Forces = Annotated[tuple[Force, Force, Force], Strict(False)]
-Torques = Annotated[tuple[Torque, Torque, Torque], Strict(False)]
-ForcesPerMetre = Annotated[tuple[ForcePerMetre, ForcePerMetre, ForcePerMetre], Strict(False)]
-TorquesPerMetre = Annotated[tuple[TorquePerMetre, TorquePerMetre, TorquePerMetre], Strict(False)]
+Forces = Three[Force]
+Torques = Three[Torque]
+ForcesPerMetre = Three[ForcePerMetre]
+TorquesPerMetre = Three[TorquePerMetre]
 Part = Annotated[tuple[Length, Length], Strict(False)]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, model_validator
 
-from engine.study_file.spec import KindOf, Noun, Spec
+from engine.study_file.spec import KindOf, Noun, Several, Spec, Three
 from engine.study_file.units import (
     Acceleration,
     AngularAcceleration,
@@ -29,11 +29,10 @@ from engine.study_file.units import (
 
 MOST_LINKS, MOST_RAILS, MOST_MOVES = 7, 2, 64
 
-Vector = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False)]
-Place = Annotated[tuple[Length, Length, Length], Strict(False)]
-_Principal = Annotated[Inertia, Field(ge=0)]
-Principal = Annotated[tuple[_Principal, _Principal, _Principal], Strict(False)]
-Values = Annotated[tuple[Dimensionless, ...], Strict(False)]
+Vector = Three[Dimensionless]
+Place = Three[Length]
+Principal = Three[Annotated[Inertia, Field(ge=0)]]
+Values = Several[Dimensionless]
 
 
 class Drive(Spec):
@@ -125,7 +124,7 @@ class Arm(Solid):
 
     mass: Mass = Field(gt=0)
     rail: Sliding
-    links: Annotated[tuple[AnyLink, ...], Strict(False), Field(min_length=1, max_length=MOST_LINKS)]
+    links: Annotated[Several[AnyLink], Field(min_length=1, max_length=MOST_LINKS)]
     tool: Place = (0.0, 0.0, 0.0)
 
     @property
@@ -161,10 +160,10 @@ class Robot(Spec):
     """
 
     arm: Annotated[str, Noun("the name of a table [arm.NAME]")]
-    rails: Annotated[tuple[str, ...], Strict(False), Field(min_length=1, max_length=MOST_RAILS)]
+    rails: Annotated[Several[str], Field(min_length=1, max_length=MOST_RAILS)]
     offset: Place = (0.0, 0.0, 0.0)
     start: Values
-    moves: Annotated[tuple[Move, ...], Strict(False), Field(max_length=MOST_MOVES)] = ()
+    moves: Annotated[Several[Move], Field(max_length=MOST_MOVES)] = ()
     delay: Time = Field(default=0.0, ge=0)
     payload: Mass = Field(default=0.0, ge=0)
     speed_scale: Dimensionless = Field(default=1.0, gt=0)

@@ -26,10 +26,6 @@ def _along_a_body(word: str) -> str:
     return one_of(*(name for name in quantities_of_a_body() if not QUANTITIES[name].of_support), meant=MEANT)(word)
 
 
-def _of_anything(word: str) -> str:
-    return word if word in QUANTITIES else one_of(*QUANTITIES, meant=MEANT)(word)
-
-
 def quantities_of_a_body() -> list[str]:
     """The quantities that can be read of bodies."""
     return [name for name, quantity in QUANTITIES.items() if not quantity.of_contact]
@@ -75,7 +71,7 @@ class Sensor(Spec):
     under: str | None = None
     carriage: str | None = None
     contact: str | None = None
-    quantity: Annotated[str, AfterValidator(_of_anything)] = "displacement"
+    quantity: Annotated[str, AfterValidator(one_of(more=QUANTITIES, meant=MEANT))] = "displacement"
     tolerance: OwnTolerance | None = None
     frequency_limit: Limit | None = None
 

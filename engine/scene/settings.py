@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Strict, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Tag, model_validator
 
 from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme, SchemeRow
-from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Hint, Spec, by_form, form_of, one_of
+from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Hint, Several, Spec, by_form, form_of, one_of
 from engine.study_file.units import Dimensionless, fault
 from results_schema.errors import shortened
 from results_schema.pieces import Pieces, no_row_of
@@ -25,11 +25,7 @@ FIDELITIES = ("auto", "static", "force", "mass", "mass-without-convective", "ful
 MAX_STEPS = 100_000_000
 
 
-def _scheme_name(word: str) -> str:
-    return word if word in ALL_SCHEMES else one_of("auto", *ALL_SCHEMES)(word)
-
-
-SchemeName = Annotated[str, AfterValidator(_scheme_name)]
+SchemeName = Annotated[str, AfterValidator(one_of("auto", more=ALL_SCHEMES))]
 Chosen = Annotated[str, AfterValidator(one_of(*FIDELITIES))]
 
 
@@ -102,9 +98,9 @@ class Output(Spec):
     histories: Annotated[
         Annotated[Literal["auto", "none", "all"], Tag(WORD)] | Annotated[Every, Tag(TABLE)], by_form
     ] = "auto"
-    percentiles: Annotated[tuple[Percentile, ...], Strict(False), Field(max_length=20)] = ()
+    percentiles: Annotated[Several[Percentile], Field(max_length=20)] = ()
     keep: Literal["all", "extremes", "percentiles"] = "all"
-    cells: Annotated[tuple[str, ...], Strict(False)] | None = None
+    cells: Several[str] | None = None
     unreduced: int = Field(default=0, ge=0, le=1000)
     residual: bool = False
 
@@ -138,10 +134,9 @@ def as_tuple(value: Any) -> Any:
 
 
 Amount = Annotated[float | int | str, PlainValidator(read_amount, json_schema_input_type=float | int | str)]
-Amounts = Annotated[tuple[Amount, ...], Strict(False), Field(min_length=1)]
+Amounts = Annotated[Several[Amount], Field(min_length=1)]
 Paths = Annotated[
-    tuple[str, ...],
-    Strict(False),
+    Several[str],
     Field(min_length=1, max_length=100),
     BeforeValidator(as_tuple, json_schema_input_type=str | list[str]),
 ]

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr, Strict, ValidationError
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
@@ -25,7 +25,7 @@ from engine.scene.trains import Trains, axle_name, with_axles
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
 from engine.study_file.refusals import Keys, field_at, refuse
-from engine.study_file.spec import Noun, Spec, one_of
+from engine.study_file.spec import Noun, Several, Spec, one_of
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.status import Status, label
@@ -53,7 +53,7 @@ def _kind_name(kind: str) -> str:
     return kind
 
 
-Statuses = Annotated[tuple[Annotated[str, AfterValidator(one_of(*EXPECTABLE))], ...], Strict(False)]
+Statuses = Several[Annotated[str, AfterValidator(one_of(*EXPECTABLE))]]
 
 
 class Scene(Trains):

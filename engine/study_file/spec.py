@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
@@ -14,6 +14,7 @@ from pydantic import (
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    Strict,
     Tag,
     TypeAdapter,
     ValidationError,
@@ -37,7 +38,20 @@ class Spec(BaseModel):
     entry_class: ClassVar[Any] = None  # class of the tables under names of the user's choice, if there are such
 
 
+class SpecOfKind(Spec):
+    """Base of tables whose class is chosen by their key `kind`, which every such class names."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def kind(self) -> str:
+            """As in the study file."""
+
+
 SpecT = TypeVar("SpecT", bound=Spec)
+T = TypeVar("T")
+Three = Annotated[tuple[T, T, T], Strict(False)]
+Several = Annotated[tuple[T, ...], Strict(False)]
 
 
 def form_of(value: Any) -> str:
@@ -115,15 +129,19 @@ def _kind_of(cls: type[Spec]) -> str:
     return "" if field is None else str(next(iter(get_args(field.annotation)), ""))
 
 
-def one_of(*words: str, meant: Mapping[str, str] = MappingProxyType({})) -> Callable[[str], str]:
-    """Validator of a word out of a list. meant: words that others use -> the one of the list."""
+def one_of(
+    *words: str, more: Collection[str] = (), meant: Mapping[str, str] = MappingProxyType({})
+) -> Callable[[str], str]:
+    """Validator of a word out of a list. more: of a table, as it is when a word is read. meant: words that others
+    use -> the one of the list."""
 
     def check(word: str) -> str:
-        if word in words:
+        if word in words or word in more:
             return word
+        every = (*words, *more)
         known = meant.get(word.lower().replace("_", "-").replace(" ", "-"))
-        remedy = f'did you mean "{known}"?' if known else nearest(word, words)
-        expected = f"one of {', '.join(words)}"
+        remedy = f'did you mean "{known}"?' if known else nearest(word, every)
+        expected = f"one of {', '.join(every)}"
         raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
 
     return check

@@ -7,14 +7,14 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, Strict, Tag
+from pydantic import AfterValidator, Field, Tag
 
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh, Spot, Spots
 from engine.bodies.modal.modal_body import SAME_PLACE, Array, ModalBody
 from engine.bodies.modal.outline import ALONG, HELD_AT, Elastic, Held, Outline, straight
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import LIST, WORD, Spec, by_form, one_of
+from engine.study_file.spec import LIST, WORD, Several, Spec, by_form, one_of
 from engine.study_file.units import (
     Area,
     Damping,
@@ -54,7 +54,7 @@ _MEANT = {
     "cantilever": "clamped-free",
 }
 Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
-Springs = Annotated[tuple[Spring, ...], Strict(False), Field(min_length=1, max_length=100)]
+Springs = Annotated[Several[Spring], Field(min_length=1, max_length=100)]
 Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
 
 

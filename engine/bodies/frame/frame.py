@@ -20,7 +20,7 @@ from engine.bodies.modal.description import Body, Spot, Spots, check_level
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
-from engine.study_file.spec import LIST, WORD, Spec, by_form, distinct, one_of
+from engine.study_file.spec import LIST, WORD, Several, Spec, Three, by_form, distinct, one_of
 from engine.study_file.units import (
     Area,
     Damping,
@@ -56,18 +56,17 @@ def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     return vector
 
 
-Vector = Annotated[tuple[Dimensionless, Dimensionless, Dimensionless], Strict(False), AfterValidator(_not_zero)]
+Vector = Annotated[Three[Dimensionless], AfterValidator(_not_zero)]
 Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
-Place = Annotated[tuple[Coordinate, Coordinate, Coordinate], Strict(False)]
-Node = Annotated[tuple[Coordinate, ...], Strict(False), Field(min_length=2, max_length=3)]
+Place = Three[Coordinate]
+Node = Annotated[Several[Coordinate], Field(min_length=2, max_length=3)]
 Two = Annotated[tuple[str, str], Strict(False)]
-Names = Annotated[tuple[str, ...], Strict(False), AfterValidator(distinct)]
-Three = tuple[float, float, float]
+Names = Annotated[Several[str], AfterValidator(distinct)]
+Triple = tuple[float, float, float]
+_ZERO = (0.0, 0.0, 0.0)
 
 _DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
-_Directions = Annotated[
-    tuple[_DirectionWord, ...], Strict(False), Field(min_length=1, max_length=6), AfterValidator(distinct)
-]
+_Directions = Annotated[Several[_DirectionWord], Field(min_length=1, max_length=6), AfterValidator(distinct)]
 _HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant={"fixed": "clamped", "hinged": "pinned"}))]
 Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
 
@@ -113,7 +112,7 @@ class Member(Spec):
     elements: int = Field(default=8, ge=1, le=MAX_ELEMENTS)
     up: Vector | None = None
     theory: TheoryWord = "euler-bernoulli"
-    offsets: Annotated[tuple[Place, Place], Strict(False)] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    offsets: Annotated[tuple[Place, Place], Strict(False)] = (_ZERO, _ZERO)
 
 
 class PointMass(Spec):
@@ -121,18 +120,8 @@ class PointMass(Spec):
 
     node: str
     mass: Mass = Field(gt=0)
-    inertia: Annotated[
-        tuple[Annotated[Inertia, Field(ge=0)], Annotated[Inertia, Field(ge=0)], Annotated[Inertia, Field(ge=0)]],
-        Strict(False),
-    ] = (0.0, 0.0, 0.0)
-    offset: Place = (0.0, 0.0, 0.0)
-
-
-_Stiffness = Annotated[Stiffness, Field(ge=0)]
-_Rotational = Annotated[RotationalStiffness, Field(ge=0)]
-_Damping = Annotated[Damping, Field(ge=0)]
-_RotationalDamping = Annotated[RotationalDamping, Field(ge=0)]
-_ZERO = (0.0, 0.0, 0.0)
+    inertia: Three[Annotated[Inertia, Field(ge=0)]] = _ZERO
+    offset: Place = _ZERO
 
 
 class NodeSpring(Spec):
@@ -140,12 +129,10 @@ class NodeSpring(Spec):
 
     node: str
     to: str | None = None
-    stiffness: Annotated[tuple[_Stiffness, _Stiffness, _Stiffness], Strict(False)] = _ZERO
-    rotational: Annotated[tuple[_Rotational, _Rotational, _Rotational], Strict(False)] = _ZERO
-    damping: Annotated[tuple[_Damping, _Damping, _Damping], Strict(False)] = _ZERO
-    rotational_damping: Annotated[tuple[_RotationalDamping, _RotationalDamping, _RotationalDamping], Strict(False)] = (
-        _ZERO
-    )
+    stiffness: Three[Annotated[Stiffness, Field(ge=0)]] = _ZERO
+    rotational: Three[Annotated[RotationalStiffness, Field(ge=0)]] = _ZERO
+    damping: Three[Annotated[Damping, Field(ge=0)]] = _ZERO
+    rotational_damping: Three[Annotated[RotationalDamping, Field(ge=0)]] = _ZERO
 
 
 class Point(Spec):
@@ -195,7 +182,7 @@ class Frame(Body):
     mass_matrix: MassWord = "consistent"
     interface: Annotated[Names, Field(max_length=MAX_POINTS)] = ()
     fixed_interface_modes: int = Field(default=12, ge=0, le=MAX_FIXED_INTERFACE_MODES)
-    leave_out: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Strict(False)] = ()
+    leave_out: Several[Annotated[int, Field(ge=1)]] = ()
     rigid_body_modes: Annotated[str, AfterValidator(one_of("keep", "drop"))] = "keep"
 
     @model_validator(mode="after")
@@ -214,7 +201,7 @@ class Frame(Body):
         return self.line.length
 
     @property
-    def gravity(self) -> Three:
+    def gravity(self) -> Triple:
         """The direction of gravity as it is given, else down: against the last axis."""
         if self.gravity_direction is not None:
             return self.gravity_direction
@@ -222,7 +209,7 @@ class Frame(Body):
         return (0.0, -1.0, 0.0) if last == 1 else (0.0, 0.0, -1.0)
 
     @property
-    def direction(self) -> Three:
+    def direction(self) -> Triple:
         """The direction in which loads act on the track."""
         return self.gravity if self.track.direction is None else self.track.direction
 
@@ -242,7 +229,7 @@ class Frame(Body):
     def check_along(self) -> None:
         check_level(self.line.tangent, self.line.direction, unit(self.gravity))
 
-    def place(self, node: str) -> Three:
+    def place(self, node: str) -> Triple:
         """Coordinates of a node, m; in a plane frame two may be given."""
         given = self.node[node]
         if len(given) == 3:

@@ -14,7 +14,19 @@ from engine.bodies.modal.outline import Outline, straight
 from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside
-from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Hint, Spec, by_amount_form, by_form, nearest
+from engine.study_file.spec import (
+    LIST,
+    NUMBER,
+    TABLE,
+    Auto,
+    Hint,
+    Several,
+    Spec,
+    SpecOfKind,
+    by_amount_form,
+    by_form,
+    nearest,
+)
 from engine.study_file.units import Dimensionless, Rate, Time
 from results_schema.errors import BadInput, shortened
 
@@ -30,7 +42,7 @@ class Rayleigh(Spec):
 
 
 Ratio = Annotated[Dimensionless, Field(ge=0, lt=1), Hint('a part of critical damping: 0.02 or "2 %"')]
-Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
+Ratios = Annotated[Several[Ratio], Field(min_length=1, max_length=MAX_MODES)]
 DampingRatio = Annotated[
     Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
 ]
@@ -82,7 +94,7 @@ class Recorded(Beside):
     length: float
 
 
-class Body(Spec):
+class Body(SpecOfKind):
     """Base of all bodies: a track of some length along which loads ride.
 
     damping_ratio: of every mode, or one per mode, of which the last goes on, or Rayleigh's two numbers. modes: how many
@@ -93,10 +105,6 @@ class Body(Spec):
     names_files: ClassVar[bool] = False
     _recorded: Recorded | None = PrivateAttr(default=None)
     if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """As in the study file."""
 
         @property
         def length(self) -> float:

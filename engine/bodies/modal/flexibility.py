@@ -66,7 +66,7 @@ class Flexibility:
         rigid = self.rigid.shape[1]
         wanted = max(0, count - rigid)
         values, shapes = self._elastic(wanted + 6) if wanted else (np.zeros(0), self.rigid[:, :0])
-        while wanted < len(values) and _equal(values[wanted - 1 : wanted + 1]) and wanted > 0:
+        while 0 < wanted < len(values) and values[wanted] - values[wanted - 1] <= 2.0 * SAME_FREQUENCY * values[wanted]:
             wanted += 1
         omega = np.concatenate([np.zeros(rigid), np.sqrt(values[:wanted])])
         return omega, np.hstack([self.rigid, shapes[:, :wanted]])
@@ -184,7 +184,3 @@ def symmetric_lu(matrix: Any) -> Any:
     from scipy.sparse.linalg import splu
 
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def _equal(values: Array) -> bool:
-    return len(values) == 2 and bool(values[1] - values[0] <= 2.0 * SAME_FREQUENCY * values[1])

@@ -8,13 +8,13 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, model_validator
 
 from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.scene.motions.point_to_point import PointToPoint
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import Hint, KindOf, kinds
+from engine.study_file.spec import Hint, KindOf, Several, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
 from results_schema.late import interpolate
 
@@ -231,8 +231,8 @@ class Sinusoidal(Motion):
         return found
 
 
-Places = Annotated[tuple[Length, ...], Strict(False)]
-Times = Annotated[tuple[Time, ...], Strict(False)]
+Places = Several[Length]
+Times = Several[Time]
 
 
 class Waypoints(Motion):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine.study_file.checks import Check
-from engine.study_file.spec import Spec
+from engine.study_file.spec import SpecOfKind
 
 if TYPE_CHECKING:
     from engine.scene.motions.of_joints import Number
@@ -53,7 +53,7 @@ class Legs(NamedTuple):
     cruise: tuple[float, float]
 
 
-class Motion(Spec):
+class Motion(SpecOfKind):
     """Base of all motions. Positions in m along the body's track, tau without unit."""
 
     period: ClassVar[float | None] = None  # tau after which the path repeats
@@ -62,11 +62,6 @@ class Motion(Spec):
     slides: ClassVar[bool] = False  # whether its place is an unknown of the equations of motion
     is_harmonic: ClassVar[bool] = False  # whether it swings as a sine about the middle of its range
     in_pieces: ClassVar[bool] = False  # whether bodies in frames that move know it, by `pieces`
-    if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """As in the study file."""
 
     @property
     @abstractmethod

@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, Strict, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
-from engine.study_file.spec import KindOf, Spec, kinds
+from engine.study_file.spec import KindOf, Several, SpecOfKind, kinds
 from engine.study_file.units import Angle, AngularRate, Dimensionless, Frequency, Length, Rate, Speed, Time, fault
 from results_schema.arrays import Array
 
@@ -18,18 +18,12 @@ from results_schema.arrays import Array
 #: amplitude, rate (rad/s) and phase of a sine.
 START, CONSTANT, AMPLITUDE, RATE, PHASE, COLUMNS = 0, 1, 7, 8, 9, 10
 
-SEVERAL = Field(min_length=2, max_length=1000)
+TWO_OR_MORE = Field(min_length=2, max_length=1000)
 Number = Callable[[str], Array]  # (V,) of a key of the motion, for every variant
 
 
-class TimeMotion(Spec):
+class TimeMotion(SpecOfKind):
     """Base of the motions of joints, and of the courses of loads, which are factors without a unit."""
-
-    if TYPE_CHECKING:
-
-        @property
-        def kind(self) -> str:
-            """As in the study file."""
 
     @abstractmethod
     def pieces(self, number: Number) -> Array:
@@ -102,8 +96,8 @@ class Points(TimeMotion):
     """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
 
     kind: Literal["waypoints"]
-    times: Annotated[tuple[Time, ...], Strict(False), SEVERAL]
-    values: Annotated[tuple[Dimensionless, ...], Strict(False), SEVERAL]
+    times: Annotated[Several[Time], TWO_OR_MORE]
+    values: Annotated[Several[Dimensionless], TWO_OR_MORE]
 
     @model_validator(mode="after")
     def _ascending(self) -> Points:
@@ -127,11 +121,11 @@ def _of_a_joint(base: type[TimeMotion], way: Literal["Turn", "Slide"], **fields:
 SteadyTurn = _of_a_joint(Steady, "Turn", start=(Angle, 0.0), rate=(AngularRate, ...))
 SwingTurn = _of_a_joint(Swing, "Turn", centre=(Angle, 0.0), amplitude=(Angle, ...))
 SpinUpTurn = _of_a_joint(SpinUp, "Turn", rate=(AngularRate, ...))
-PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[tuple[Angle, ...], Strict(False), SEVERAL], ...))
+PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[Several[Angle], TWO_OR_MORE], ...))
 SteadySlide = _of_a_joint(Steady, "Slide", start=(Length, 0.0), rate=(Speed, ...))
 SwingSlide = _of_a_joint(Swing, "Slide", centre=(Length, 0.0), amplitude=(Length, ...))
 SpinUpSlide = _of_a_joint(SpinUp, "Slide", rate=(Speed, ...))
-PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[tuple[Length, ...], Strict(False), SEVERAL], ...))
+PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[Several[Length], TWO_OR_MORE], ...))
 
 _TURNING, _SLIDING = "motion of a joint that turns", "motion of a joint that slides"
 TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn)
