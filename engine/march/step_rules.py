@@ -65,20 +65,20 @@ def free_steps(model: SceneModel) -> int:
     return max(FREE_STEPS, math.ceil(limit))
 
 
-def alias_steps(model: SceneModel, time_scale: Array, kept: int | None = None) -> Array:
+def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     """(V,) least steps per passage or cycle of the alias rule for the masses that ride on their bodies; 0 without any.
 
     A mass sees the highest mode's wave pass at k_N s' while the scheme turns that mode by its own phase; together they
     must stay below half a turn per step, k_N s' h + phase(omega_N h) < pi, else the march may resonate with itself.
-    For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2). kept: of all modes.
+    For average acceleration that is k_N s' h < 2 atan(2/(omega_N h)) (mechanics section 7.2).
     """
     found = np.zeros_like(time_scale)
     joined = {spring.carriage for spring in model.springs if spring.rigid}
     for number, carriage in enumerate(model.carriages):
         if carriage.inertia != "force" or number in joined:
             body = model.bodies[carriage.body].modal
-            wave = float(body.wave_number[:kept].max()) * carriage.rider.top_speed
-            found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega[:kept].max()) * time_scale))
+            wave = float(body.wave_number.max()) * carriage.rider.top_speed
+            found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega.max()) * time_scale))
     return model.scheme.stride * found
 
 

@@ -61,14 +61,14 @@ Along = tuple[StationPath, ...]  # all riders along some stations
 
 def ways(model: SceneModel, *segments: Segment) -> Along:
     """The ways of all riders at the stations 0..steps of segments, one after the other."""
-    times, highest = [_times(segment) for segment in segments], _highest(model)
+    times, highest = [station_times(segment) for segment in segments], _highest(model)
     return tuple(
         _joined([_way(rider, s, tau, s.active[r], highest[r]) for s, tau in zip(segments, times, strict=True)])
         for r, rider in enumerate(model.riders)
     )
 
 
-def _times(segment: Segment) -> Array:
+def station_times(segment: Segment) -> Array:
     """Scene times of the stations of a segment."""
     tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
     tau[-1] = segment.end

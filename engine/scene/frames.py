@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from engine.bodies.frame.frame import Vector
 from engine.scene.motions.of_joints import AnySliding, AnyTurning, TimeMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import KindOf, Noun, Several, Spec, SpecOfKind, Three, kinds
@@ -15,7 +16,6 @@ from engine.study_file.units import (
     Angle,
     AngularRate,
     Damping,
-    Dimensionless,
     Inertia,
     Length,
     RotationalDamping,
@@ -30,7 +30,6 @@ from results_schema.arrays import Array
 GROUND = "ground"
 MOST_JOINTS = 6
 
-Direction = Three[Dimensionless]
 RotationVector = Three[Angle]
 Spin = Three[AngularRate]
 Velocity = Three[Speed]
@@ -45,7 +44,7 @@ class Joint(SpecOfKind):
     turns: ClassVar[bool] = True
 
     @property
-    def turned_about(self) -> Direction | None:
+    def turned_about(self) -> Vector | None:
         """The axis about which a motion turns what it holds, if there is one."""
         return None
 
@@ -63,7 +62,7 @@ class AxisJoint(Joint):
     with that stiffness and that damping (PD).
     """
 
-    axis: Direction
+    axis: Vector
     start: float | None = None
     rate: float | None = None
     stiffness: float = 0.0
@@ -82,9 +81,7 @@ class AxisJoint(Joint):
         return along * self.turns, along * (not self.turns)
 
     @model_validator(mode="after")
-    def _axis_and_start(self) -> AxisJoint:
-        if not any(self.axis):
-            raise fault("an axis needs a direction", expected="three numbers, not all zero, such as [0, 1, 0]")
+    def _start_of_motion(self) -> AxisJoint:
         if self.is_driven and (self.start is not None or self.rate is not None):
             raise fault("a driven joint starts where its motion does", expected="start and rate left out")
         return self
@@ -101,7 +98,7 @@ class Revolute(AxisJoint):
     motion: AnyTurning | None = None
 
     @property
-    def turned_about(self) -> Direction | None:
+    def turned_about(self) -> Vector | None:
         return self.axis if self.motion is not None else None
 
 

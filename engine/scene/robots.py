@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from engine.bodies.frame.frame import Vector
 from engine.study_file.spec import KindOf, Noun, Several, Spec, Three
 from engine.study_file.units import (
     Acceleration,
@@ -29,7 +30,6 @@ from engine.study_file.units import (
 
 MOST_LINKS, MOST_RAILS, MOST_MOVES = 7, 2, 64
 
-Vector = Three[Dimensionless]
 Place = Three[Length]
 Principal = Three[Annotated[Inertia, Field(ge=0)]]
 Values = Several[Dimensionless]
@@ -92,13 +92,7 @@ class Link(Solid):
     slides: ClassVar[bool]
     axis: Vector
     place: Place = (0.0, 0.0, 0.0)
-    turned: Vector = (0.0, 0.0, 0.0)
-
-    @model_validator(mode="after")
-    def _has_axis(self) -> Link:
-        if not any(self.axis):
-            raise fault("an axis needs a direction", expected="three numbers, not all zero, such as [0, 0, 1]")
-        return self
+    turned: Three[Dimensionless] = (0.0, 0.0, 0.0)
 
 
 class Prismatic(Sliding, Link):

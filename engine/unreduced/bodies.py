@@ -123,8 +123,8 @@ def _full_frame(study: Study, name: str, frame: Frame) -> FullBody:
     return _assembled(study, name, frame, assemble(frame))
 
 
-def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEMENTS) -> Frame:
-    """A uniform beam as a plane frame with nodes at its supports and about so many elements."""
+def frame_of_beam(study: Study, name: str, beam: Beam) -> Frame:
+    """A uniform beam as a plane frame with nodes at its supports and about `BEAM_ELEMENTS` elements."""
     if len(beam.springs) > MOST_SUPPORTS:
         what, expected = "too many supports for the unreduced model", f"at most {MOST_SUPPORTS}"
         raise study.source.fault(f"body.{name}.supports", what, expected=expected, received=str(len(beam.springs)))
@@ -134,7 +134,7 @@ def frame_of_beam(study: Study, name: str, beam: Beam, elements: int = BEAM_ELEM
         f"m{index}": {
             "nodes": [number[before], number[after]],
             "section": "all",
-            "elements": max(1, round(elements * (after - before) / beam.length)),
+            "elements": max(1, round(BEAM_ELEMENTS * (after - before) / beam.length)),
         }
         for index, (before, after) in enumerate(pairwise(places))
     }

@@ -25,7 +25,7 @@ from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.unreduced.march import Course, march_unreduced
 from engine.unreduced.rows import Along
-from engine.unreduced.scene import Unreduced, contacts_of, unreduced_model
+from engine.unreduced.scene import contacts_of, unreduced_model
 from engine.unreduced.statics import statics_at
 from results_schema.arrays import Array, Counts
 
@@ -75,7 +75,8 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
     )
     found = march_unreduced(whole, course, by * counts, check)
     seen = np.isfinite(found.sensors)
-    resting = statics_at(whole, _standing(whole, tables, counts)).sensors
+    places = np.stack([tables.timeline.positions(r, counts) for r in range(len(whole.riders))], axis=1)
+    resting = statics_at(whole, Along.at_rest(places, np.isfinite(places), whole.riders)).sensors
     return Compared(
         quantities={name: sensor.quantity for name, sensor in study.sensor.items()},
         elapsed=course.elapsed(by * counts),
@@ -122,9 +123,3 @@ def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array
     unit = tables.statics.at(counts)
     loads = weights(tables.model, values)[:, 0]
     return np.asarray(unit.gravity * values.gravity[0] + unit.force @ loads)
-
-
-def _standing(whole: Unreduced, tables: SceneTables, counts: Counts) -> Along:
-    """All riders at rest where they are at stations by their count."""
-    places = np.stack([tables.timeline.positions(r, counts) for r in range(len(whole.riders))], axis=1)
-    return Along.at_rest(places, np.isfinite(places), whole.riders)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from engine.bodies.modal.flexibility import symmetric_lu
 from engine.kernels.layout import SOUND
 from engine.march.stepper import Codes, go
+from engine.model.station_path import station_times
 from engine.model.timeline import Impact, Segment, Timeline
 from engine.observation.histories import rows_sampled
 from engine.unreduced.rows import Along, Readings, readings, rider_of, softness, softness_slopes, tie_rows
@@ -85,8 +86,7 @@ def march_unreduced(
 
 def along_segment(model: Unreduced, course: Course, segment: Segment) -> Along:
     """All riders at the stations of a segment."""
-    tau = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
-    tau[-1] = segment.end
+    tau = station_times(segment)
     shape = (tau.size, len(model.riders))
     s, ds, dds, on = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.bool_)
     for r, (rider, active) in enumerate(zip(course.timeline.riders, segment.active, strict=True)):

@@ -124,7 +124,7 @@ SENSOR = {"body": "beam", "at": 0.0}
         ({"carriage": {"load": LOAD | {"motion": {"kind": "free", "start": 20.0}}}}, "starts on its body"),
         ({"frame": {"other": {}}}, "no such body"),
         ({"frame": {"beam": {"at": 1.0}}}, "the ground has no track"),
-        ({"frame": {"beam": {"joints": [REVOLUTE | {"axis": [0, 0, 0]}]}}}, "an axis needs a direction"),
+        ({"frame": {"beam": {"joints": [REVOLUTE | {"axis": [0, 0, 0]}]}}}, "this direction has no length"),
         ({"frame": {"beam": {"joints": [REVOLUTE | {"stiffness": "1 N/m"}]}}}, "rotational stiffness"),
         ({"frame": {"beam": {"joints": [REVOLUTE | {"rate": "1 Hz"}]}}}, r"rate of turning \(rad s-1\)"),
         ({"frame": {"beam": {"joints": [PRISMATIC | {"start": "1 deg"}]}}}, r"a length \(m\)"),
