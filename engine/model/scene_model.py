@@ -233,9 +233,7 @@ def build_model(
     contacts = tuple(rider for stands in support_reactions.values() for rider in stands.riders)
     on_contacts = tuple(spring for stands in support_reactions.values() for spring in stands.springs)
     springs = (*_springs(study, numerics, carriages, first, swept), *on_contacts)
-    carried = tuple(
-        support_reactions[n].carried(tie) if n in support_reactions else tie for n, tie in enumerate(carriages)
-    )
+    carried = tuple(support_reactions[n].carriage if n in support_reactions else tie for n, tie in enumerate(carriages))
     model = SceneModel(
         study,
         numerics,

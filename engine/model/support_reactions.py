@@ -42,19 +42,11 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SupportReactions:
-    """A body on its contacts: its number, mass (kg) and reference (m), their ways and springs, and what they carry of
-    its weight."""
+    """A body on its contacts: the carriage with its weight on them, their ways and springs."""
 
-    rides: int
-    mass: float
-    reference: float
+    carriage: CarriageTie
     riders: tuple[Rider, ...]
     springs: tuple[SpringTie, ...]
-    loads: tuple[Load, ...]
-
-    def carried(self, tie: CarriageTie) -> CarriageTie:
-        """The carriage with its weight on the contacts."""
-        return replace(tie, loads=self.loads, rides=self.rides, own_mass=self.mass, reference=self.reference)
 
 
 def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]) -> SupportReactions:
@@ -80,7 +72,8 @@ def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]
         springs.append(SpringTie(place.number, load.rider, load.body, keys, held, None, damped, contact.is_rigid))
     acting = tuple(springs) if numerics.knows_springs else ()
     reference = carriage.reference_on(modal.length)
-    return SupportReactions(place.rides, modal.mass, reference, riders, acting, loads)
+    carried = replace(place.tie, loads=loads, rides=place.rides, own_mass=modal.mass, reference=reference)
+    return SupportReactions(carried, riders, acting)
 
 
 def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tuple[float, ...]:

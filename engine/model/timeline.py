@@ -146,11 +146,11 @@ class Grid:
     """A scene cut at its events with some steps in every part. All timelines on it cut each of these into equal ones,
     so that marches with different numbers of steps meet at its stations.
 
-    counts: steps of every part; free: of the free vibration after the last one.
+    parts: without steps of their own; counts: steps of every part; free: of the free vibration after the last one.
     """
 
     riders: tuple[Rider, ...]
-    parts: tuple[_Part, ...]
+    parts: tuple[Segment, ...]
     counts: tuple[int, ...]
     free: int
     free_periods: float
@@ -159,7 +159,7 @@ class Grid:
         """The timeline with ``by`` steps in one of the grid's, and ``free_by`` in one of the free vibration."""
         segments: list[Segment] = []
         for part, count in zip(self.parts, self.counts, strict=True):
-            segments += part.stepped(count * by, segments[-1].first + segments[-1].steps if segments else 0)
+            segments += _stepped(part, count * by, segments[-1].first + segments[-1].steps if segments else 0)
         if self.free:
             end = self.parts[-1].end
             parked = tuple(rider.stays and rider.touches(end, end) for rider in self.riders)
@@ -216,29 +216,18 @@ def coarsened(timeline: Timeline, by: int) -> Timeline:
     return replace(timeline, segments=segments, window=(first // by, last // by))
 
 
-class _Part(NamedTuple):
-    """What lies between two neighbouring boundaries, however many steps it gets; otherwise as `Segment`."""
-
-    start: float
-    end: float
-    active: tuple[bool, ...]
-    fresh: bool
-    strikes: tuple[Impact, ...]
-    recorded: bool
-    rests: bool
-
-    def stepped(self, total: int, count: int) -> Iterator[Segment]:
-        """Its slices with so many steps in all, counted from ``count``; an event precedes the first."""
-        bounds = _slices(total)
-        at = [self.start + (self.end - self.start) * n / total for n in bounds[:-1]] + [self.end]
-        for i, (first, last) in enumerate(pairwise(bounds)):
-            fresh, strikes = (self.fresh, self.strikes) if i == 0 else (False, ())
-            place = at[i], at[i + 1], last - first, count + first
-            yield Segment(*place, self.active, fresh, strikes, self.recorded, False, self.rests)
+def _stepped(part: Segment, total: int, count: int) -> Iterator[Segment]:
+    """Slices of a part with so many steps in all, counted from ``count``; an event precedes the first."""
+    bounds = _slices(total)
+    at = [part.start + (part.end - part.start) * n / total for n in bounds[:-1]] + [part.end]
+    for i, (first, last) in enumerate(pairwise(bounds)):
+        fresh, strikes = (part.fresh, part.strikes) if i == 0 else (False, ())
+        own = part._replace(start=at[i], end=at[i + 1], steps=last - first, first=count + first)
+        yield own._replace(fresh=fresh, strikes=strikes)
 
 
 @lru_cache(maxsize=64)
-def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) -> tuple[_Part, ...]:
+def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) -> tuple[Segment, ...]:
     """The scene cut at its events, its cycles and ``stops``; a study asks for the same with many numbers of steps."""
     leading, end, recorded = riders[0], max(rider.end for rider in riders), _recorded(riders, window)
     hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
@@ -246,14 +235,15 @@ def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) 
     if leading.motion.period is not None:
         seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
     rest = max(rider.rests_from for rider in riders)
-    found: list[_Part] = []
+    found: list[Segment] = []
     before = tuple(False for _ in riders)
     for start, stop in pairwise(_merged([*hard, *seams, *recorded], end)):
         active = tuple(rider.touches(start, stop) for rider in riders)
         fresh = _near(hard, start, end)
         seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
         strikes = tuple(_strikes(riders, active, before, (start, stop))) if fresh else ()
-        found.append(_Part(start, stop, active, fresh, strikes, seen, start >= rest - _SAME * end))
+        rests = start >= rest - _SAME * end
+        found.append(Segment(start, stop, 0, 0, active, fresh, strikes, seen, False, rests))
         before = active
     return tuple(found)
 
@@ -268,9 +258,9 @@ def _recorded(riders: tuple[Rider, ...], window: Window) -> tuple[float, float]:
 
 def _free_vibration(last: Segment, total: int) -> list[Segment]:
     """Slices after the end of the scene; who stands on a body and what is recorded is as ``last`` says."""
-    count = last.first + last.steps
+    count, still = last.first + last.steps, last._replace(start=last.end, strikes=(), free=True, rests=True)
     return [
-        Segment(last.end, last.end, stop - first, count + first, last.active, first == 0, (), last.recorded, True, True)
+        still._replace(steps=stop - first, first=count + first, fresh=first == 0)
         for first, stop in pairwise(_slices(total))
     ]
 

@@ -71,21 +71,20 @@ def _whole(content: Content) -> _Whole:
 
 def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     whole = _whole(Content.of(frame, without=ABOUT_MODES))
-    assembly, flexibility, track, statics = whole.assembly, whole.flexibility, whole.track, whole.statics
+    assembly, track, statics = whole.assembly, whole.track, whole.statics
     omega, moved, shapes = _kept(frame, whole)
     masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
-    (numbers, everywhere), pull = loads_everywhere(frame, assembly), assembly.drag @ gravity
+    read = Read(frame, assembly, whole.flexibility, statics, whole.ends, omega, shapes)
+    numbers, everywhere = loads_everywhere(frame, assembly)
     loads = numbers, everywhere[assembly.free]
-    points = frame_points(loads, assembly, flexibility, sections, whole.ends, shapes, pull) if loads[0] else None
-    read = Read(frame, assembly, flexibility, statics, whole.ends, omega, shapes)
     bending = track.bending
     return ModalBody(
         length=frame.length,
         mass=assembly.total_mass,
         omega=omega,
-        participation=frozen(shapes.T @ pull),
+        participation=frozen(shapes.T @ read.pull),
         wave_number=frozen(track.wave_number(omega)),
         bending_stiffness=float(bending[0]) if np.ptp(bending) <= 1e-9 * bending[0] else np.nan,
         dampers=(),
@@ -93,7 +92,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         statics=statics,
         gravity_share=float(track.direction @ gravity),
         sections=sections,
-        points=points,
+        points=frame_points(read, loads, sections) if numbers else None,
         along=along_shapes(track, moved, forces),
         gauges={name: frame_gauge(read, spot, (numbers, everywhere)) for name, spot in spots},
     )

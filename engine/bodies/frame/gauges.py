@@ -40,6 +40,11 @@ class Read(NamedTuple):
     omega: Array
     shapes: Array
 
+    @property
+    def pull(self) -> Array:
+        """(n,) own weight per unit gravity."""
+        return np.asarray(self.assembly.drag @ unit(self.frame.gravity))
+
 
 @dataclass(frozen=True, eq=False)
 class FrameSpot:
@@ -118,7 +123,7 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
     row = place.row
     moved = read.flexibility.solve(row[:, None])
     response = read.ends.of(assembly.whole(moved)).reshape(-1)
-    weight = float(moved[:, 0] @ (assembly.drag @ unit(read.frame.gravity))) + place.under_weight
+    weight = float(moved[:, 0] @ read.pull) + place.under_weight
     names, loads = points
     return Gauge(
         row=place.mode_row(read.omega, read.shapes),
@@ -156,27 +161,18 @@ def loads_everywhere(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], 
     return numbers, np.array(list(rows.values())).reshape(len(rows), 6 * total).T
 
 
-def frame_points(
-    loads: tuple[dict[str, int], Array],
-    assembly: Assembly,
-    flexibility: Flexibility,
-    sections: TrackSections,
-    points: TrackPoints,
-    shapes: Array,
-    pull: Array,
-) -> Points:
-    """Points from their loads (n, P), the modes' shapes (n, N) and own weight per unit gravity (n,)."""
-    numbers, rows = loads
-    moved = flexibility.solve(rows)
-    statics = sections.statics
-    response = points.of(assembly.whole(moved)).reshape(statics.weight.size, -1)
+def frame_points(read: Read, points: tuple[dict[str, int], Array], sections: TrackSections) -> Points:
+    """The frame's points, from their names and loads (n, P)."""
+    numbers, loads = points
+    moved, statics = read.flexibility.solve(loads), read.statics
+    response = read.ends.of(read.assembly.whole(moved)).reshape(statics.weight.size, -1)
     return Points(
         numbers=numbers,
-        shapes=rows.T @ shapes,
-        flexibility=rows.T @ moved,
+        shapes=loads.T @ read.shapes,
+        flexibility=loads.T @ moved,
         response=response,
         section_response=response,
-        weight=moved.T @ pull,
+        weight=moved.T @ read.pull,
         rigid=statics.rigid,
         statics=statics,
         sections=sections,
