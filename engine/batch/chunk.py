@@ -1,25 +1,30 @@
-"""One chunk of variants: their results, what these were computed with, how far they may be off, and kept histories."""
+"""One chunk of variants: their results, what these were computed with, how far they may be off, and kept histories; and
+what stands in an archive of variants that end every process that computes them: a status, and no values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import USED, Found, Group, marches_again
-from engine.accuracy.jobs import Halted
+from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
-from engine.batch.plan import Plan
+from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import Flat, histories
 from engine.observation.histories import counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
+from results_schema.errors import WorkersGaveUp
 from results_schema.status import Status
 from results_schema.statuses import gravest, lost
-from results_schema.store.rows import Chunk, Rows, joined
+from results_schema.store.rows import Arrays, Chunk, Rows, joined
+
+OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0
 
 
 def march_chunk(plan: Plan, variants: Counts, halted: Halted, group: int, beside: int) -> Chunk:
@@ -49,7 +54,8 @@ def run_chunk(
         "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
         "error_estimate": _worst(error, results),
     }
-    return flat, _histories(plan, group, variants, found.used, halted)
+    kept = np.flatnonzero(np.isin(variants, plan.shown))
+    return flat, joined(list(_marched_again(plan, group.grid, variants[kept], _of(found.used, kept), halted)))
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
@@ -91,12 +97,6 @@ def histories_of(plan: Plan, variants: Counts, used: Flat) -> Rows | None:
     return joined(rows)
 
 
-def _histories(plan: Plan, group: Group, variants: Counts, used: Flat, halted: Callable[[], bool]) -> Rows | None:
-    """Histories of the kept ones among some variants."""
-    lanes = np.flatnonzero(np.isin(variants, plan.shown))
-    return joined(list(_marched_again(plan, group.grid, variants[lanes], _of(used, lanes), halted)))
-
-
 def _of(used: Flat, lanes: Counts) -> Flat:
     return {name: used[name][lanes] for name in USED}
 
@@ -111,3 +111,36 @@ def _marched_again(
     for tables, own in marches_again(grid, used):
         counts = counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)
         yield Rows(variants[own], histories(tables, values.part(own), counts, halted))
+
+
+def crashed_chunks(plan: Plan, crashed: Sequence[Counts], share: Share) -> Iterator[Chunk]:
+    """The chunks of such variants: as of another variant, whose results say what there would be, emptied. Raises
+    WorkersGaveUp where there is no other."""
+    variants = np.unique(np.concatenate([NOBODY, *crashed]))
+    if not variants.size:
+        return
+    others = np.setdiff1d(np.arange(plan.size), variants)
+    if not others.size:
+        raise WorkersGaveUp("every variant ends the process that computes it", remedy="try the study without workers")
+    shown = np.isin(variants, plan.shown)
+    of_shown = np.intersect1d(others, plan.shown)
+    for own, like in ((variants[shown], of_shown if of_shown.size else others), (variants[~shown], others)):
+        if own.size:
+            (found,) = share(plan, [_alone(plan, int(like[0]))])
+            yield Chunk(_emptied(found.rows, own), None if found.selected is None else _emptied(found.selected, own))
+
+
+def _alone(plan: Plan, variant: int) -> Job[Chunk]:
+    """The chunk of one variant."""
+    (group,) = (number for number, group in enumerate(plan.groups) if variant in group.variants)
+    return Job(partial(march_chunk, group=group, beside=len(plan.groups)), np.array([variant], dtype=np.int64))
+
+
+def _emptied(rows: Rows, variants: Counts) -> Rows:
+    """Rows of so many variants, of the same arrays without values."""
+    found: Arrays = {}
+    for name, array in rows.arrays.items():
+        shape = (variants.size, *array.shape[1:])
+        empty = np.nan if array.dtype.kind == "f" else OF_CRASHED.get(name, 0)
+        found[name] = np.full(shape, empty, dtype=array.dtype)
+    return Rows(variants, found)

@@ -75,8 +75,7 @@ def execute(
 
     Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
     """
-    from engine.batch.chunk import march_chunk
-    from engine.batch.crashed import crashed_chunks
+    from engine.batch.chunk import crashed_chunks, march_chunk
 
     here = here or Threads(cores())
     warm_up(plan)

@@ -77,16 +77,14 @@ class Rigid(Body):
 class RigidShapes:
     """phi = (1/sqrt(m), (s - centre)/sqrt(J))."""
 
-    mass: float
-    inertia: float
-    centre: float
+    body: Rigid
 
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
         """d^j phi / ds^j at the stations `s` (S,) for several j, as (orders, S, 2)."""
-        arm = np.asarray(s, dtype=np.float64) - self.centre
+        arm = np.asarray(s, dtype=np.float64) - self.body.centre_of_mass
         none = np.zeros_like(arm)
         shapes = {0: (none + 1.0, arm), 1: (none, none + 1.0)}
-        sizes = np.sqrt([self.mass, self.inertia])
+        sizes = np.sqrt([self.body.mass, self.body.inertia])
         return np.stack([np.stack(shapes.get(order, (none, none)), axis=1) / sizes for order in orders])
 
 
@@ -117,6 +115,6 @@ def rigid_body(body: Rigid) -> ModalBody:
         wave_number=np.zeros(2),
         bending_stiffness=np.nan,
         dampers=(),
-        shapes=RigidShapes(body.mass, body.inertia, body.centre_of_mass),
+        shapes=RigidShapes(body),
         statics=RigidStatics(),
     )
