@@ -15,7 +15,7 @@ from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Along, ways
+from engine.model.station_path import ways
 from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
 from engine.model.track import closed, tie_rows, ties_of
 from engine.observation import kinks, signals
@@ -71,16 +71,12 @@ class SceneTables:
     @cached_property
     def timeline(self) -> Timeline:
         """The scene cut into segments."""
-        return refined(self._unrefined, self.refinement)
-
-    @cached_property
-    def _unrefined(self) -> Timeline:
         free = free_steps(self.model)
         if self.refinement > 1:
             free = max(free, self.steps)  # more steps bring the whole history of a pair closer, free vibration too
         steps, free = (-(-wanted // self.refinement) for wanted in (self.steps, free))
         stops = kinks.stops(self.model, self.sensors) if self.stops == "kinks" and self.window == "whole" else ()
-        return build_timeline(self.model.riders, steps, self.window, free, stops)
+        return refined(build_timeline(self.model.riders, steps, self.window, free, stops), self.refinement)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -144,7 +140,7 @@ class SceneTables:
         return (segment, *following[: np.count_nonzero(stations[1:] <= MOST_STATIONS)])
 
     def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
-        along = self._ways(segments)
+        along = ways(self.model, *segments)
         numbers = ties_of(self.model, np.any([segment.active for segment in segments], axis=0))
         if not missed:
             found = residual(self.model, along, numbers), tabulate_missed(self.model, self.signals, along, numbers)
@@ -176,10 +172,6 @@ class SceneTables:
         if sum(part.nbytes for one in self._missed.values() for part in one) <= KEPT_BYTES:
             self._missed[key] = found
         return found
-
-    def _ways(self, segments: Sequence[Segment]) -> Along:
-        """The ways of all carriages along segments, one after the other."""
-        return ways(self.model, *segments)
 
     def forget(self) -> None:
         """Drop the tables, when no chunk needs them any more."""

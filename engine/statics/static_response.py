@@ -132,7 +132,7 @@ class Statics:
         """Readings at stations by their count."""
         key = counts.tobytes()
         if key not in self._kept:
-            readings = self._readings(standing(self.timeline, counts))
+            readings = static_readings(self.model, self.sensors, standing(self.timeline, counts))
             self._kept[key] = StaticUnit(readings[:, :, :-1], readings[:, :, -1])
         return self._kept[key]
 
@@ -147,10 +147,6 @@ class Statics:
             self._slopes[key] = np.where(here[:, None], self._slope(along), 0.0) if active else none
         return self._slopes[key]
 
-    def _readings(self, along: Along) -> Array:
-        """(S, J, C + 1) readings per unit weight of each carriage, and last per unit gravity."""
-        return static_readings(self.model, self.sensors, along)
-
     def _slope(self, along: Along) -> Array:
         """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
         apart, which it reaches with all its contacts."""
@@ -159,12 +155,12 @@ class Statics:
         lowest = np.minimum.reduce([along[r].s for r in own])
         highest = np.minimum.reduce([riders[r].length - along[r].s for r in own])
         before, after = -np.minimum(apart, lowest), np.minimum(apart, highest)
-        left, right = (
+        moved = [
             tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
             for shift in (before, after)
-        )
-        change = self._readings(right)[:, :, 0] - self._readings(left)[:, :, 0]
-        return np.asarray(change / (after - before)[:, None])
+        ]
+        left, right = (static_readings(self.model, self.sensors, ways)[:, :, 0] for ways in moved)
+        return np.asarray((right - left) / (after - before)[:, None])
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

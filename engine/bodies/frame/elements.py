@@ -96,16 +96,18 @@ def rotation_shapes(x: Array, length: Array, phi: Array) -> Array:
 
 def stiffness(beams: Beams) -> Array:
     """(E, 12, 12) element stiffness matrices."""
-    found = np.zeros((len(beams.length), 12, 12))
-    bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    found[:, AXIAL[:, None], AXIAL] = (beams.axial / beams.length)[:, None, None] * bar
-    found[:, TORSION[:, None], TORSION] = (beams.torsion / beams.length)[:, None, None] * bar
-    found[:, ALONG_Y[:, None], ALONG_Y] = _bending(beams.length, beams.bending_y, beams.phi_y) * np.outer(
-        SIGN_Y, SIGN_Y
-    )
-    found[:, ALONG_Z[:, None], ALONG_Z] = _bending(beams.length, beams.bending_z, beams.phi_z) * np.outer(
-        SIGN_Z, SIGN_Z
-    )
+    bars = np.stack([beams.axial / beams.length, beams.torsion / beams.length])
+    along_y = _bending(beams.length, beams.bending_y, beams.phi_y)
+    along_z = _bending(beams.length, beams.bending_z, beams.phi_z)
+    return _in_place(bars[:, :, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]]), along_y, along_z)
+
+
+def _in_place(bars: Array, along_y: Array, along_z: Array) -> Array:
+    """(E, 12, 12) from matrices of extension and twist (2, E, 2, 2), and of bending along y and z (E, 4, 4)."""
+    found = np.zeros((len(along_y), 12, 12))
+    found[:, AXIAL[:, None], AXIAL], found[:, TORSION[:, None], TORSION] = bars
+    found[:, ALONG_Y[:, None], ALONG_Y] = along_y * np.outer(SIGN_Y, SIGN_Y)
+    found[:, ALONG_Z[:, None], ALONG_Z] = along_z * np.outer(SIGN_Z, SIGN_Z)
     return found
 
 
@@ -124,15 +126,10 @@ def _bending(length: Array, bending: Array, phi: Array) -> Array:
 
 def consistent_mass(beams: Beams) -> Array:
     """(E, 12, 12) masses of the same shapes, by quadrature that is exact for them."""
-    found = np.zeros((len(beams.length), 12, 12))
-    bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
-    found[:, AXIAL[:, None], AXIAL] = (beams.mass * beams.length)[:, None, None] * bar
-    found[:, TORSION[:, None], TORSION] = (beams.twist_inertia * beams.length)[:, None, None] * bar
+    bars = np.stack([beams.mass * beams.length, beams.twist_inertia * beams.length])
     along_y = _bending_mass(beams, beams.phi_y, beams.turn_inertia_y)
     along_z = _bending_mass(beams, beams.phi_z, beams.turn_inertia_z)
-    found[:, ALONG_Y[:, None], ALONG_Y] = along_y * np.outer(SIGN_Y, SIGN_Y)
-    found[:, ALONG_Z[:, None], ALONG_Z] = along_z * np.outer(SIGN_Z, SIGN_Z)
-    return found
+    return _in_place(bars[:, :, None, None] * (np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0), along_y, along_z)
 
 
 def _bending_mass(beams: Beams, phi: Array, turn_inertia: Array) -> Array:
