@@ -80,29 +80,24 @@ def runge_kutta() -> ComparisonScheme:
     return ComparisonScheme("rk4", 4, math.sqrt(8.0), (0.5, 1.0), RungeKutta(0.5))
 
 
-def lagged_inertia(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
-    """Staggered coupling: the contact force m (g - D2w) of the last step. Stable iff m phi.phi < 1 (section 7.1)."""
-    rule = Coupling(scheme, 0.0, 0.0, 0, 0.0, 0.0)
-    return ComparisonScheme("lagged-inertia", 1, _limit(scheme), (0.0, 1.0), rule)
+#: Staggered and iterated couplings, with average acceleration.
+_COUPLED = {
+    # the contact force m (g - D2w) of the last step: stable iff m phi.phi < 1 (section 7.1)
+    "lagged-inertia": Coupling(AVERAGE_ACCELERATION, 0.0, 0.0, 0, 0.0, 0.0),
+    # implicit inertia, the convective terms of the last step: stable and of first order
+    "lagged-convective": Coupling(AVERAGE_ACCELERATION, 1.0, 0.0, 0, 0.0, 0.0),
+    # the implicit step by fixed-point iteration of the contact force, which contracts where r < 1 (section 7.1); a
+    # variant whose iteration does not converge within 50 ends as NaN
+    "picard": Coupling(AVERAGE_ACCELERATION, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 0.0),
+    # the same with the changes divided by 1 + r
+    "picard-relaxed": Coupling(AVERAGE_ACCELERATION, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 1.0),
+}
 
 
-def lagged_convective(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
-    """Implicit inertia, the convective terms of the last step: stable and of first order."""
-    rule = Coupling(scheme, 1.0, 0.0, 0, 0.0, 0.0)
-    return ComparisonScheme("lagged-convective", 1, _limit(scheme), (0.0, 1.0), rule)
-
-
-def picard(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
-    """The implicit step by fixed-point iteration of the contact force, which contracts where r < 1 (section 7.1);
-    a variant whose iteration does not converge within 50 ends as NaN."""
-    rule = Coupling(scheme, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 0.0)
-    return ComparisonScheme("picard", 2, _limit(scheme), (0.0, 1.0), rule)
-
-
-def picard_relaxed(scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
-    """The same with the changes divided by 1 + r."""
-    rule = Coupling(scheme, 1.0, 1.0, MOST_ITERATIONS, ITERATED_TO, 1.0)
-    return ComparisonScheme("picard-relaxed", 2, _limit(scheme), (0.0, 1.0), rule)
+def coupled(name: str, scheme: Newmark = AVERAGE_ACCELERATION) -> ComparisonScheme:
+    """A staggered or iterated coupling by its name, with a scheme of the march for the modes."""
+    rule = _COUPLED[name]._replace(scheme=scheme)
+    return ComparisonScheme(name, 2 if rule.iterations else 1, _limit(scheme), (0.0, 1.0), rule)
 
 
 def rigid_tie(scheme: Newmark | Alpha = AVERAGE_ACCELERATION) -> ComparisonScheme:
@@ -126,10 +121,7 @@ COMPARISON: Mapping[str, ComparisonScheme] = {
     for scheme in (
         wilson_theta(),
         runge_kutta(),
-        lagged_inertia(),
-        lagged_convective(),
-        picard(),
-        picard_relaxed(),
+        *map(coupled, _COUPLED),
         rigid_tie(),
     )
 }

@@ -52,10 +52,10 @@ def compute(ground: Ground, asked: Asked, work: Work) -> xr.Dataset:
 
 def lagged_growth(scene: MapScene, mass: Array, relative: float) -> Array:
     """(n,) growth per step for masses (n,) over the body's, omega_1 h = relative."""
-    from engine.methods.comparison import lagged_inertia
+    from engine.methods.comparison import COMPARISON
 
     step = np.full_like(mass, relative / scene.model.first_omega)
-    return scene.step_growth(scene.values(mass), step, scheme=lagged_inertia())
+    return scene.step_growth(scene.values(mass), step, scheme=COMPARISON["lagged-inertia"])
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:

@@ -12,9 +12,8 @@ from engine.kernels.layout import Newmark, State
 from engine.methods.comparison import (
     COMPARISON,
     ComparisonScheme,
+    coupled,
     frozen_track,
-    lagged_inertia,
-    picard_relaxed,
     propagate_comparison,
 )
 from engine.model.lane_table import from_blocks, lane_table, padded, to_blocks
@@ -75,7 +74,7 @@ def test_lagged_convective_stays_stable_where_lagged_inertia_fails() -> None:
 def test_limits_are_those_of_the_scheme_of_the_modes() -> None:
     linear = Newmark(1 / 6, 1 / 2)
     model = held(2, 0.0)
-    for scheme in (lagged_inertia(linear), picard_relaxed(linear)):
+    for scheme in (coupled("lagged-inertia", linear), coupled("picard-relaxed", linear)):
         limit = bisected(lambda x, one=scheme: grows(one, model, x / float(model.omega.max())), 2.0, 5.0)
         assert limit == pytest.approx(math.sqrt(12.0), rel=1e-3)
         assert scheme.stability_limit == pytest.approx(limit, rel=1e-3)
