@@ -23,11 +23,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
-    from engine.kernels.layout import (
-        Observation,
-        State,
-        Ties,
-    )
+    from engine.kernels.layout import Observation, State, Ties
     from engine.march.stepper import Codes
     from engine.march.tables import SceneTables, SegmentTable
     from engine.model.lane_table import LaneTable

@@ -11,16 +11,7 @@ from engine.scene.frames import GROUND, Place
 from engine.scene.motions.of_joints import AnyCourse
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Noun, Spec, Three
-from engine.study_file.units import (
-    Damping,
-    Force,
-    ForcePerMetre,
-    Length,
-    Stiffness,
-    Torque,
-    TorquePerMetre,
-    fault,
-)
+from engine.study_file.units import Damping, Force, ForcePerMetre, Length, Stiffness, Torque, TorquePerMetre, fault
 
 Forces = Three[Force]
 Torques = Three[Torque]

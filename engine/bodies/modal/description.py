@@ -14,19 +14,7 @@ from engine.bodies.modal.outline import Outline, straight
 from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check
 from engine.study_file.document import Beside
-from engine.study_file.spec import (
-    LIST,
-    NUMBER,
-    TABLE,
-    Auto,
-    Hint,
-    Several,
-    Spec,
-    SpecOfKind,
-    by_amount_form,
-    by_form,
-    nearest,
-)
+from engine.study_file.spec import LIST, NUMBER, TABLE, Auto, Hint, Spec, SpecOfKind, by_amount_form, by_form, nearest
 from engine.study_file.units import Dimensionless, Rate, Time
 from results_schema.errors import BadInput, shortened
 
@@ -42,7 +30,7 @@ class Rayleigh(Spec):
 
 
 Ratio = Annotated[Dimensionless, Field(ge=0, lt=1), Hint('a part of critical damping: 0.02 or "2 %"')]
-Ratios = Annotated[Several[Ratio], Field(min_length=1, max_length=MAX_MODES)]
+Ratios = Annotated[tuple[Ratio, ...], Strict(False), Field(min_length=1, max_length=MAX_MODES)]
 DampingRatio = Annotated[
     Annotated[Ratio, Tag(NUMBER)] | Annotated[Ratios, Tag(LIST)] | Annotated[Rayleigh, Tag(TABLE)], by_amount_form
 ]
