@@ -97,12 +97,9 @@ class Group:
     def chunk_bytes(self) -> float:
         """Bytes of a variant's histories and statistics while it is marched."""
         asked, study = self.grid.asked, self.scene.study
-        steps = self.usual_steps
-        rows = (
-            min(2 * asked.reduction.stations, steps)
-            if asked.reduction is not None
-            else min(self.grid.unit, MOST_COMPARED)
-        )
+        steps, rows = self.usual_steps, min(self.grid.unit, MOST_COMPARED)
+        if asked.reduction is not None:
+            rows = min(2 * asked.reduction.stations, steps)
         places = max((envelope.places for envelope in study.envelope.values()), default=0)
         signals = len(study.sensor) + len(self.scene.carriages)
         found = 8.0 * rows * max(1, len(study.sensor)) + 8.0 * STATISTICS * max(signals, places)
@@ -177,11 +174,9 @@ class ConvergingGroup(Group):
     def work(self) -> float:
         levels, values = as_fixed(self.grid), self.grid.values
         own = float(np.mean(level_work(self.grid, values, levels, min(USUAL_LEVEL, len(levels.numerics) - 1))))
-        return (
-            1.3 * own
-            if is_free(self.grid)
-            else own + 1.3 * float(np.mean(level_work(self.grid, values, in_full(self.grid), USUAL_LEVEL)))
-        )
+        if is_free(self.grid):
+            return 1.3 * own
+        return own + 1.3 * float(np.mean(level_work(self.grid, values, in_full(self.grid), USUAL_LEVEL)))
 
     @property
     def usual_steps(self) -> int:

@@ -180,10 +180,8 @@ def _include(statistics: Array, reading: Array, at: float) -> None:
         (layout.SMALLEST, layout.SMALLEST_AT, np.less),
     ):
         more = beyond(reading, statistics[value])
-        statistics[value], statistics[place] = (
-            np.where(more, reading, statistics[value]),
-            np.where(more, at, statistics[place]),
-        )
+        statistics[value] = np.where(more, reading, statistics[value])
+        statistics[place] = np.where(more, at, statistics[place])
 
 
 def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Callable[[], bool]) -> Flat:

@@ -174,17 +174,12 @@ def _sag_under(model: SceneModel, spring: SpringTie, below: Attachment, along: A
 def rate_rows(model: SceneModel, ties: list[int], along: Along) -> tuple[Array, Array, Array]:
     """p and s' phi' (N, R) of springs or joints at the first station, and s' times the slope of the body's own sag (R,)
     per unit gravity; s' as the ways have it."""
-    force, slope, sag = (
-        np.zeros((model.omega.size, len(ties))),
-        np.zeros((model.omega.size, len(ties))),
-        np.zeros(len(ties)),
-    )
+    (force, slope), sag = np.zeros((2, model.omega.size, len(ties))), np.zeros(len(ties))
     for place, r in enumerate(ties):
         for attachment in model.attachments[r]:
             if holds(attachment, along):
-                force[model.bodies[attachment.body].modes, place] += (
-                    attachment.factor * shape_rows(model, attachment, along)[0]
-                )
+                shapes = attachment.factor * shape_rows(model, attachment, along)[0]
+                force[model.bodies[attachment.body].modes, place] += shapes
         below = model.attachments[r][0]
         if below.rider is not None and along[below.rider].active:
             way = along[below.rider]

@@ -49,11 +49,9 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
         chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]
         return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)
     mode = next((spring.mode for spring in springs.values()), None)
-    return (
-        Sensor(name, spec.quantity, body, at, under)
-        if mode is None
-        else SprungSensor(name, spec.quantity, body, at, under, mode)
-    )
+    if mode is None:
+        return Sensor(name, spec.quantity, body, at, under)
+    return SprungSensor(name, spec.quantity, body, at, under, mode)
 
 
 def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: Along, ties: Counts) -> Array:

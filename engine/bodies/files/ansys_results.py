@@ -55,10 +55,8 @@ def _modes(model: FileModel, path: str, line: NodeLine, component: int) -> Modes
     rows = np.full((len(model.nodes), len(DOFS)), -1)
     rows[model.owner, model.direction] = np.arange(model.size)
     for k in range(file.nsets):
-        moved, ways = (
-            _of_nodes(model, path, partial(file.nodal_solution, k)),
-            foreign(path, partial(file.result_dof, k)),
-        )
+        moved = _of_nodes(model, path, partial(file.nodal_solution, k))
+        ways = foreign(path, partial(file.result_dof, k))
         for name, values in zip(ways, moved.T, strict=False):
             own = rows[:, DOFS[name]] if name in DOFS else np.full(len(rows), -1)
             shapes[own[own >= 0], k] = values[own >= 0]
