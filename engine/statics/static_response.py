@@ -19,7 +19,6 @@ from results_schema.arrays import Array, Counts
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Timeline
-    from engine.observation.contact_forces import ContactForce
     from engine.scene.variants import VariantValues
 
 
@@ -71,14 +70,11 @@ def static_shapes(model: SceneModel, values: VariantValues, along: Along, body: 
 
 def contact_names(model: SceneModel) -> list[str]:
     """The names of `signals.contact_forces`: the carriage, or the carriage and its contact with a dot."""
-    return [_name(model, contact) for contact in contact_forces(model)]
-
-
-def _name(model: SceneModel, contact: ContactForce) -> str:
-    carriage = model.carriages[contact.carriage].name
-    if contact.contact is None:
-        return carriage
-    return f"{carriage}.{model.contact_names(contact.carriage)[contact.contact]}"
+    found = []
+    for force in contact_forces(model):
+        name, contacts = model.carriages[force.carriage].name, model.contact_names(force.carriage)
+        found.append(name if force.contact is None else f"{name}.{contacts[force.contact]}")
+    return found
 
 
 def _loads(model: SceneModel, values: VariantValues) -> Array:

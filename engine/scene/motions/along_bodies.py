@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side
+from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side, two_places
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.scene.motions.point_to_point import PointToPoint
 from engine.study_file.checks import Check, on_body
@@ -52,7 +52,7 @@ class Cruise(Motion):
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
         touch = Check(here, (length, start, end), _line_touches, _NO_TOUCH, _TOUCHING)
-        return [_stroke_check(start, end), touch]
+        return [two_places(start, end), touch]
 
     def law(self, tau: Array, side: Side) -> Path:
         velocity = np.full_like(tau, self.end - self.start)
@@ -128,9 +128,8 @@ class OutAndBack(Motion):
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
         return [
-            _stroke_check(start, end),
-            on_body(start, (start, length), "an out-and-back path must stay on its body"),
-            on_body(end, (end, length), "an out-and-back path must stay on its body"),
+            two_places(start, end),
+            *(on_body(key, (key, length), "an out-and-back path must stay on its body") for key in (start, end)),
         ]
 
     def law(self, tau: Array, side: Side) -> Path:
@@ -329,10 +328,6 @@ AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 
 _NO_TOUCH = "the path never touches its body"
 _TOUCHING = "a path with a part between 0 and the body's length"
-
-
-def _stroke_check(start: str, end: str) -> Check:
-    return Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
 
 
 def _line_touches(length: Any, start: Any, end: Any) -> Any:

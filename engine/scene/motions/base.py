@@ -150,6 +150,11 @@ class Motion(SpecOfKind):
         return found
 
 
+def two_places(start: str, end: str) -> Check:
+    """The condition that a stroke, by the keys of its ends, has a length."""
+    return Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
+
+
 @lru_cache(maxsize=256)
 def _passing(motion: Motion, place: float) -> tuple[float, ...]:
     low, high = motion.range()

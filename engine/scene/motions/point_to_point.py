@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from engine.scene.motions.base import Array, Motion, Path, Side
+from engine.scene.motions.base import Array, Motion, Path, Side, two_places
 from engine.scene.motions.of_joints import CONSTANT, START, Number, blank
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Acceleration, Jerk, Length, Speed, Time
@@ -131,8 +131,7 @@ class PointToPoint(Motion):
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
         what = "a point-to-point path must stay on its body"
-        apart = Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
-        return [apart, on_body(start, (start, length), what), on_body(end, (end, length), what)]
+        return [two_places(start, end), *(on_body(key, (key, length), what) for key in (start, end))]
 
     def breaks(self) -> Array:
         """Where its phases meet: there the acceleration jumps or bends."""
