@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar, cast
 from results_schema.errors import BadInput
 
 T = TypeVar("T")
+ABSENT = "is the package installed that brings this kind?"
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from engine.study_file.document import Source
 from engine.study_file.spec import LIST, NUMBER, TABLE, WORD, Hint, KindOf, Noun, Spec, nearest
 from engine.study_file.units import Unit
 from results_schema.errors import BadInput, shortened
+from results_schema.pieces import ABSENT
 
 Keys = Sequence[str | int]
 
@@ -149,7 +150,7 @@ def _where_else(model: type[Spec], data: Any, around: FieldType | None, keys: Ke
     key, here = str(keys[-1]), list(keys[:-1])
     tables_of_kinds = [note.table for note in around.notes if isinstance(note, KindOf)] if around else []
     if tables_of_kinds and key == "kind":
-        return "is the package installed that brings this kind?"
+        return ABSENT
     if here and key in keys_at(model, data, ()):
         return f"write {key} at the top of the file: a key belongs to the table whose [header] stands above it"
     fitting = [kind for table in tables_of_kinds for kind, cls in table.items() if _field_of(cls, key) is not None]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
 from results_schema.late import xr
-from results_schema.pieces import Pieces, lacks, no_row_of
+from results_schema.pieces import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
 
@@ -240,7 +240,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
     if name not in KINDS:
         known = kind_names()
         near = get_close_matches(name, known, n=1)
-        remedy = f'did you mean "{near[0]}"?' if near else ""
+        remedy = f'did you mean "{near[0]}"?' if near else ABSENT
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
     return KINDS[name]

@@ -12,6 +12,7 @@ from engine.bodies.modal.description import Recorded
 from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.late import xr
+from results_schema.pieces import ABSENT
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
 from results_schema.variables import declarations
@@ -38,6 +39,8 @@ def results_of(archive: Archive) -> Results:
         study = _study(archive.root, models)
         found = list(_findings(archive, study))
     except BadInput as error:
+        if error.remedy == ABSENT:
+            raise ArchiveError(str(error), where=str(archive.path)) from error
         raise _refused(archive.path, str(error)) from error
     if found:
         more = f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else ""

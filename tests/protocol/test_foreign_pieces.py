@@ -22,6 +22,7 @@ from results_schema.errors import BadInput
 from results_schema.pieces import Pieces
 from results_schema.quantities import QUANTITIES
 from studies.protocol.study import KINDS
+from tests.studies import scenes
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
@@ -130,6 +131,20 @@ def test_a_study_of_them_all_is_run(packages: Path) -> None:
     assert report.returncode == 0, report.stderr
     page = (packages.parent / "all-report" / "report.html").read_text(encoding="utf-8")
     assert "of the largest reading is static" in page
+
+
+def test_without_its_package_a_study_and_its_archive_are_refused_in_words(packages: Path, tmp_path: Path) -> None:
+    """The archive is whole: it is the package that is missed."""
+    (packages.parent / "one.toml").write_text(scenes.text_of("passage").replace('"passage"', '"static-share"'))
+    assert wanderlast(packages, "run", "one.toml").returncode in (0, 3)
+    gone, said = tmp_path / "gone", "unknown kind of study"
+    for code, arguments in ((2, ["run", "one.toml"]), (4, ["report", "one.nc"]), (4, ["info", "one.nc"])):
+        refused = wanderlast(gone, *arguments)
+        assert refused.returncode == code and said in refused.stderr and "static-share" in refused.stderr
+        assert "package" in refused.stderr and "not what it holds" not in refused.stderr
+        assert len(refused.stderr.splitlines()) == 1
+    assert "one.nc: whole" in refused.stdout
+    assert wanderlast(gone, "info", "one.nc", "--study").returncode == 0
 
 
 def test_the_unreduced_model_knows_the_body_and_refuses_the_quantity(packages: Path) -> None:
