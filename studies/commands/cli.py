@@ -69,7 +69,7 @@ def check(study: str) -> None:
     """Validate STUDY and explain what a run would do."""
     import engine
     from engine.kernels.compiling import told_of_compiling
-    from studies.commands import catalogue, console
+    from studies.commands import catalogue, console, screens
     from studies.commands.preview import preview
     from studies.protocol.study import kind_of
 
@@ -77,7 +77,7 @@ def check(study: str) -> None:
     loaded = engine.load(path)
     with told_of_compiling(partial(console.say_stage, path.stem)):
         seen = preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0)))
-    console.show_preview(seen)
+    screens.show_preview(seen)
 
 
 @commands.command()
@@ -115,7 +115,7 @@ def run(study: str, archive: Path | None, as_json: bool, verbose: bool, **how: A
     With a progress bar, and the answer at the end. Started again after any interruption it goes on from what is
     finished.
     """
-    from studies.commands import console
+    from studies.commands import console, screens
     from studies.findings import numerics_used as choices
     from studies.protocol.options import RunOptions
     from studies.reporting import summary
@@ -127,9 +127,9 @@ def run(study: str, archive: Path | None, as_json: bool, verbose: bool, **how: A
         chosen = choices.as_json(Results.of(outcome.results))
         console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
     else:
-        console.show_outcome(outcome)
+        screens.show_outcome(outcome)
         if verbose:
-            console.show_details(outcome)
+            screens.show_details(outcome)
     console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))
     return code
 
@@ -161,7 +161,7 @@ def info(archive: Path, every: bool, text: bool) -> None:
     """
     _refuse_what_is_no_archive(archive)
     from results_schema.store.archive import describe, open_archive
-    from studies.commands import console
+    from studies.commands import console, screens
     from studies.findings.numerics_used import told_choices
     from studies.runs.archived import results_of
 
@@ -169,9 +169,9 @@ def info(archive: Path, every: bool, text: bool) -> None:
     if text:
         console.say(*str(found.attributes.get("study", "")).splitlines())
     elif every:
-        console.show_everything(found)
+        screens.show_everything(found)
     else:
-        console.show_archive(found)
+        screens.show_archive(found)
         if found.whole:
             console.paragraphs(*told_choices(results_of(open_archive(archive))))
     if not found.whole:
@@ -187,12 +187,12 @@ def compare(first: Path, second: Path) -> int:
     Ends with 3 where variants of both differ by more than their errors explain, or in status.
     """
     from results_schema.store.archive import open_archive
-    from studies.commands import console
+    from studies.commands import screens
     from studies.reporting.comparison import compare as compared
     from studies.runs.archived import results_of
 
     found = compared(results_of(open_archive(first)), results_of(open_archive(second)))
-    console.show_comparison(found)
+    screens.show_comparison(found)
     return 0 if found.agree else 3
 
 
@@ -246,10 +246,10 @@ def schema() -> None:
 @commands.command(name="list")
 def list_() -> None:
     """List the built-in studies and the kinds of study."""
-    from studies.commands import catalogue, console
+    from studies.commands import catalogue, screens
     from studies.protocol.study import kind_named, kind_names
 
-    console.show_studies(
+    screens.show_studies(
         catalogue.entries(), catalogue.measured(), [(kind, kind_named(kind).summary) for kind in kind_names()]
     )
 
@@ -264,14 +264,14 @@ def list_() -> None:
 @_JSON
 def bench(threads: int | None, as_json: bool, **scene: Any) -> None:
     """Measure the pace of the march on this machine."""
-    from studies.commands import console
+    from studies.commands import console, screens
     from studies.commands.bench import Scene, measure
 
     found = measure(Scene(**scene), threads)
     if as_json:
         console.say_json(asdict(found))
     else:
-        console.show_throughput(found)
+        screens.show_throughput(found)
 
 
 def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:

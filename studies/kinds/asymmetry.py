@@ -16,6 +16,7 @@ from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
+from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.settled import LEFT_OVER, Asked, odd_parts, thresholds
 from studies.protocol.study import Kind
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
@@ -200,14 +201,14 @@ def _lag(results: Results, sensor: str) -> str:
     known, formula = np.isfinite(apart), theory.lag_formula(results, sensor)
     axis = results.axis(".motion.speed")
     if axis is None or not known.any():
-        return f"{sensor}: {_largest_lag(results, lag, expected)}."
+        return f"{sensor}: {_largest_lag(results, sensor, lag, expected)}."
     limit = results.holds_up_to(axis, apart <= CLOSE, known)
     if limit is None:
         slowest = apart[known & (results.everywhere(results.dataset[axis.name]) == axis.values.min())]
         off = f"up to {percent(float(slowest.max()))} away from {formula}" if slowest.size else "not known"
-        return f"{sensor}: {_largest_lag(results, lag, expected)}; at the lowest speed it is {off}."
+        return f"{sensor}: {_largest_lag(results, sensor, lag, expected)}; at the lowest speed it is {off}."
     slow = results.everywhere(results.dataset[axis.name]) <= limit
-    calm = _largest_lag(results, np.where(slow, lag, np.nan), expected)
+    calm = _largest_lag(results, sensor, np.where(slow, lag, np.nan), expected)
     if limit == axis.values.max():
         return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in every variant."
     span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
@@ -217,12 +218,15 @@ def _lag(results: Results, sensor: str) -> str:
     )
 
 
-def _largest_lag(results: Results, lag: Array, expected: Array) -> str:
-    """The largest lag of some variants in words, and that of the theory."""
+def _largest_lag(results: Results, sensor: str, lag: Array, expected: Array) -> str:
+    """The largest lag of some variants in words, what it may be off where that is much of it, and the theory's."""
     place = extreme(np.abs(lag))
     assert place is not None
+    size, off = abs(float(lag[place])), float(absolute_errors(results, "lag", sensor)[place])
     way = "trails" if lag[place] < 0.0 else "runs ahead"
-    said = f"the response {way} by {quantity(abs(float(lag[place])), 'm')}{in_words(results, place)}"
+    said = f"the response {way} by {quantity(size, 'm')}{told_error(off, size, 'm')}{in_words(results, place)}"
+    if off > size:
+        said = f"a lag of {quantity(size, 'm')} is less than what it may be off, {quantity(off, 'm', 2)}"
     known = abs(float(np.nan_to_num(expected[place])))
     return f"{said} (theory: {quantity(known, 'm')})" if known else said
 

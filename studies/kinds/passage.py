@@ -10,6 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from results_schema.late import xr
 from results_schema.variables import MARCH, declare
+from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
 from studies.findings.residual import check_residual, residuals
@@ -164,19 +165,12 @@ def _closed(results: Results, carriage: str, force: Array) -> str:
     least, name = extreme(-force), f"{carriage}_contact_force_min"
     assert least is not None
     smallest = f"the smallest contact force is {quantity(float(force[least]), 'N')}"
-    weighs = results.study.carriage[carriage].moving_mass > 0.0
-    off = results.everywhere(_weight(results, carriage))[least] * results.error_at(name, least) if weighs else np.nan
+    off = absolute_errors(results, name)[least]
     if off > force[least]:
         known = f"with an estimated error of {quantity(float(off), 'N')}"
         return f"Whether {carriage} keeps its contact is not certain: {smallest}, {known}{in_words(results, least)}."
     loosely = uncertainty(results, name, least)
     return f"{carriage} keeps its contact everywhere; {smallest}{loosely}{in_words(results, least)}."
-
-
-def _weight(results: Results, carriage: str) -> xr.DataArray | float:
-    """Of all masses of a carriage, N."""
-    masses = [results.parameter(f"carriage.{carriage}.{key}") for key in results.study.carriage[carriage].masses]
-    return sum(masses) * results.parameter("gravity")
 
 
 def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
@@ -202,7 +196,7 @@ def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
 
 def _worst(results: Results, carriage: str, opened: Mask) -> str:
     """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
-    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / _weight(results, carriage))
+    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight(results, carriage))
     place = extreme(-np.where(opened, ratio, np.nan))
     assert place is not None
     return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"

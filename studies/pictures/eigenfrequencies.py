@@ -10,9 +10,9 @@ from matplotlib.figure import Figure as Drawing
 from results_schema.arrays import Array
 from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors, moves_no_track
 from studies.pictures import at_rest
-from studies.pictures.common.figures import ALIKE, HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
+from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
-from studies.results.formatting import number, quantity
+from studies.results.formatting import ALIKE, number, quantity
 from studies.results.results import Results
 
 SWEPT_MODES = 3  # with a panel over the sweep

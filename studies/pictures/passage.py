@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
+from studies.findings.absolute_errors import weight
 from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import AskedOfPassages, ranked
-from studies.findings.theory import body_mass
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, zero_line
 from studies.pictures.common.sweep_view import DAMPING, SPEEDS, View, along_axis, draw_curves, draw_map, view
@@ -124,12 +124,8 @@ def _from(seen: View, force: Any) -> str:
 
 
 def _relative_force(seen: View, carriage: str) -> Any:
-    """Smallest contact force over the weight; of a body that rides, over its weight without sweep."""
-    spec = seen.results.study.carriage[carriage]
-    mass = sum(seen.results.parameter(f"carriage.{carriage}.{key}") for key in spec.masses)
-    if spec.riding_body is not None:
-        mass = body_mass(seen.results, spec.riding_body)
-    return seen.results.dataset[f"{carriage}_contact_force_min"] / (mass * seen.results.parameter("gravity"))
+    """Smallest contact force over the weight."""
+    return seen.results.dataset[f"{carriage}_contact_force_min"] / weight(seen.results, carriage)
 
 
 def _has_line(seen: View, force: Any) -> bool:

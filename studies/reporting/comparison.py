@@ -14,6 +14,7 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import Status, label
+from studies.findings.absolute_errors import absolute_errors
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results
 
@@ -27,14 +28,17 @@ class Change(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A result in both archives: the largest difference (second less first; NaN where one has no number), where, and in
-    how many variants it is not known to lie within both estimated errors together."""
+    """A result in both archives: the largest difference (second less first; NaN where one has no number), where, both
+    estimated errors together there (NaN: none is known), and in how many variants it is not known to lie within these.
+    blurred: whether these errors are larger than both values, so that nothing follows from lying within them."""
 
     name: str
     units: str
     largest: float
     where: str
+    allowed: float
     beyond: int
+    blurred: bool
 
 
 @dataclass(frozen=True)
@@ -123,9 +127,13 @@ def _differences(first: Results, second: Results, names: list[tuple[Range, str]]
         apart = np.where((old == new) | (np.isnan(old) & np.isnan(new)), 0.0, np.abs(new - old))
         # np.argmax takes a NaN, a number in one of them alone, for the largest
         place = tuple(map(int, np.unravel_index(int(np.argmax(apart)), apart.shape))) if apart.ndim else ()
-        beyond = int(np.count_nonzero((apart != 0.0) & ~(apart <= _allowed(first, second, name, found.name, apart))))
-        where = first.at(place[: len(first.dims)])
-        yield Difference(name, found.units, float(new[place] - old[place]) if apart[place] else 0.0, where, beyond)
+        allowed = _allowed(first, second, found, apart)
+        beyond = int(np.count_nonzero((apart != 0.0) & ~(apart <= allowed)))
+        where, differ = first.at(place[: len(first.dims)]), bool(apart[place])
+        size = max(abs(float(old[place])), abs(float(new[place])))
+        largest = float(new[place] - old[place]) if differ else 0.0
+        blurred = differ and bool(allowed[place] > size)
+        yield Difference(name, found.units, largest, where, float(allowed[place]), beyond, blurred)
 
 
 def _of(results: Results, found: Range) -> xr.DataArray:
@@ -133,25 +141,9 @@ def _of(results: Results, found: Range) -> xr.DataArray:
     return array.transpose(*results.dims, ...)
 
 
-def _allowed(first: Results, second: Results, result: str, name: str, apart: Array) -> Array:
+def _allowed(first: Results, second: Results, found: Range, apart: Array) -> Array:
     """Both estimated errors of a result together, in its unit; NaN where no estimate exists."""
-    errors = []
-    for results in (first, second):
-        known = results.dataset["result"].values if "estimated_error" in results.dataset else ()
-        if result not in known or apart.shape != results.shape:
-            return np.full(apart.shape, np.nan)
-        errors.append(results.dataset["estimated_error"].sel(result=result).transpose(*results.dims).values)
-    return np.asarray((errors[0] + errors[1]) * _size(first, name, apart.shape), dtype=np.float64)
-
-
-def _size(results: Results, name: str, shape: tuple[int, ...]) -> Array:
-    """What errors of a result are relative to: of a sensor's extremes the larger of both, in place of its static value;
-    of a contact force likewise; of lengths that of the track; indices are as they are."""
-    stem = name.removesuffix("_max").removesuffix("_min").removesuffix("_residual")
-    ends = [f"{stem}_{end}" for end in ("max", "min") if f"{stem}_{end}" in results.dataset]
-    if ends:
-        values = [np.abs(results.dataset[end].transpose(*results.dims).values) for end in ends]
-        return np.asarray(np.max(values, axis=0), dtype=np.float64)
-    if results.dataset[name].attrs.get("units") == "m":
-        return np.full(shape, float(results.models[results.carriage.on]["length"]) if results.models else 1.0)
-    return np.ones(shape)
+    if apart.shape != first.shape:
+        return np.full(apart.shape, np.nan)
+    errors = [absolute_errors(results, found.name, found.sensor) for results in (first, second)]
+    return np.asarray(errors[0] + errors[1], dtype=np.float64)

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
 LONG_TEXT = 120
+EVERYWHERE = "in every variant"
 MOST_OPEN = 6  # figures of the question that stand unfolded
 
 
@@ -276,12 +277,14 @@ def _sweep_row(results: Results, place: int) -> Row:
 
 
 def _results(results: Results) -> list[tuple[str, ...]]:
-    """Name, sensor, smallest and largest with their places, and percentiles, of the results that answer."""
+    """Name, sensor, smallest and largest with their errors and places, and percentiles, of the results that answer."""
     rows: list[tuple[str, ...]] = []
     for found in in_tables(results):
-        ends = [found.said(end.value, 4) for end in (found.smallest, found.largest)]
-        between = [found.said(value, 4) for value in found.percentiles]
-        rows.append((found.name, found.sensor, ends[0], found.smallest.where, ends[1], found.largest.where, *between))
+        both = (found.smallest, found.largest)
+        ends, alike = [found.said(end, 4) for end in both], found.is_constant and results.size > 1
+        low, high = (EVERYWHERE if alike else end.where for end in both)
+        between = [found.value(value, 4) for value in found.percentiles]
+        rows.append((found.name, found.sensor, ends[0], low, ends[1], high, *between))
     return rows
 
 

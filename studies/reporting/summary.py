@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.scene.trains import axle_name
+from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.status import Status, label
+from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
-from studies.results.formatting import quantity
+from studies.results.formatting import ALIKE, NOISE, quantity
 from studies.results.results import VARIANT, Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
@@ -28,11 +30,15 @@ SOME_NOT_OK = 3
 
 @dataclass(frozen=True)
 class Extreme:
-    """One end of a result's range: its value, the swept numbers (or names) of that variant by name, and in words."""
+    """One end of a result's range: its value, the swept numbers (or names) of that variant by name, and in words.
+
+    error: the estimated one, in the unit of the value; NaN where none is known.
+    """
 
     value: float
     variant: Mapping[str, float | str]
     words: Mapping[str, str]
+    error: float = np.nan
 
     @property
     def where(self) -> str:
@@ -44,7 +50,7 @@ class Extreme:
 class Range:
     """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor.
 
-    percentiles: its value at each of `output.percentiles`.
+    percentiles: its value at each of `output.percentiles`. beside: the largest magnitude of that of which it is an end.
     """
 
     name: str
@@ -53,6 +59,7 @@ class Range:
     smallest: Extreme
     largest: Extreme
     percentiles: tuple[float, ...] = ()
+    beside: float = 0.0
 
     @property
     def extreme(self) -> Extreme:
@@ -60,13 +67,23 @@ class Range:
         return max(self.largest, self.smallest, key=lambda end: abs(end.value))
 
     @property
-    def size(self) -> float:
-        """The larger magnitude, beside which rounding shows."""
-        return abs(self.extreme.value)
+    def is_constant(self) -> bool:
+        """Whether its values differ by rounding alone."""
+        return self.largest.value - self.smallest.value <= max(ALIKE * abs(self.extreme.value), NOISE * self.beside)
 
-    def said(self, value: float, digits: int = 3) -> str:
+    @property
+    def is_loose(self) -> bool:
+        """Whether its end of larger magnitude may be off by much of itself."""
+        return bool(told_error(self.extreme.error, self.extreme.value, self.units))
+
+    def value(self, value: float, digits: int = 3) -> str:
         """One of its values with the unit."""
-        return quantity(value, self.units, digits, beside=self.size)
+        return quantity(value, self.units, digits, beside=max(abs(self.extreme.value), self.beside))
+
+    def said(self, end: Extreme, digits: int = 3) -> str:
+        """One of its ends with the unit, and what that may be off where that is known."""
+        off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > 0.0 else ""
+        return f"{self.value(end.value, digits)}{off}"
 
 
 def is_measured(results: xr.Dataset) -> bool:
@@ -152,18 +169,31 @@ def as_json(outcome: Outcome, exit_code: int) -> dict[str, Any]:
 
 
 def _end_as_json(end: Extreme) -> dict[str, Any]:
-    return {"value": end.value, "at": dict(end.variant)}
+    return {"value": end.value, "error": end.error, "at": dict(end.variant)}
 
 
 def asked(study_results: Results) -> list[Range]:
-    """The ranges that answer: the results of the kind of study, then extremes and contact forces; without means of
-    squares, estimated errors and work."""
+    """The ranges that answer: what has a limit, the results of the kind of study, extremes and contact forces, last the
+    times of these; without means of squares, estimated errors and work."""
     beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
     for name, carriage in study_results.study.carriage.items():  # a force presses as it is written
         if not carriage.inertial:
             beside |= {f"{name}_contact_force_max", f"{name}_contact_force_min"}
+    first = tuple(f"{name}_" for name in _limited(study_results))
     found = [one for one in ranges(study_results) if one.name not in beside]
-    return sorted(found, key=lambda one: not one.sensor)
+    return sorted(
+        found,
+        key=lambda one: (
+            one.name.endswith("_time"),
+            not (f"{one.sensor}_".startswith(first) or one.name.startswith(first)),
+            not one.sensor,
+        ),
+    )
+
+
+def _limited(results: Results) -> list[str]:
+    """The sensors of which the study names a limit."""
+    return [name for name, sensor in results.study.sensor.items() if sensor.quantity in results.study.question]
 
 
 def in_tables(study_results: Results) -> list[Range]:
@@ -183,12 +213,16 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     if not np.isfinite(values).any():
         return
     units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
-    smallest, largest = (_extreme(study_results, array, pick(values)) for pick in (np.nanargmin, np.nanargmax))
+    errors = absolute_errors(study_results, name, sensor) if array.dims == study_results.dims else None
+    smallest, largest = (_extreme(study_results, array, pick(values), errors) for pick in (np.nanargmin, np.nanargmax))
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
-    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)))
+    stem = name.removesuffix("_max").removesuffix("_min")
+    both = [results[f"{stem}_{end}"].values for end in ("max", "min") if f"{stem}_{end}" in results]
+    beside = max((float(np.nanmax(np.abs(one))) for one in both), default=0.0)
+    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside)
 
 
-def _extreme(results: Results, array: xr.DataArray, flat: np.intp) -> Extreme:
+def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array | None) -> Extreme:
     place = dict(zip(array.dims, np.unravel_index(flat, array.shape), strict=True))
     swept_axes = {axis.name: axis for axis in results.axes}
     variant: dict[str, float | str] = {}
@@ -203,7 +237,8 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp) -> Extreme:
                 words[str(name)] = swept_axes[str(name)].in_words(value)
             else:
                 words[str(name)] = quantity(value, str(coordinate.attrs.get("units", "1")))
-    return Extreme(float(array.values.reshape(-1)[flat]), variant, words)
+    error = np.nan if errors is None else float(errors.reshape(-1)[flat])
+    return Extreme(float(array.values.reshape(-1)[flat]), variant, words, error)
 
 
 _DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

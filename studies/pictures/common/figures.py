@@ -26,14 +26,13 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from results_schema.arrays import Array
-from studies.results.formatting import number
+from studies.results.formatting import ALIKE, number
 
 INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
 DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 SEQUENTIAL = "viridis"
 FEW_DECADES = 300.0
-ALIKE = 1e-6  # of the largest value: a smaller range is rounding
 FLAT = 0.05  # of the largest value, shown to either side of what is constant
 
 BESIDE: Mapping[str, Any] = {

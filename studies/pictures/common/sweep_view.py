@@ -16,7 +16,7 @@ from results_schema.late import xr
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
-from studies.results.formatting import listed
+from studies.results.formatting import ALIKE, listed
 from studies.results.results import VARIANT, Axis, Index, Results, spread, statuses
 
 MOST_CURVES = 6
@@ -211,7 +211,7 @@ def coincide(curves: Sequence[Curve]) -> bool:
     known = y[np.isfinite(y)]
     if len(curves) < 2 or not known.size or np.ptp(x, axis=0).any() or (np.isfinite(y) != np.isfinite(y[0])).any():
         return False
-    height = max(float(np.ptp(known)), look.ALIKE * float(np.abs(known).max()))
+    height = max(float(np.ptp(known)), ALIKE * float(np.abs(known).max()))
     return bool(np.nan_to_num(np.ptp(y, axis=0)).max() <= UNSEEN * height)
 
 
@@ -238,7 +238,7 @@ def per_shown(seen: View, axis: Axis | None, ratio: Any) -> float | None:
         return None
     factors = np.asarray(seen.cut(ratio).values, dtype=np.float64) / np.where(axis.shown, axis.shown, np.nan)
     known = factors[np.isfinite(factors)]
-    return float(known[0]) if known.size and np.ptp(known) <= look.ALIKE * abs(known[0]) and known[0] > 0.0 else None
+    return float(known[0]) if known.size and np.ptp(known) <= ALIKE * abs(known[0]) and known[0] > 0.0 else None
 
 
 def _draw_points(axes: Axes, seen: View, curve: Curve) -> None:

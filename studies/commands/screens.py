@@ -1,0 +1,237 @@
+"""What the commands show on standard output: previews, lists, archives, what became of runs, comparisons, paces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from results_schema.status import Status, label
+from studies.commands.console import blank, heading, paragraphs, say, table
+from studies.findings.numerics_used import is_marched, told_choices
+from studies.reporting.answers import answer_of
+from studies.results.findings_common import missed_most
+from studies.results.formatting import counted, listed, number, quantity
+from studies.results.results import Results
+from studies.runs.audit import told_accuracy, told_audit
+
+if TYPE_CHECKING:
+    from results_schema.store.archive import Summary
+    from studies.commands.bench import Throughput
+    from studies.commands.catalogue import Entry
+    from studies.commands.preview import Preview
+    from studies.reporting.comparison import Comparison, Difference
+    from studies.reporting.summary import Range
+    from studies.runs.runner import Outcome
+
+MOST_ALIKE = 4  # results that are the same in every variant and told with their value
+MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
+
+
+def show_preview(shown: Preview) -> None:
+    """What `check` found."""
+    for part in shown.tables:
+        table(part.title, part.headings, part.rows)
+    say(shown.cost)
+    if shown.remarks:
+        say("", "Worth knowing", *(f"- {remark}" for remark in shown.remarks))
+
+
+def show_studies(
+    entries: Iterable[Entry], measured: Mapping[str, Mapping[str, Any]], kinds: Iterable[tuple[str, str]]
+) -> None:
+    """The built-in studies with the time they take, and the kinds of study."""
+    rows = [
+        (e.name, f"{measured[e.name]['seconds']:.0f} s" if e.name in measured else "minutes", e.title) for e in entries
+    ]
+    table("Built-in studies (wanderlast run NAME)", ("name", "about", "question"), rows)
+    table('Kinds of study (start one with "wanderlast init KIND")', ("kind", "answers"), list(kinds))
+
+
+def show_archive(summary: Summary) -> None:
+    """What is inside an archive, who made it, is it whole: on one screen."""
+    from studies.commands.preview import size
+
+    attributes, root = summary.attributes, [v for v in summary.variables if v.group == "/"]
+    state = "whole" if summary.whole else "DAMAGED"
+    paragraphs(f"{summary.path}: {state}, {size(summary.file_bytes)}")
+    grid = next((v.dims for v in root if v.name == "status"), ())
+    shape = " x ".join(f"{name} {summary.dimensions[name]:,}" for name in grid)
+    own = [v.name for v in root if v.dims[: len(grid)] == grid and v.name not in grid and v.units]
+    if "status_name" in summary.dimensions:
+        own = [v.name for v in root if v.dims[: len(grid) + 1] == (*grid, "result") and v.dtype != "text"]
+    results = [name for name in own if not name.endswith("_position")]
+    histories = [v.name for v in root if "history" in v.dims]
+    groups = sorted({v.group for v in summary.variables} - {"/"})
+    said = {
+        "title": attributes.get("title", ""),
+        "kind": attributes.get("study_kind", ""),
+        "variants": f"{sum(summary.status_counts.values()):,}{f' = {shape}' if len(grid) > 1 else ''}",
+        "status": ", ".join(f"{name} {count:,}" for name, count in summary.status_counts.items()),
+        "results": ", ".join(results),
+        "histories": ", ".join(histories),
+        "groups": ", ".join(groups),
+        "made": attributes.get("history", ""),
+        "in": f"{number(float(attributes['run_seconds']))} s" if "run_seconds" in attributes else "",
+        "on": attributes.get("machine", ""),
+    }
+    table("", ("", ""), [(name, _line(value)) for name, value in said.items() if value])
+    paragraphs(
+        f"wanderlast info {summary.path} --all lists every variable with its meaning, --study prints the study file."
+    )
+
+
+def show_everything(summary: Summary) -> None:
+    """Every attribute, dimension and variable of an archive."""
+    from studies.commands.preview import size
+
+    say(f"{summary.path}: {'whole' if summary.whole else 'DAMAGED'}, {size(summary.file_bytes)}", "")
+    table("Made", ("", ""), [(key, _line(value)) for key, value in summary.attributes.items()])
+    table("Dimensions", ("dimension", "length"), [(name, str(length)) for name, length in summary.dimensions.items()])
+    table("Status", ("status", "variants"), [(name, f"{count:,}") for name, count in summary.status_counts.items()])
+    for group in sorted({v.group for v in summary.variables}):
+        rows = [(v.name, ", ".join(v.dims), v.units, v.long_name) for v in summary.variables if v.group == group]
+        table(f"Variables of {group}", ("name", "dimensions", "unit", "meaning"), rows)
+
+
+def show_outcome(outcome: Outcome) -> None:
+    """The answer of a run in sentences, the results that were asked for, their accuracy, and what to do next."""
+    from studies.reporting import summary
+
+    results = Results.of(outcome.results)
+    heading(outcome.results.attrs["title"])
+    paragraphs(*answer_of(results))
+    if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
+        _ranges(summary.in_tables(results), results.percentiles)
+    accuracy = told_accuracy(outcome.audit, results)
+    paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
+    paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
+
+
+def show_details(outcome: Outcome) -> None:
+    """How a run was computed: the range of every result with both variants, models, schemes, work, and the audit."""
+    from studies.reporting import summary
+
+    results = Results.of(outcome.results)
+    rows = [
+        (_name(found), found.said(end), "" if found.is_constant else end.where)
+        for found in summary.ranges(results)
+        for end in (found.smallest, found.largest)
+    ]
+    blank()
+    table("Smallest and largest of every result", ("result", "value", "where"), rows)
+    paragraphs(*told_choices(results), *told_audit(outcome.audit, results))
+
+
+def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
+    """Each result with its range, and the variant of the end of larger size; in a sentence those that do not change."""
+    axes = list(dict.fromkeys(name for one in found for name in one.extreme.words))
+    blank()
+    if not axes:
+        table("", ("result", "value"), [(_name(one), one.said(one.extreme)) for one in found])
+        return
+    parts = [f"{number(part)} %" for part in percentiles]
+    where = f"extreme at {', '.join(name.replace('_', ' ') for name in axes)}"
+    varied = [one for one in found if not one.is_constant]
+    rows = [
+        (
+            _name(one),
+            *(one.value(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
+            ", ".join(one.extreme.words.values()),
+        )
+        for one in varied
+    ]
+    if rows:
+        table("", ("result", "smallest", *parts, "largest", where), rows[:MOST_ROWS])
+    if rows[MOST_ROWS:]:
+        paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
+    same = [f"{_name(one)} {one.value(one.largest.value)}" for one in found if one.is_constant]
+    if same:
+        more = f" and {len(same) - MOST_ALIKE} more" if len(same) > MOST_ALIKE else ""
+        paragraphs(f"The same in every variant: {', '.join(same[:MOST_ALIKE])}{more}.")
+    loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
+    if loose:
+        paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
+
+
+def _name(found: Range) -> str:
+    return f"{found.name} {found.sensor}".strip()
+
+
+def show_comparison(found: Comparison) -> None:
+    """What differs between two archives."""
+    changes = [(change.key, _value(change.first), _value(change.second)) for change in found.changes]
+    if changes:
+        table("The studies differ", ("key", "first", "second"), changes)
+    only = f"; {found.only_first:,} only in the first, {found.only_second:,} only in the second"
+    alone = only if found.only_first or found.only_second else ""
+    paragraphs(f"{counted(found.variants, 'variant')} in both{alone}.")
+    paragraphs(*(f"{count:,} of them: {old} -> {new}" for (old, new), count in found.statuses.items()))
+    apart = [one for one in found.differences if one.largest]
+    if apart:
+        blank()
+        rows = [
+            (one.name, quantity(one.largest, one.units), _allowance(one), f"{one.beyond:,}", one.where) for one in apart
+        ]
+        table("", ("result", "largest difference", "told errors there", "variants beyond these", "at"), rows)
+    if found.only_in_one:
+        paragraphs(f"Only in one of them, or in another shape: {', '.join(found.only_in_one)}.")
+    same = [one.name for one in found.differences if not one.largest]
+    if same:
+        paragraphs(f"Equal in every variant: {', '.join(same)}.")
+    paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
+    blurred = [one.name for one in apart if one.blurred and not one.beyond]
+    if blurred:
+        paragraphs(
+            f"Of {listed(blurred)} told errors are larger than the values, so that lying within them says nothing."
+        )
+
+
+def _allowance(found: Difference) -> str:
+    """Both told errors of a result together, where it differs most."""
+    return quantity(found.allowed, found.units, 2) if math.isfinite(found.allowed) else "unknown"
+
+
+def _value(value: Any) -> str:
+    return "-" if value is None else str(value)
+
+
+def show_throughput(found: Throughput) -> None:
+    """What `bench` measured."""
+    say(
+        f"{found.scheme}, {counted(found.ties, 'tie')}, {found.modes} modes, {found.steps} steps, "
+        f"{found.variants} variants, "
+        f"{counted(found.threads, 'thread')}, best of {found.best_of}: {number(found.seconds)} s",
+        f"{number(found.case_mode_steps_per_second / 1e9)} thousand million modes x steps x variants per second, "
+        f"{number(found.variants_per_second, 4)} variants per second",
+    )
+
+
+def _about_statuses(results: Results) -> Iterator[str]:
+    from studies.reporting import summary
+
+    counts, noun = summary.counts(results.dataset), summary.noun(results.dataset)
+    expected = results.study.expected
+    for status in Status:
+        if (count := counts.get(label(status), 0)) and status != Status.OK:
+            part = "as the study expects, " if label(status) in expected else ""
+            most = missed_most(results) if status is Status.TOLERANCE_MISSED else ""
+            yield f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}: {part}{status.message}{most}."
+
+
+def _about_work(outcome: Outcome) -> str:
+    from studies.reporting import summary
+
+    variants = counted(sum(summary.counts(outcome.results).values()), summary.noun(outcome.results))
+    if outcome.was_finished:
+        return f"{outcome.archive} held the finished results of this study: nothing to do"
+    resumed = f"{outcome.resumed:,} of them" if is_marched(outcome.results) else counted(outcome.resumed, "piece")
+    earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
+    return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"
+
+
+def _line(value: Any) -> str:
+    """An attribute on one line; of a long text only how long it is."""
+    if isinstance(value, str) and "\n" in value:
+        return f"a text of {value.count(chr(10)) + 1} lines"
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)

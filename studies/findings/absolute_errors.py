@@ -1,0 +1,87 @@
+"""Estimated errors of results in their own units: an archive has them as parts of a scale of each result's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from results_schema.arrays import Array
+from results_schema.late import xr
+from studies.findings.theory import body_mass
+from studies.protocol.study import kind_named
+from studies.results.formatting import quantity
+from studies.results.results import Results
+
+LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
+OF_TOOLS = ("error_moving", "error_working", "error_holding")
+OF_RAILS = ("deflection_largest", "stress_largest")
+
+
+def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
+    """The estimated error of a result, of one sensor (or robot or rail) where it is over these, in its unit and the
+    sweep's shape; NaN where none is known.
+
+    Errors of sensors are told over their largest static value. An archive tells that where it has their dynamic
+    amplification; else their own largest value stands for it, which is not far from it but near a resonance.
+    """
+    own = name in (*OF_TOOLS, *OF_RAILS)
+    told = f"{name.partition('_')[0]} of {sensor}" if own else f"{name} {sensor}".strip()
+    return results.estimated_error(told) * results.everywhere(_scale(results, name, sensor))
+
+
+def told_error(error: float, value: float, units: str) -> str:
+    """What a value may be off, to stand behind it: "" where that is little of it, or not known."""
+    return f" ± {quantity(error, units, 2)}" if error > LOOSE_PART * abs(value) else ""
+
+
+def weight(results: Results, carriage: str) -> Any:
+    """Of all masses of a carriage, or of the body that rides (without sweep), N."""
+    spec = results.study.carriage[carriage]
+    if spec.riding_body is not None:
+        return body_mass(results, spec.riding_body) * results.parameter("gravity")
+    masses = [results.parameter(f"carriage.{carriage}.{key}") for key in spec.masses]
+    return sum(masses) * results.parameter("gravity")
+
+
+def _scale(results: Results, name: str, sensor: str) -> Any:
+    """What the estimated error of a result is a part of, in the result's unit."""
+    dataset, stem = results.dataset, name.rpartition("_")[0]
+    if name in OF_TOOLS:
+        return _largest([results.of_sensor(one, sensor) for one in OF_TOOLS])
+    if name in OF_RAILS:
+        return results.of_sensor(name, sensor)
+    if name == "lag":
+        return _cruise(results)
+    if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
+        return _scale_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
+    return 1.0  # an index
+
+
+def _scale_of_ends(results: Results, stem: str, own: xr.DataArray) -> Any:
+    """The same of what has a largest and a smallest value; own: the larger magnitude of both."""
+    moves = kind_named(results.study.kind).moves_frames
+    if stem in results.sensors and "dynamic_amplification" in results.dataset:
+        static = own / results.of_sensor("dynamic_amplification", stem)
+        return static.where(np.isfinite(static), own)
+    carriage = next((one for one in results.study.carriage if stem.startswith(f"{one}_")), "")
+    what = stem.removeprefix(f"{carriage}_")
+    if what == "contact_force" and not moves:
+        return weight(results, carriage)
+    if what == "position" and moves:
+        track = results.models.get(results.study.carriage[carriage].on)
+        return np.nan if track is None else float(track["length"])
+    return own
+
+
+def _largest(parts: list[xr.DataArray]) -> xr.DataArray:
+    """The largest magnitude of some results."""
+    return abs(xr.concat(parts, "part", coords="minimal", compat="override")).max("part")
+
+
+def _cruise(results: Results) -> Any:
+    """The length of the part of a cycle at constant speed, m."""
+    start, end, turn = (
+        results.parameter(f"carriage.{results.carriage_name}.motion.{key}") for key in ("start", "end", "turn")
+    )
+    return np.abs(end - start) * (1.0 - 2.0 * turn)

@@ -1,0 +1,104 @@
+"""Told errors in the units of results: against errors that two marches of the same study differ by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies.findings.absolute_errors import absolute_errors
+from studies.reporting import answers
+from studies.reporting.comparison import compare
+from studies.reporting.summary import Range, in_tables
+from studies.results.results import Results
+from tests.studies import scenes
+
+MASS = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+STILL = '[sensor.still]\nbody = "bed"\nat = 0.0'
+
+
+def found(kind: str, **options: str) -> Results:
+    return Results.of(scenes.run(kind, f"{scenes.pace(kind)}\n{MASS}", **options))
+
+
+def rows(results: Results) -> dict[str, Range]:
+    return {f"{one.name} {one.sensor}".strip(): one for one in in_tables(results)}
+
+
+def with_error(results: Results, result: str, error: float) -> Results:
+    """The same with one told error everywhere."""
+    return Results(scenes.with_errors(results.dataset, error, result), results.study, results.models)
+
+
+def test_errors_are_over_what_the_archive_says() -> None:
+    """Of sensors the largest static value, of contact forces the weight, of lags the cruise; of indices 1."""
+    passage = found("passage")
+    size = np.maximum(abs(passage.dataset.midspan_max), abs(passage.dataset.midspan_min)).values
+    static = size / passage.numbers("dynamic_amplification", "midspan")
+    np.testing.assert_allclose(
+        absolute_errors(with_error(passage, "midspan_max", 0.25), "midspan_max"), 0.25 * static, rtol=1e-6
+    )
+    weights = np.broadcast_to(passage.dataset.mass.values, passage.shape) * 9.80665
+    pressed = with_error(passage, "table_contact_force_min", 0.5)
+    np.testing.assert_allclose(absolute_errors(pressed, "table_contact_force_min"), 0.5 * weights, rtol=1e-6)
+    both_ways = found("asymmetry")
+    cruise = abs(9.6 - 5.0) * (1.0 - 2.0 * 0.1)
+    for result, scale in (("lag", cruise), ("odd_rms", 1.0)):
+        told = absolute_errors(with_error(both_ways, f"{result} midspan", 1e-3), result, "midspan")
+        np.testing.assert_allclose(told, 1e-3 * scale, rtol=1e-6)
+    assert np.isnan(absolute_errors(passage, "midspan_max_position", "none")).all()
+
+
+def test_told_errors_are_as_large_as_what_finer_steps_change() -> None:
+    """In the unit of the result: most cover it, none by more than a thousand times."""
+    coarse, fine = (found("passage", extra=f"[solver]\nsteps = {steps}\naudit = 0") for steps in (80, 1280))
+    off = np.abs(coarse.dataset.midspan_max - fine.dataset.midspan_max).values
+    told = absolute_errors(coarse, "midspan_max")
+    assert np.mean(off <= told) > 0.75 and (off <= 2.0 * told).all() and (off > 1e-3 * told).all()
+
+
+def test_an_answer_that_is_less_than_its_error_is_told_so() -> None:
+    """A lag of 0.1 mm is known to within 1e-3 of the cruise: 3.7 mm."""
+    results = Results.of(scenes.run("asymmetry", MASS))
+    lag = float(np.abs(results.numbers("lag", "midspan")).max())
+    cruise = 4.6 * 0.8
+    loose = with_error(results, "lag midspan", 2.0 * lag / cruise)
+    sentences = answers.answer(loose.dataset)
+    told = next(text for text in sentences if text.startswith("midspan") and "lag" in text)
+    assert "is less than what it may be off" in told
+    half = with_error(results, "lag midspan", 0.5 * lag / cruise)
+    assert any(" ± " in text for text in answers.answer(half.dataset) if text.startswith("midspan"))
+    assert rows(loose)["lag midspan"].is_loose and rows(half)["lag midspan"].is_loose
+    end = rows(half)["lag midspan"].extreme
+    assert end.error == pytest.approx(0.5 * lag, rel=1e-6)
+    assert " ± " in rows(half)["lag midspan"].said(end) and not rows(results)["midspan_max"].is_loose
+
+
+def test_what_does_not_change_is_rounding_and_said_so() -> None:
+    dataset = found("passage", extra=STILL).dataset
+    noisy = dataset.copy(deep=True)
+    noisy["moment_max"].values[...] = 7.0 * (
+        1.0 + 1e-12 * np.arange(noisy.moment_max.size).reshape(noisy.moment_max.shape)
+    )
+    noisy["moment_min"].values[...] = -1e-14
+    noisy["moment_min"].values[0, 0] = 2e-15
+    told = rows(Results.of(noisy))
+    assert told["moment_max"].is_constant and told["moment_min"].is_constant
+    assert told["moment_min"].value(-1e-14) == "0 N m"
+    assert not told["midspan_max"].is_constant and told["still_max"].is_constant
+
+
+def blurred(error: float) -> tuple[xr.Dataset, xr.Dataset]:
+    """Two datasets that differ by a thousandth, with told errors of so much."""
+    first = scenes.with_errors(scenes.run("passage", scenes.pace("passage")), error)
+    second = first.copy(deep=True)
+    second["midspan_max"] = second["midspan_max"] * 1.001
+    return first, second
+
+
+@pytest.mark.parametrize(("error", "says_nothing"), [(1.5, True), (0.1, False)])
+def test_to_lie_within_errors_larger_than_the_values_says_nothing(error: float, says_nothing: bool) -> None:
+    result = compare(*map(Results.of, blurred(error)))
+    told = next(one for one in result.differences if one.name == "midspan_max")
+    assert result.agree and told.beyond == 0
+    assert told.blurred == says_nothing and told.allowed > 2.0 * error * 0.5 * abs(told.largest)
