@@ -17,7 +17,19 @@ from studies.protocol import stopping
 # takes 0.96 GB, a portal 1.25 GB, and the compiler ends the process where it gets none.
 LEAST_MEMORY = 1 << 30
 
-_LETTERS = {"µ": "u", "μ": "u", "×": "x", "·": " ", "°": "deg", "−": "-", "–": "-", "—": "-", "√": "sqrt", "π": "pi"}
+_LETTERS = {
+    "µ": "u",
+    "μ": "u",
+    "×": "x",
+    "·": " ",
+    "°": "deg",
+    "−": "-",
+    "±": "+-",
+    "–": "-",
+    "—": "-",
+    "√": "sqrt",
+    "π": "pi",
+}
 _LETTERS |= {"ω": "omega", "Ω": "Omega", "φ": "phi"}
 
 

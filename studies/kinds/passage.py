@@ -13,6 +13,7 @@ from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
+from studies.findings.effects import told_effects, unchanged
 from studies.findings.residual import check_residual, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
@@ -51,7 +52,7 @@ class Passage(Kind):
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
         residual = residuals(results, question_of(results.study, AskedOfPassages).residual)
-        first = [*residual[:1], *said[:1], *lifted]
+        first = [*residual[:1], *said[:1], *lifted, *_effects(results)]
         return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
@@ -82,6 +83,8 @@ def _largest(results: Results, sensor: str) -> str:
     opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
     shown = "" if results.held[results.kept.values].all() else opened
     said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
+    if same := unchanged(results, sizes(results, sensor)):
+        return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
     if best is None:
         return f"{said}{where}."
@@ -94,6 +97,13 @@ def _largest(results: Results, sensor: str) -> str:
         f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "
         f"{amplified}{loosely}."
     )
+
+
+def _effects(results: Results) -> list[str]:
+    """What every swept number does to the first sensor, where there are several."""
+    sensor = _told(results)[0]
+    said = told_effects(results, sizes(results, sensor), f"the largest {results.noun(sensor)}")
+    return [f"{sensor}: {said}"] if said else []
 
 
 def _amplified(results: Results, sensor: str) -> str:

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from studies.findings.amplification import largest, sizes
+from studies.findings.effects import unchanged
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
+from studies.pictures.common.sweep_view import view
+from studies.pictures.passages.sizes import sizes_of
 from studies.pictures.trajectory import histories, ranging
-from studies.results.formatting import quantity
+from studies.results.formatting import ALIKE, quantity
 from studies.results.results import Index, Results, chosen
 
 MOST_ROWS, MOST_CURVES = 5, 4
 
 
 def pictures(results: Results) -> list[Figure]:
-    """Sensors and carriages over time, the phase portrait of what slides, the energy."""
+    """Largest values over the sweep, sensors and carriages over time, the phase portrait of what slides, the energy."""
     traced = results.traced()
     if not traced:
         return []
     shown, own = list(chosen(traced, MOST_CURVES)), [_own(results, traced)]
-    rows, found = _rows(results), list[Figure]()
+    rows, found = _rows(results), list(_over_sweep(results))
     caption = f"At {results.at(own[0])}; one of {len(traced)} kept histories." if len(traced) > 1 else ""
     if rows:
         name = next(iter(rows))
@@ -27,8 +33,23 @@ def pictures(results: Results) -> list[Figure]:
     found += [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
     energies = {"kinetic_energy": "J", "potential_energy": "J"}
     change = float(np.nanmax(results.dataset["energy_change"].values))
+    whole = max(float(np.abs(results.trace(name, index).values).max()) for name in energies for index in traced)
     title = f"The energy of everything changes by at most {quantity(change, 'J')}"
+    if change <= ALIKE * whole:
+        title = "The energy of everything does not change"
     return [*found, on_method(histories(results, "energy", title, caption, energies, own))]
+
+
+def _over_sweep(results: Results) -> Iterator[Figure]:
+    """The largest values of sensors over the sweep, one figure for each quantity that changes."""
+    sensors = [name for name in results.sensors if np.isfinite(sizes(results, name)).any()]
+    for noun in dict.fromkeys(map(results.noun, sensors)):
+        own = [name for name in sensors if results.noun(name) == noun]
+        top = largest(results, sizes(results, own[0]))
+        assert top is not None
+        seen = view(results, at=top)
+        if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
+            yield sizes_of(seen, own, None, top)
 
 
 def _own(results: Results, traced: list[Index]) -> Index:

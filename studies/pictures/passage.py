@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from studies.findings.absolute_errors import weight
 from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import AskedOfPassages, ranked
+from studies.findings.effects import unchanged
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, zero_line
 from studies.pictures.common.sweep_view import DAMPING, SPEEDS, View, along_axis, draw_curves, draw_map, view
@@ -40,6 +41,8 @@ def pictures(results: Results) -> list[Figure]:
     if seen.x is not None:
         for name in dict.fromkeys(results.study.sensor[sensor].quantity for sensor in sensors):
             own = [sensor for sensor in sensors if results.study.sensor[sensor].quantity == name]
+            if all(unchanged(results, sizes(results, sensor)) for sensor in own):
+                continue  # the findings say so
             asked = not first or limits.limit(name) is not None
             (first if asked else others).append(_sizes(results, own, limits.limit(name)))
         if seen.y is not None and len(seen.y.values) > MANY and _varies(seen, gain(results, sensors[0])):

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import sizes
 from studies.findings.theory import first_omega
-from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades
+from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve, coincide
 from studies.pictures.common.traces import picked
-from studies.results.formatting import quantity, scale_for
+from studies.results.formatting import ALIKE, quantity, scale_for
 from studies.results.results import Index, Results, chosen
 
 MOST_ROWS = 4
@@ -58,11 +58,13 @@ def _coarse(results: Results, sensor: str, index: Index) -> str:
 
 
 def ranging(results: Results, name: str, unit: str, shown: list[Index]) -> str:
-    """From where to where the histories of a result go."""
+    """From where to where the histories of a result go, or where they stay."""
     values = np.concatenate([results.trace(name, index).values for index in shown])
-    ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    ends = [quantity(end, unit, beside=max(-low, high)) for end in (low, high)]
     noun = f"{results.noun(name)} {results.place(name)}" if name in results.sensors else name.replace("_", " ")
-    return f"{noun[0].upper()}{noun[1:]} goes from {ends[0]} to {ends[1]}"
+    stays = high - low <= ALIKE * max(abs(low), abs(high))
+    return f"{noun[0].upper()}{noun[1:]} {f'stays at {ends[1]}' if stays else f'goes from {ends[0]} to {ends[1]}'}"
 
 
 def _carriage_rows(results: Results) -> dict[str, str]:
@@ -93,6 +95,7 @@ def _draw(results: Results, units: dict[str, str], shown: list[Index], drawing: 
             times = trace.times / (trace.end if relative else 1.0)
             label = results.at(index).replace(", ", "\n")
             axes.plot(times, trace.values * scale.factor, color=colour, label=label, linewidth=1.3)
+        widen(axes, [trace.values * scale.factor for trace in traces])
         words = name.replace("_", " ")
         if name not in results.sensors:
             axes.set_ylabel(f"{words}\n({scale.unit})" if scale.unit else words)

@@ -1,4 +1,4 @@
-"""Figures of a passage's largest values, one for each quantity, with the limit that the study names for it."""
+"""Figures of largest values over a sweep, one for each quantity, with the limit that the study names for it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves
 
 
 def gain(results: Results, sensor: str) -> Any:
-    """The dynamic amplification of a sensor, over the sweep."""
+    """The dynamic amplification of a sensor, over the sweep; NaN where the kind of study has none."""
+    if "dynamic_amplification" not in results.dataset:
+        return results.dataset["status"].copy(data=np.full(results.shape, np.nan))
     return results.of_sensor("dynamic_amplification", sensor)
 
 

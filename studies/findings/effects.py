@@ -1,0 +1,70 @@
+"""What each of several swept numbers does to a result by itself, in one sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from results_schema.arrays import Array
+from studies.results.formatting import ALIKE, listed, number, percent
+from studies.results.results import VARIANT, Axis, Results
+
+MOST_AXES = 4
+TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
+
+
+def unchanged(results: Results, values: Array) -> str:
+    """That values (in the sweep's shape) do not change over it, as the end of a sentence; "" where they change by
+    more than rounding, or nothing is swept."""
+    known = values[results.with_values & np.isfinite(values)]
+    varied = [axis for axis in results.axes if len(axis.values) > 1]
+    if known.size < 2 or not varied or np.ptp(known) > ALIKE * np.abs(known).max():
+        return ""
+    over = [f"{axis.noun} {axis.span}" for axis in varied[:MOST_AXES]]
+    return f"does not change over {listed(over) if len(varied) <= MOST_AXES else 'the sweep'}"
+
+
+def told_effects(results: Results, values: Array, what: str) -> str:
+    """How positive values (in the sweep's shape) change along each swept number while the others are in the middle of
+    theirs; "" without several numbers on a grid, or where none has values along its whole line."""
+    axes = [axis for axis in results.axes if len(axis.values) > 1]
+    if not 2 <= len(axes) <= MOST_AXES or VARIANT in results.dims:
+        return ""
+    told = [_effect(axis, line) for axis in axes if (line := _line(results, axis, values)) is not None]
+    return f"With all other numbers in the middle of their sweeps {what} {listed(told)}." if told else ""
+
+
+def _line(results: Results, axis: Axis, values: Array) -> Array | None:
+    """Values along an axis, ascending; None where some do not count, or are zero."""
+    place = tuple(
+        slice(None) if dim == axis.dim else size // 2 for dim, size in zip(results.dims, results.shape, strict=True)
+    )
+    line = np.where(results.with_values, values, np.nan)[place][np.argsort(axis.values)]
+    return line if (line > 0.0).all() else None
+
+
+def _effect(axis: Axis, line: Array) -> str:
+    """What a swept number does, in words.
+
+    >>> speed = Axis("speed", "speed", {}, np.array([1.0, 2.0, 4.0]), "m s-1")
+    >>> _effect(speed, np.array([1.0, 2.0, 3.2]))
+    'grows 3.2 times over speed 1 m/s to 4 m/s'
+    >>> _effect(speed, np.array([1.1, 1.0, 1.05]))
+    'changes by up to 10 % over speed 1 m/s to 4 m/s (largest at 1 m/s)'
+    >>> _effect(speed, np.array([1.0, 0.9, 0.8])), _effect(speed, np.ones(3))
+    ('falls by 20 % over speed 1 m/s to 4 m/s', 'stays the same over speed 1 m/s to 4 m/s')
+    """
+    over, ratio = f"over {axis.noun} {axis.span}", float(line.max() / line.min())
+    steps = np.diff(line)
+    if ratio - 1.0 <= ALIKE:
+        return f"stays the same {over}"
+    if (steps >= 0.0).all():
+        return f"grows {'' if ratio >= TIMES else 'by '}{_times(ratio)} {over}"
+    if (steps <= 0.0).all():
+        return f"falls {f'to 1/{number(ratio, 2)}' if ratio >= TIMES else f'by {percent(1.0 - 1.0 / ratio)}'} {over}"
+    top = axis.in_words(float(np.sort(axis.values)[int(np.argmax(line))]))
+    return f"changes {'up to' if ratio >= TIMES else 'by up to'} {_times(ratio)} {over} (largest at {top})"
+
+
+def _times(ratio: float) -> str:
+    """How much larger the larger of two is."""
+    return f"{number(ratio, 2)} times" if ratio >= TIMES else percent(ratio - 1.0)

@@ -1,0 +1,89 @@
+"""What swept numbers do one by one, from sweeps whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import studies
+from engine.scene.study import Study
+from studies.findings.amplification import sizes
+from studies.findings.effects import told_effects, unchanged
+from studies.reporting import answers
+from studies.results.results import Results
+from tests.studies import scenes
+
+MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
+DEAD = 'place = { of = "sensor.dead.at", values = [1.0, 2.0] }'
+ELSEWHERE = '[sensor.dead]\nbody = "bed"\nat = 1.0'
+
+
+def test_each_number_is_told_by_itself() -> None:
+    """A heavier table deflects the bed more, in proportion at a crawl; where another sensor reads changes nothing."""
+    crawl = 'pace = { of = "carriage.table.motion.speed", from = 0.02, to = 0.04, count = 3 }'
+    results = Results.of(scenes.run("passage", f"{crawl}\n{MASS}\n{DEAD}", extra=ELSEWHERE))
+    said = told_effects(results, sizes(results, "midspan"), "it")
+    assert said.startswith("With all other numbers in the middle of their sweeps it ")
+    assert "grows 4 times over mass 50 kg to 200 kg" in said and "stays the same over place 1 m to 2 m" in said
+    assert any(text.startswith("midspan: With all other numbers") for text in answers.answer(results.dataset))
+
+
+def test_a_line_with_a_contact_that_opens_tells_nothing() -> None:
+    results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
+    values = np.where(np.arange(12).reshape(4, 3) == 7, np.nan, 1.0)  # at the middle speed and mass
+    assert told_effects(results, values, "it") == ""
+
+
+def test_one_number_or_a_sample_has_no_effects_of_its_own() -> None:
+    one = Results.of(scenes.run("passage", MASS))
+    assert told_effects(one, sizes(one, "midspan"), "it") == ""
+    sampled = scenes.run(
+        "passage", f"zip = true\n{MASS}\n{DEAD.replace('[1.0, 2.0]', '[1.0, 2.0, 3.0]')}", extra=ELSEWHERE
+    )
+    assert told_effects(Results.of(sampled), np.ones(3), "it") == ""
+
+
+def test_what_nothing_changes_is_said_so() -> None:
+    dataset = scenes.run("passage", DEAD, extra=ELSEWHERE)
+    results = Results.of(dataset)
+    assert unchanged(results, sizes(results, "midspan")) == "does not change over place 1 m to 2 m"
+    assert unchanged(results, sizes(results, "dead")) == ""
+    told = next(text for text in answers.answer(dataset) if text.startswith("midspan:"))
+    assert told.count("does not change over place 1 m to 2 m") == 1 and " at place " not in told
+
+
+def test_what_nothing_changes_is_not_drawn() -> None:
+    found = {figure.name for figure in answers.figures(scenes.run("passage", DEAD, extra=ELSEWHERE))}
+    assert "largest-displacement" in found and "largest-bending-moment" not in found
+
+
+def test_a_history_that_stays_where_it_is_is_titled_so() -> None:
+    dataset = scenes.run("trajectory", MASS)
+    noise = 1e-13 * np.arange(dataset["midspan"].size).reshape(dataset["midspan"].shape) / dataset["midspan"].size
+    dataset["midspan"].values[...] = 2e-3 + noise
+    sensors = answers.figures(dataset)[0]
+    assert sensors.title == "Displacement at 5 m of bed stays at 2 mm"
+    assert np.ptp(sensors.drawing.axes[0].get_ylim()) > 0.1
+
+
+def test_a_study_of_frames_draws_its_sweep_and_no_rounding_of_its_energy() -> None:
+    joint = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 1.0, "time": 1.0}}
+    arm = {"kind": "beam", "length": 10.0, "area": 4e-4, "second_moment": 2e-7, "youngs_modulus": 7e10}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": arm | {"density": 3000.0, "supports": "clamped-free", "modes": 2}},
+        frame={"arm": {"joints": [joint], "stiffening": True}},
+        sensor={"tip": {"body": "arm", "at": 10.0}},
+        sweep={"rate": {"of": "frame.arm.joints.0.motion.rate", "values": [0.5, 1.0]}},
+        question={"duration": 1.5},
+    )
+    dataset = studies.run(study)
+    first, *others = answers.figures(dataset)
+    (axes,) = first.drawing.axes
+    largest = np.maximum(abs(dataset["tip_max"]), abs(dataset["tip_min"])).values
+    np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), largest)
+    assert axes.get_xlabel() == "rate (rad/s)" and first.name == "largest-displacement"
+    assert any("changes by at most" in figure.title for figure in others)
+    dataset["energy_change"].values[...] = 1e-12
+    titles = [figure.title for figure in answers.figures(dataset)]
+    assert "The energy of everything does not change" in titles
