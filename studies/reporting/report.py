@@ -172,7 +172,7 @@ def page_template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"soft": _soft, "minus": _minus}
+    environment.filters |= {"soft": _soft, "minus": _minus, "unbroken": _unbroken}
     return environment.get_template(name)
 
 
@@ -184,6 +184,15 @@ def _soft(text: str) -> Markup:
 def _minus(text: str) -> str:
     """Numbers with a true minus sign."""
     return re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def _unbroken(text: str) -> str:
+    """A value that breaks between it and its error alone.
+
+    >>> _unbroken("1.5 kN m ± 2 N m").replace("\N{NO-BREAK SPACE}", "_")
+    '1.5_kN_m ±_2_N_m'
+    """
+    return text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}±", " ±")
 
 
 def check_folder(folder: Path, page: str) -> None:

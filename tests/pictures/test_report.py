@@ -108,6 +108,9 @@ def test_the_page_opens_with_six_figures_at_most_and_folds_methods(tmp_path: Pat
     assert text.count("<figure>") == len(found) and any(figure.on_method for figure in found)
     assert "<h2>Answer</h2>" in unfolded and "How exact, and how it was computed" not in unfolded
     assert "<th>5 %</th><th>50 %</th>" in unfolded
+    # a value and its error break between them alone, and stand beside the sensor that they are of
+    assert re.search(r"<td>dynamic_<wbr>amplification<span class=.at.>midspan</span></td>", unfolded)
+    assert re.search(r"<td>[\d.]+\N{NO-BREAK SPACE}mm ±\N{NO-BREAK SPACE}[\d.]+\N{NO-BREAK SPACE}.m<span", unfolded)
     for table in re.findall(r"<tbody>(.*?)</tbody>", unfolded, flags=re.DOTALL):
         assert table.count("<tr>") <= 10
 
