@@ -75,7 +75,7 @@ class Influence(AtRestKind):
         for name, sensor in study.sensor.items():
             if QUANTITIES[sensor.quantity].rate:
                 what = "this quantity has no static reading"
-                expected = "displacement, a section force, stress or contact_force"
+                expected = "displacement, a section force, stress, contact_force or support_reaction"
                 raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)
         super().check(study)
 
