@@ -31,7 +31,7 @@ class Rail:
     start (3,): m, where it begins; ends (E + 1,): m, the ends of its elements along it; omega (n,); shapes
     (E, 4, 6, n): cubics (spline, C2) of the motion of its axis per mode, constant first; moved (E + 1, 6, n): that
     motion at the ends; missed (6 (E + 1), 6 (E + 1)): motion of the ends per unit load that the modes miss;
-    bending: its stresses by these.
+    pull: N/m, what its supports pull at it per metre that it would grow shorter; bending: its stresses by these.
     """
 
     start: Array
@@ -40,6 +40,7 @@ class Rail:
     shapes: Array
     moved: Array
     missed: Array
+    pull: float
     bending: Bending
 
 
@@ -52,6 +53,13 @@ class _Whole:
     track: TrackBeams
     points: TrackPoints
     soft: Array
+
+    @property
+    def pull(self) -> float:
+        """N/m, at a track that would grow shorter: nothing where an end is free, as stiff as itself between walls."""
+        own = 1.0 / float(np.sum(self.track.beams.length / self.track.beams.axial))
+        ends = self.soft[np.ix_([0, -6], [0, -6])]
+        return own * (1.0 - own * float(ends[0, 0] + ends[1, 1] - ends[0, 1] - ends[1, 0]))
 
 
 def rail(frame: Frame) -> Rail:
@@ -103,4 +111,4 @@ def _rail(content: Content) -> Rail:
         demand_finite(omega, moved, missed)
     start = whole.assembly.mesh.points[whole.points.points[0]] + whole.points.arms[0]
     bending = bending_of(whole.track, flat, missed)
-    return Rail(start, whole.track.places, omega, np.moveaxis(spline, 0, 1), moved, missed, bending)
+    return Rail(start, whole.track.places, omega, np.moveaxis(spline, 0, 1), moved, missed, whole.pull, bending)

@@ -28,6 +28,7 @@ from engine.kernels.robots.layout import (
     WORKS,
 )
 from engine.robots.peaks import Steps, peaks
+from engine.robots.shortening import beyond_linear
 from engine.robots.stress import is_told, largest_stress
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
@@ -64,8 +65,10 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     zero_at = at_start if zero == "start" else np.zeros_like(at_start)
     tools, of_tools = _tools(record, resting, steps, zero_at, model.study.solver.tolerance)
     rails, of_rails = _rails(model, cut, steps, record)
+    longest = np.fmax.reduce([tools[f"error_{doing}"] for doing in DOING])
     pressed = peaks(record.passed[:, :, PRESSED:], steps.stretch).value.max(axis=1)
     numbers = {"cycle_time": model.done.max(), "error_at_start": at_start, "rail_force_largest": pressed}
+    numbers["beyond_linear"] = beyond_linear(model, record, longest)
     return Outcome(
         numbers | tools | rails,
         np.concatenate([of_tools, of_rails]),

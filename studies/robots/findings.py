@@ -30,6 +30,7 @@ def answer(results: Results) -> list[str]:
         *_statics(results),
         *_deflections(results),
         *_causes(results),
+        *_beyond_linear(results),
         *told_statuses(results),
     ]
 
@@ -130,6 +131,16 @@ def _deflections(results: Results) -> Iterator[str]:
                 strained = quantity(float(stress.values[most]), "Pa")
                 said += f"; its largest bending stress is {strained}{in_words(results, most)}"
             yield f"{said}."
+
+
+def _beyond_linear(results: Results) -> Iterator[str]:
+    """Tools of which more than the tolerance is left out."""
+    for name in results.study.robot:
+        part = results.dataset["beyond_linear"].sel(robot=name)
+        index = extreme(part)
+        if index is not None and float(part.values[index]) > results.study.solver.tolerance:
+            said = f"up to {percent(float(part.values[index]))}{in_words(results, index)}"
+            yield f"Rails that grow shorter as they bend would change the error of {name} by {said}, which is left out."
 
 
 def _front(results: Results) -> Iterator[str]:

@@ -26,6 +26,8 @@ RESULTS = outputs("""
         likewise; NaN where it never does
     beyond_rest_holding | robot | m | | largest length of what a tool is off from rest while it stands without work
         likewise; NaN where it never does
+    beyond_linear | robot | | | what rails leave out that do not grow shorter as they bend, over the longest error
+        of the tool; second order, in no estimated error
     at_rest | robot | | | part of the time for which a tool is where it would rest
         within the tolerance, of its largest error
     * | | | |

@@ -126,6 +126,15 @@ def test_every_number_is_told_with_the_variant_that_it_belongs_to(found: Any) ->
     assert "2 m in moves and 1.5 m at work at acceleration 3, payload 2; from" in answer
 
 
+def test_what_linear_rails_leave_out_is_told_where_it_is_more_than_the_tolerance(found: Any) -> None:
+    assert ((found["beyond_linear"] > 0.0) & (found["beyond_linear"] < 1e-2)).all()
+    assert "grow shorter" not in " ".join(kind_of(swept()).findings(Results.of(found)))
+    own = found.copy(deep=True)
+    own["beyond_linear"].loc[{"robot": "hanging", "acceleration": 3.0, "payload": 2.0}] = 0.02
+    told = [text for text in kind_of(swept()).findings(Results.of(own)) if "grow shorter" in text]
+    assert len(told) == 1 and "the error of hanging by up to 2 % at acceleration 3, payload 2, which" in told[0]
+
+
 def test_the_worst_move_is_played_as_exaggerated_as_its_caption_says(found: Any) -> None:
     """Rails in the SVG element, at the station where a rail is down the most, against the dataset."""
     results = Results.of(found)

@@ -35,10 +35,11 @@ from engine.kernels.robots.layout import (
     PUSH,
     RATE,
     SLIDES,
+    TILT,
     TURN,
     VALUE,
 )
-from engine.kernels.robots.vectors import add_vector, keep_matrix, keep_vector, rotation
+from engine.kernels.robots.vectors import add_vector, keep_matrix, keep_vector, rotation, spin_of
 
 STILL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -160,12 +161,13 @@ def screw(chain, j, links, origin):
 def weigh(chain, count, robot, tool, links, found, sums):
     """The inertia of a robot after `follow`: found (6 + J, 6 + J) of its base, then its joints, the upper half.
 
-    robot (ROBOT): of which its payload, and how the base moves per unit rate of joint 0.  sums (10): used.
+    robot (ROBOT): of which its payload, its rotation vector, and how the base moves per unit rate of joint 0.
+    sums (10): used.
     """
-    origin = shared_vector(links, 0, PLACE)
+    origin, tilt = shared_vector(links, 0, PLACE), (robot[TILT], robot[TILT + 1], robot[TILT + 2])
     forward = (
         (robot[AHEAD], robot[AHEAD + 1], robot[AHEAD + 2]),
-        (robot[AHEAD + 3], robot[AHEAD + 4], robot[AHEAD + 5]),
+        spin_of(tilt, (robot[AHEAD + 3], robot[AHEAD + 4], robot[AHEAD + 5])),
     )
     for k in range(10):
         sums[k] = 0.0
@@ -179,17 +181,19 @@ def weigh(chain, count, robot, tool, links, found, sums):
         add_solid(sums, chain[j, MASS], lever, turn, shared_vector(chain, j, INERTIA))
         motion = screw(chain, j, links, origin) if j > 0 else forward
         linear, angular = momenta(sums, motion)
+        along = spin_of(times(-1.0, tilt), angular)
         for k in range(3):
-            found[k, 6 + j], found[3 + k, 6 + j] = linear[k], angular[k]
+            found[k, 6 + j], found[3 + k, 6 + j] = linear[k], along[k]
         for i in range(j + 1):
             velocity, spin = screw(chain, i, links, origin) if i > 0 else forward
             found[6 + i, 6 + j] = dot(velocity, linear) + dot(spin, angular)
     for k in range(6):
         velocity = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
-        spin = (1.0 * (k == 3), 1.0 * (k == 4), 1.0 * (k == 5))
+        spin = spin_of(tilt, (1.0 * (k == 3), 1.0 * (k == 4), 1.0 * (k == 5)))
         linear, angular = momenta(sums, (velocity, spin))
+        along = spin_of(times(-1.0, tilt), angular)
         for i in range(3):
-            found[i, k], found[3 + i, k] = linear[i], angular[i]
+            found[i, k], found[3 + i, k] = linear[i], along[i]
 
 
 @kernel

@@ -3,12 +3,13 @@ matrix that their accelerations are solved with.
 
 A rail feels a robot as a wrench; the robot's base goes with the rail: for a base at s(t) that moves by B(s) q,
 velocity B q' + s' (B' q + e) and acceleration B q'' + 2 s' B' q' + s'^2 B'' q + s'' (B' q + e), e along the rail
-((16), (17) of Hartweg and Heckmann 2012, for all six). Rotations of rails are small; those of robots are not.
+((16), (17) of Hartweg and Heckmann 2012, for all six). The motion has a rotation vector in it, of which the robot takes
+the whole rotation; that of the rail's own points beside its axis is first order.
 """
 
 import numpy as np
 
-from engine.kernels.floating.vectors import no_vector, shared_vector
+from engine.kernels.floating.vectors import no_vector, shared_vector, times
 from engine.kernels.jit import called, kernel
 from engine.kernels.layout import LANES
 from engine.kernels.robots.chain import STILL, driven, follow, weigh
@@ -38,6 +39,7 @@ from engine.kernels.robots.layout import (
     ROBOT,
     SIXES,
     SOLID,
+    TILT,
     TOLD,
     TOOL,
     VALUE,
@@ -48,7 +50,7 @@ from engine.kernels.robots.layout import (
 )
 from engine.kernels.robots.timing import planned
 from engine.kernels.robots.tracks import along_track, push_on, section
-from engine.kernels.robots.vectors import rotation
+from engine.kernels.robots.vectors import keep_vector, rotation, spin_change_of, spin_of
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes, total
 
 #: Of the largest inertia of a base: what is added to all, as those are singular along joints that are free (1e-16 is
@@ -136,8 +138,10 @@ def ride(system, r, state, work):
     x, y, z = shared_vector(system.robots, r, BASE)
     place = (x + joint[ACTUAL + VALUE] + moved[0], y + moved[1], z + moved[2])
     acceleration = (push[0], push[1], push[2] + system.gravity)
-    turn = rotation((moved[3], moved[4], moved[5]))
-    return place, turn, (rate[3], rate[4], rate[5]), acceleration, (push[3], push[4], push[5])
+    tilt, change = (moved[3], moved[4], moved[5]), (rate[3], rate[4], rate[5])
+    keep_vector(work.robots, r, TILT, tilt)
+    spin, own = spin_of(tilt, change), spin_change_of(tilt, change, (push[3], push[4], push[5]))
+    return place, rotation(tilt), spin, acceleration, own
 
 
 @called
@@ -155,6 +159,7 @@ def evaluate(system, state, work, left):
                 links[j, ACTUAL + order] = links[j, PLANNED + order] + (state[k, order] if k >= 0 else 0.0)
         base, tool = ride(system, r, state, work), shared_vector(system.robots, r, TOOL)
         force, moment, end = follow(system.chain[r], count, base, robot[PAYLOAD], tool, links, ACTUAL)
+        moment = spin_of(times(-1.0, shared_vector(work.robots, r, TILT)), moment)
         for k in range(3):
             robot[WRENCH + k], robot[WRENCH + 3 + k], robot[ACTUAL_TOOL + k] = force[k], moment[k], end[k]
         for j in range(count):

@@ -36,8 +36,9 @@ PLACE, TURN, AXIS, FORCE, MOMENT, ACTUAL, PLANNED, TOLD, DRIVE, SINCE, COLUMNS =
     30,
 )
 VALUE, RATE, PUSH = range(3)
-# columns of Work.robots: tool centre points, motion of the base per unit rate of joint 0, wrench on it, payload
-PLANNED_TOOL, ACTUAL_TOOL, AHEAD, WRENCH, PAYLOAD, ROBOT = 0, 3, 6, 12, 18, 19
+# columns of Work.robots: tool centre points, motion of the base per unit rate of joint 0, wrench on it (of its moment
+# what does work along the rotation vector), payload, rotation vector of the base
+PLANNED_TOOL, ACTUAL_TOOL, AHEAD, WRENCH, PAYLOAD, TILT, ROBOT = 0, 3, 6, 12, 18, 19, 22
 # columns of Work.doing
 BEGUN, PHASE = range(2)
 # columns of Work.grips, by rail: wrench on the robot, motion that the modes miss, loads on the ends of an element, the

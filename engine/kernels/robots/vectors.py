@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from engine.kernels.floating.vectors import dot
+from engine.kernels.floating.vectors import add, cross, dot, times
 from engine.kernels.jit import called
 
 SMALL = 1e-8  # of the square of an angle: beyond the first terms of the series are 1e-18
@@ -44,3 +44,22 @@ def rotation(t):
         (b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x),
         (b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)),
     )
+
+
+@called
+def spin_of(t, d):
+    """Angular velocity of exp(t) where t, a rotation of a rail, changes by d: d + b t x d + c t x (t x d), by series
+    of which 1e-10 is left at 0.1 rad; of -t its transpose."""
+    x, across = dot(t, t), cross(t, d)
+    b, c = 0.5 - x / 24.0 * (1.0 - x / 30.0), 1.0 / 6.0 - x / 120.0 * (1.0 - x / 42.0)
+    return add(d, add(times(b, across), times(c, cross(t, across))))
+
+
+@called
+def spin_change_of(t, d, dd):
+    """The rate of `spin_of`, t changing by d and d by dd."""
+    x, rate, across = dot(t, t), 2.0 * dot(t, d), cross(t, d)
+    b_rate, c_rate = -rate / 24.0 * (1.0 - x / 15.0), -rate / 120.0 * (1.0 - x / 21.0)
+    c = 1.0 / 6.0 - x / 120.0 * (1.0 - x / 42.0)
+    found = add(times(b_rate, across), times(c_rate, cross(t, across)))
+    return add(spin_of(t, dd), add(found, times(c, cross(d, across))))
