@@ -14,10 +14,10 @@ from engine.kernels.robots.layout import (
     HOLDS,
     MODES,
     MOVES,
+    OF_GRIP,
     OFF,
+    PASSED_GRIPS,
     PASSED_PHASE,
-    PASSED_SUNK,
-    PRESSED,
     SEEN_ACTUAL,
     SEEN_PLANNED,
     START,
@@ -29,7 +29,7 @@ from engine.kernels.robots.layout import (
 )
 from engine.robots.peaks import Steps, peaks
 from engine.robots.shortening import beyond_linear
-from engine.robots.stress import is_told, largest_stress
+from engine.robots.stress import is_told, stress_at_steps
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
@@ -64,9 +64,9 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     steps, at_start = Steps.of(cut), _off(record)[0].copy()
     zero_at = at_start if zero == "start" else np.zeros_like(at_start)
     tools, of_tools = _tools(record, resting, steps, zero_at, model.study.solver.tolerance)
-    rails, of_rails = _rails(model, cut, steps, record)
+    rails, of_rails = _rails(model, steps, record)
     longest = np.fmax.reduce([tools[f"error_{doing}"] for doing in DOING])
-    pressed = peaks(record.passed[:, :, PRESSED:], steps.stretch).value.max(axis=1)
+    pressed = peaks(record.passed[:, :, PASSED_GRIPS + VERTICAL :: OF_GRIP], steps.stretch).value.max(axis=1)
     numbers = {"cycle_time": model.done.max(), "error_at_start": at_start, "rail_force_largest": pressed}
     numbers["beyond_linear"] = beyond_linear(model, record, longest)
     return Outcome(
@@ -112,12 +112,13 @@ def _tools(
     return numbers, over(np.max([one.missed for one in found.values()], axis=0), longest)
 
 
-def _rails(model: RobotModel, cut: Stretch, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
+def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
     """Deflections and stresses of rails (B,), and what is missed of deflections and of stresses that are told, over
-    them. Stresses are known at stations."""
-    sunk, bodies = peaks(record.passed[:, :, PASSED_SUNK:PRESSED], steps.stretch), model.system.body
+    them."""
+    sunk, bodies = peaks(record.passed[:, :, PASSED_GRIPS + SUNK :: OF_GRIP], steps.stretch), model.system.body
     down, missed = (np.array([part[bodies == b].max() for b in range(len(model.rails))]) for part in sunk)
-    stress = peaks(largest_stress(model, record), np.repeat(np.arange(cut.steps.size), cut.steps // cut.every + 1))
+    stresses = [stress_at_steps(model, b, steps, record) for b in range(len(model.rails))]
+    stress = peaks(np.stack(stresses, axis=1), steps.stretch)
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
     numbers = {"deflection_largest": down, "stress_largest": stress.value}
     return numbers, np.concatenate([over(missed, down), over(stress.missed, stress.value)[told]])

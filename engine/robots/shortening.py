@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from engine.robots.model import RobotModel
 
 PITCH, YAW = 4, 5  # motions of a track's axis
-LOOKED_AT = 1000  # stations, evenly
+LOOKED_AT = 200  # stations, evenly
 
 
 def beyond_linear(model: RobotModel, record: Record, longest: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.bodies.frame.sections import forces_from_ends
-from engine.kernels.robots.layout import FIRST, MODES
+from engine.kernels.robots.layout import FIRST, MODES, OF_GRIP, PASSED_GRIPS
 from engine.kernels.robots.stress import Bending
 from engine.kernels.robots.stress import largest_stress as of_rail
 from results_schema.arrays import Array
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from engine.bodies.frame.track import TrackBeams
     from engine.kernels.robots.layout import Record
     from engine.robots.model import RobotModel
+    from engine.robots.peaks import Steps
 
 MOMENTS = slice(4, 6)  # of section forces: M_y and M_z
+NEAR = 0.9  # of the largest at stations: where steps between these are looked at
 
 
 def bending_of(track: TrackBeams, moved: Array, missed: Array) -> Bending:
@@ -45,13 +47,23 @@ def is_told(bending: Bending) -> bool:
     return bool(np.isfinite(bending.per_moment).all())
 
 
-def largest_stress(model: RobotModel, record: Record) -> Array:
-    """(S, B) Pa: the largest at any place of a rail; NaN where a section has no fibre distances."""
-    found = np.full((len(record.coordinates), len(model.rails)), np.nan)
-    for b, rail in enumerate(model.rails.values()):
-        if is_told(rail.bending):
-            first = model.system.tracks[b, FIRST]
-            y = record.coordinates[:, first : first + model.system.tracks[b, MODES], 0]
-            r, g = np.nonzero((model.system.body == b) & model.study.solver.static_correction)
-            found[:, b] = of_rail(rail.bending, np.ascontiguousarray(y), record.grips[:, r, g])
+def largest_stress(model: RobotModel, b: int, y: Array, grips: Array) -> Array:
+    """(S,) Pa: the largest at any place of rail b, by coordinates of all modes y (S, n) under robots with ``grips``
+    (S, R, 2, OF_GRIP); NaN where a section has no fibre distances."""
+    bending, first = list(model.rails.values())[b].bending, model.system.tracks[b, FIRST]
+    if not is_told(bending):
+        return np.full(len(y), np.nan)
+    r, g = np.nonzero((model.system.body == b) & model.study.solver.static_correction)
+    own = np.ascontiguousarray(y[:, first : first + model.system.tracks[b, MODES]])
+    return np.asarray(of_rail(bending, own, grips[:, r, g]))
+
+
+def stress_at_steps(model: RobotModel, b: int, steps: Steps, record: Record) -> Array:
+    """(T,) Pa, the same at all steps: those at which it is not near its largest go straight from station to station."""
+    stations = largest_stress(model, b, record.coordinates[:, : model.modes, 0], record.grips)
+    found, before = steps.between_stations(stations), steps.station.astype(np.int64)
+    high = np.maximum(stations[before], stations[np.minimum(before + 1, len(stations) - 1)])
+    near = high >= NEAR * stations.max()
+    grips = record.passed[near, :, PASSED_GRIPS:].reshape(-1, len(model.robots), 2, OF_GRIP)
+    found[near] = largest_stress(model, b, record.bent[near], grips)
     return found

@@ -142,13 +142,14 @@ class Pace(NamedTuple):
 class Record(NamedTuple):
     """What is observed at stations: coordinates (S, N, 4): y, y', y'' and the time;  robots (S, R, OBSERVED) and grips
     (S, R, 2, OF_GRIP): columns below;  drive (S, R, J): what drives exert. And after every step of a march: passed
-    (T, R, PASSED), columns below."""
+    (T, R, PASSED), columns below, and bent (T, n of all): y of modes."""
 
     coordinates: FloatArray
     robots: FloatArray
     drive: FloatArray
     grips: FloatArray
     passed: FloatArray
+    bent: FloatArray
 
 
 # columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point, what
@@ -156,6 +157,6 @@ class Record(NamedTuple):
 # and the place along it (m)
 SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, SEEN_PHASE, OBSERVED = 0, 3, 6, 12, 13
 VERTICAL, SUNK, ALONG, OF_GRIP = 2, 6, 7, 8
-# columns of Record.passed: actual less planned tool centre point (m), what the robot does; by rail: m by which it is
-# down, and the vertical force on it
-OFF, PASSED_PHASE, PASSED_SUNK, PRESSED, PASSED = 0, 3, 4, 6, 8
+# columns of Record.passed: actual less planned tool centre point (m), what the robot does, and what `grips` has of both
+# rails
+OFF, PASSED_PHASE, PASSED_GRIPS, PASSED = 0, 3, 4, 4 + 2 * OF_GRIP

@@ -22,15 +22,15 @@ from engine.kernels.robots.layout import (
     MISSED_THERE,
     MISSING,
     MOMENTUM,
+    OF_GRIP,
     OFF,
+    PASSED_GRIPS,
     PASSED_PHASE,
-    PASSED_SUNK,
     PAYLOAD,
     PHASE,
     PLACE,
     PLANNED,
     PLANNED_TOOL,
-    PRESSED,
     PUSH,
     RATE,
     SEEN_ACTUAL,
@@ -42,7 +42,6 @@ from engine.kernels.robots.layout import (
     SUNK,
     UP_THERE,
     VALUE,
-    VERTICAL,
     WRENCH,
     Pace,
 )
@@ -83,7 +82,7 @@ def march(system, stretches, newmark, record):
                 if not np.isfinite(energy):
                     return np.int64(NOT_CONVERGED)
             observe(system, start + n * h, state, work, left, record, station)
-            pass_by(record, station, passed)
+            pass_by(state, record, station, passed)
             passed += 1
             if n % stretches.every == 0:  # what is no station is written over
                 station += 1
@@ -351,15 +350,18 @@ def observe(system, t, state, work, left, record, station):
 
 
 @called
-def pass_by(record, station, passed):
+def pass_by(state, record, station, passed):
     """What is kept of every step, out of what is observed."""
+    for k in range(record.bent.shape[1]):
+        record.bent[passed, k] = state[k, 0]
     for r in range(record.passed.shape[1]):
         own, seen, grips = record.passed[passed, r], record.robots[station, r], record.grips[station, r]
         for k in range(3):
             own[OFF + k] = seen[SEEN_ACTUAL + k] - seen[SEEN_PLANNED + k]
         own[PASSED_PHASE] = seen[SEEN_PHASE]
         for g in range(2):
-            own[PASSED_SUNK + g], own[PRESSED + g] = grips[g, SUNK], grips[g, VERTICAL]
+            for k in range(OF_GRIP):
+                own[PASSED_GRIPS + OF_GRIP * g + k] = grips[g, k]
 
 
 @called

@@ -48,18 +48,12 @@ def rotation(t):
 
 @called
 def spin_of(t, d):
-    """Angular velocity of exp(t) where t, a rotation of a rail, changes by d: d + b t x d + c t x (t x d), by series
-    of which 1e-10 is left at 0.1 rad; of -t its transpose."""
-    x, across = dot(t, t), cross(t, d)
-    b, c = 0.5 - x / 24.0 * (1.0 - x / 30.0), 1.0 / 6.0 - x / 120.0 * (1.0 - x / 42.0)
-    return add(d, add(times(b, across), times(c, cross(t, across))))
+    """Angular velocity of exp(t) where t, a rotation of a rail, changes by d: to |t|^3/24 of d; of -t its transpose."""
+    across = cross(t, d)
+    return add(d, add(times(0.5, across), times(1.0 / 6.0, cross(t, across))))
 
 
 @called
 def spin_change_of(t, d, dd):
     """The rate of `spin_of`, t changing by d and d by dd."""
-    x, rate, across = dot(t, t), 2.0 * dot(t, d), cross(t, d)
-    b_rate, c_rate = -rate / 24.0 * (1.0 - x / 15.0), -rate / 120.0 * (1.0 - x / 21.0)
-    c = 1.0 / 6.0 - x / 120.0 * (1.0 - x / 42.0)
-    found = add(times(b_rate, across), times(c_rate, cross(t, across)))
-    return add(spin_of(t, dd), add(found, times(c, cross(d, across))))
+    return add(spin_of(t, dd), times(1.0 / 6.0, cross(d, cross(t, d))))
