@@ -50,7 +50,7 @@ def _empty(model: RobotModel, times: Stretch, passed: int) -> Record:
         np.full((S, R, OBSERVED), math.nan),
         np.zeros((S, R, J)),
         np.zeros((S, R, 2, OF_GRIP)),
-        np.full((passed, R, PASSED), math.nan),
+        np.full((passed, R, PASSED + J), math.nan),
         np.full((passed, model.modes), math.nan),
     )
 

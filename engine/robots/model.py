@@ -9,7 +9,6 @@ import numpy as np
 
 from engine.bodies.frame.frame import Frame
 from engine.kernels.layout import LANES
-from engine.kernels.robots.chain import inverse_dynamics
 from engine.kernels.robots.layout import (
     CENTRE,
     ELEMENTS,
@@ -78,7 +77,7 @@ def build(study: Study) -> RobotModel:
     J = coordinate.shape[1]
     system = System(
         np.array([(len(a.drives), len(r.moves), r.feedforward == "plan") for a, r in zip(arms, robots, strict=True)]),
-        np.stack([_chain(arm, J) for arm in arms]),
+        np.stack([chain_of(arm, J) for arm in arms]),
         np.concatenate([[arm.tool for arm in arms], stands.base], axis=1),
         study.gravity,
         coordinate,
@@ -115,15 +114,7 @@ def _joints(arms: list[Arm], first: int) -> tuple[Counts, Array]:
     return found, np.array(springs).reshape(len(soft), 2)
 
 
-def drive_forces(arm: Arm, joints: Array, gravity: float, payload: float = 0.0) -> Array:
-    """(S, J) N and N m that the drives of an arm exert by recursive Newton-Euler, on a rail that does not bend.
-
-    joints (S, J, 3): values, rates, accelerations, that along the rail first; gravity m/s2; payload kg at the tool.
-    """
-    return np.asarray(inverse_dynamics(_chain(arm, len(arm.drives)), np.array(arm.tool), payload, gravity, joints))
-
-
-def _chain(arm: Arm, most: int) -> Array:
+def chain_of(arm: Arm, most: int) -> Array:
     """(J, LINK): an arm, the carriage as link 0."""
     from scipy.spatial.transform import Rotation
 

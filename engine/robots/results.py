@@ -12,14 +12,17 @@ from engine.kernels.robots.layout import (
     ELEMENTS,
     FIRST,
     HOLDS,
+    JOINTS,
     MODES,
     MOVES,
     OF_GRIP,
     OFF,
+    PASSED,
     PASSED_GRIPS,
     PASSED_PHASE,
     SEEN_ACTUAL,
     SEEN_PLANNED,
+    SLIDES,
     START,
     STEADY,
     SUNK,
@@ -66,8 +69,9 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     tools, of_tools = _tools(record, resting, steps, zero_at, model.study.solver.tolerance)
     rails, of_rails = _rails(model, steps, record)
     longest = np.fmax.reduce([tools[f"error_{doing}"] for doing in DOING])
-    pressed = peaks(record.passed[:, :, PASSED_GRIPS + VERTICAL :: OF_GRIP], steps.stretch).value.max(axis=1)
+    pressed = peaks(record.passed[:, :, PASSED_GRIPS + VERTICAL : PASSED : OF_GRIP], steps.stretch).value.max(axis=1)
     numbers = {"cycle_time": model.done.max(), "error_at_start": at_start, "rail_force_largest": pressed}
+    numbers |= _drives(model, steps, record)
     numbers["beyond_linear"] = beyond_linear(model, record, longest)
     return Outcome(
         numbers | tools | rails,
@@ -115,13 +119,22 @@ def _tools(
 def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
     """Deflections and stresses of rails (B,), and what is missed of deflections and of stresses that are told, over
     them."""
-    sunk, bodies = peaks(record.passed[:, :, PASSED_GRIPS + SUNK :: OF_GRIP], steps.stretch), model.system.body
+    sunk, bodies = peaks(record.passed[:, :, PASSED_GRIPS + SUNK : PASSED : OF_GRIP], steps.stretch), model.system.body
     down, missed = (np.array([part[bodies == b].max() for b in range(len(model.rails))]) for part in sunk)
     stresses = [stress_at_steps(model, b, steps, record) for b in range(len(model.rails))]
     stress = peaks(np.stack(stresses, axis=1), steps.stretch)
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
     numbers = {"deflection_largest": down, "stress_largest": stress.value}
     return numbers, np.concatenate([over(missed, down), over(stress.missed, stress.value)[told]])
+
+
+def _drives(model: RobotModel, steps: Steps, record: Record) -> dict[str, Array]:
+    """(R, J) the largest force or torque of drives, NaN where a joint is of the other sort or is none."""
+    largest = peaks(np.abs(record.passed[:, :, PASSED:]), steps.stretch).value
+    slides = model.system.chain[:, :, SLIDES] > 0.0
+    there = np.arange(largest.shape[1]) < model.system.counts[:, JOINTS, None]
+    sorts = {"drive_force_largest": slides & there, "drive_torque_largest": ~slides & there}
+    return {name: np.where(own, largest, np.nan) for name, own in sorts.items()}
 
 
 def over(part: Array, whole: Array) -> Array:

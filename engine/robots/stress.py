@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.bodies.frame.sections import forces_from_ends
-from engine.kernels.robots.layout import FIRST, MODES, OF_GRIP, PASSED_GRIPS
+from engine.kernels.robots.layout import FIRST, MODES, OF_GRIP, PASSED, PASSED_GRIPS
 from engine.kernels.robots.stress import Bending
 from engine.kernels.robots.stress import largest_stress as of_rail
 from results_schema.arrays import Array
@@ -64,6 +64,6 @@ def stress_at_steps(model: RobotModel, b: int, steps: Steps, record: Record) -> 
     found, before = steps.between_stations(stations), steps.station.astype(np.int64)
     high = np.maximum(stations[before], stations[np.minimum(before + 1, len(stations) - 1)])
     near = high >= NEAR * stations.max()
-    grips = record.passed[near, :, PASSED_GRIPS:].reshape(-1, len(model.robots), 2, OF_GRIP)
+    grips = record.passed[near, :, PASSED_GRIPS:PASSED].reshape(-1, len(model.robots), 2, OF_GRIP)
     found[near] = largest_stress(model, b, record.bent[near], grips)
     return found

@@ -148,6 +148,7 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
 
     model, declared = build(with_open_modes(study.without_sweep())), study.results(kind)
     labels: dict[str, Sequence[str]] = {"robot": model.robots, "rail": list(model.rails), "component": COMPONENTS}
+    labels["joint"] = [f"link {j}" if j else "rail" for j in range(model.system.coordinate.shape[1])]
     own = dict(parts)
     alone = own.pop(ONE_AT_A_TIME, None)
     if alone is not None:

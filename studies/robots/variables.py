@@ -28,6 +28,10 @@ RESULTS = outputs("""
         likewise; NaN where it never does
     beyond_linear | robot | | | what rails leave out that do not grow shorter as they bend, over the longest error
         of the tool; second order, in no estimated error
+    drive_force_largest | robot joint | N | | largest force of the drive of a joint that slides
+        of its controller too; not that of a blow; NaN of joints that turn or are not there
+    drive_torque_largest | robot joint | N m | | largest torque of the drive of a joint that turns
+        likewise; NaN of joints that slide or are not there
     at_rest | robot | | | part of the time for which a tool is where it would rest
         within the tolerance, of its largest error
     * | | | |
@@ -52,6 +56,7 @@ RESULTS = outputs("""
     * | | | |
     robot | | | axis str | robot
     still | | | axis str | robot that stands still
+    joint | | | axis str | joint, from the rail outward
     rail | | | axis str | body that robots ride
     rail_end | | | axis | number of the place along a rail
     component | | | axis str | component of the vector

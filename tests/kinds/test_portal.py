@@ -23,7 +23,8 @@ from studies.reporting.summary import asked
 from studies.reporting.tabulated import table_of
 from studies.results.results import Results
 from studies.robots.findings import front, of_front
-from tests.robots.scenes import GANTRY, rail, scene
+from tests.robots.scenes import FOX_GOODWIN, GANTRY, rail, scene
+from tests.robots.scenes import marched as by_steps
 
 SWEPT = {
     "acceleration": {"of": ["robot.portal.acceleration_scale"], "values": [0.5, 1.0, 3.0]},
@@ -124,6 +125,22 @@ def test_every_number_is_told_with_the_variant_that_it_belongs_to(found: Any) ->
     own["error_working"].loc[{"robot": "portal", "acceleration": 3.0, "payload": 2.0}] = 1.5
     answer = " ".join(kind_of(swept()).findings(Results.of(own)))
     assert "2 m in moves and 1.5 m at work at acceleration 3, payload 2; from" in answer
+
+
+def test_drives_are_told_by_what_they_exert_the_most(found: Any) -> None:
+    """At every step of a finer march; forces of joints that slide, torques of those that turn."""
+    own = expand(swept()).study_of(swept(), 4)
+    model, record = by_steps(own, 0.002, float(found["cycle_time"][2, 0]) + 0.5, scheme=FOX_GOODWIN)
+    most = np.abs(record.drive).max(axis=0)
+    force, torque = (found[f"drive_{what}_largest"].values[2, 0] for what in ("force", "torque"))
+    slides = np.array([[True, True, True, False, False], [True, False, False, False, False]])
+    there = np.array([[True] * 5, [True] * 3 + [False] * 2])
+    assert list(found["joint"].values) == ["rail", "link 1", "link 2", "link 3", "link 4"]
+    np.testing.assert_array_equal(np.isfinite(force), slides)
+    np.testing.assert_array_equal(np.isfinite(torque), ~slides & there)
+    np.testing.assert_allclose(np.where(slides, force, torque)[there], most[there], rtol=2e-2)
+    assert (found["drive_force_largest"].sel(robot="portal", joint="link 2") > 9.81 * (120 + 60 + 25)).all()
+    assert model.robots == ("portal", "hanging")
 
 
 def test_what_linear_rails_leave_out_is_told_where_it_is_more_than_the_tolerance(found: Any) -> None:

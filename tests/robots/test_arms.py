@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.robots.model import build, drive_forces
+from engine.robots.model import build
 from engine.robots.plans import plans_of
 from engine.scene.motions.point_to_point import profile
 from engine.scene.robots import Arm
 from tests.naive.robots_as_particles import driven_by, pieces, told
+from tests.robots.inverse import drive_forces
 from tests.robots.scenes import ARM, GANTRY, marched, scene
 
 # PUMA 560 (Corke and Armstrong-Helouvry 1994) by standard Denavit-Hartenberg: a, d, twist; mass, centre, inertia

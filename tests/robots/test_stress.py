@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.kernels.robots.layout import OF_GRIP, PASSED_GRIPS, Record
+from engine.kernels.robots.layout import OF_GRIP, PASSED, PASSED_GRIPS, Record
 from engine.robots.converge import Ladder, Rung, climb, marched
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import RobotModel, build
@@ -72,7 +72,7 @@ def test_the_largest_stress_is_that_of_all_steps(faster: float) -> None:
     assert (off <= found.error[-2:]).all() and off.max() < 5e-5
     level = ladder.level(found.rung)
     record, _ = march(level.model, level.times, FOX_GOODWIN)
-    grips = record.passed[:, :, PASSED_GRIPS:].reshape(-1, 2, 2, OF_GRIP)
+    grips = record.passed[:, :, PASSED_GRIPS:PASSED].reshape(-1, 2, 2, OF_GRIP)
     for b, value in enumerate(own):
         whole = largest_stress(level.model, b, record.bent, grips)
         assert peaks(whole, Steps.of(level.times).stretch).value == pytest.approx(value, rel=1e-12)

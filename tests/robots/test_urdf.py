@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from engine.robots.model import drive_forces
 from engine.robots.urdf import table_of
 from engine.scene.robots import Arm
 from results_schema.errors import BadInput
 from studies.commands.cli import main
+from tests.robots.inverse import drive_forces
 
 TURNED = np.array([0.3, -0.2, 0.5])  # of the root on the carriage
 GRAVITY = 9.81

@@ -3,8 +3,6 @@
 Everything is in the axes of the ground; moments and spatial inertias are about the base point.
 """
 
-import numpy as np
-
 from engine.kernels.floating.vectors import (
     add,
     after,
@@ -16,13 +14,11 @@ from engine.kernels.floating.vectors import (
     turned_in,
     turned_out,
 )
-from engine.kernels.jit import called, kernel
+from engine.kernels.jit import called
 from engine.kernels.robots.layout import (
-    ACTUAL,
     AHEAD,
     AXIS,
     CENTRE,
-    COLUMNS,
     FORCE,
     INERTIA,
     JOINT_AXIS,
@@ -194,20 +190,3 @@ def weigh(chain, count, robot, tool, links, found, sums):
         along = spin_of(times(-1.0, tilt), angular)
         for i in range(3):
             found[i, k], found[3 + i, k] = linear[i], along[i]
-
-
-@kernel
-def inverse_dynamics(chain, tool, payload, gravity, joints):
-    """(S, J) what drives exert at S stations of joints (S, J, 3): values, rates, accelerations; on a base that does not
-    move but along x, by joint 0."""
-    S, J = joints.shape[:2]
-    found, links, still = np.zeros((S, J)), np.zeros((J, COLUMNS)), (0.0, 0.0, 0.0)
-    for n in range(S):
-        links[:, ACTUAL : ACTUAL + 3] = joints[n]
-        place = (joints[n, 0, VALUE], 0.0, 0.0)
-        base = place, STILL, still, (joints[n, 0, PUSH], 0.0, gravity), still
-        force, _, _ = follow(chain, J, base, payload, (tool[0], tool[1], tool[2]), links, ACTUAL)
-        found[n, 0] = force[0]
-        for j in range(1, J):
-            found[n, j] = driven(chain, j, links, place)
-    return found

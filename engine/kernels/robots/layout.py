@@ -142,7 +142,7 @@ class Pace(NamedTuple):
 class Record(NamedTuple):
     """What is observed at stations: coordinates (S, N, 4): y, y', y'' and the time;  robots (S, R, OBSERVED) and grips
     (S, R, 2, OF_GRIP): columns below;  drive (S, R, J): what drives exert. And after every step of a march: passed
-    (T, R, PASSED), columns below, and bent (T, n of all): y of modes."""
+    (T, R, PASSED + J), columns below, and bent (T, n of all): y of modes."""
 
     coordinates: FloatArray
     robots: FloatArray
@@ -157,6 +157,6 @@ class Record(NamedTuple):
 # and the place along it (m)
 SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, SEEN_PHASE, OBSERVED = 0, 3, 6, 12, 13
 VERTICAL, SUNK, ALONG, OF_GRIP = 2, 6, 7, 8
-# columns of Record.passed: actual less planned tool centre point (m), what the robot does, and what `grips` has of both
-# rails
+# columns of Record.passed: actual less planned tool centre point (m), what the robot does, what `grips` has of both
+# rails; then what each of J drives exerts
 OFF, PASSED_PHASE, PASSED_GRIPS, PASSED = 0, 3, 4, 4 + 2 * OF_GRIP

@@ -24,6 +24,7 @@ from engine.kernels.robots.layout import (
     MOMENTUM,
     OF_GRIP,
     OFF,
+    PASSED,
     PASSED_GRIPS,
     PASSED_PHASE,
     PAYLOAD,
@@ -362,6 +363,8 @@ def pass_by(state, record, station, passed):
         for g in range(2):
             for k in range(OF_GRIP):
                 own[PASSED_GRIPS + OF_GRIP * g + k] = grips[g, k]
+        for j in range(record.drive.shape[2]):
+            own[PASSED + j] = record.drive[station, r, j]
 
 
 @called
