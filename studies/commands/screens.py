@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from results_schema.status import Status, label
 from studies.commands.console import blank, heading, paragraphs, say, table
 from studies.findings.numerics_used import is_marched, told_choices
+from studies.protocol.study import kind_named
 from studies.reporting.answers import answer_of
 from studies.results.findings_common import missed_most
 from studies.results.formatting import counted, listed, number, quantity
@@ -213,6 +214,8 @@ def _about_statuses(results: Results) -> Iterator[str]:
     counts, noun = summary.counts(results.dataset), summary.noun(results.dataset)
     expected = results.study.expected
     for status in Status:
+        if status is Status.TOLERANCE_MISSED and kind_named(results.study.kind).missed(results):
+            continue
         if (count := counts.get(label(status), 0)) and status != Status.OK:
             part = "as the study expects, " if label(status) in expected else ""
             most = missed_most(results) if status is Status.TOLERANCE_MISSED else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from results_schema.variables import declare
 from studies.protocol.study import PiecedKind, question_of
 from studies.robots import findings
+from studies.robots.missed import told_missed
 from studies.robots.question import Question
 from studies.robots.variables import RESULTS
 
@@ -74,6 +75,9 @@ class Portal(PiecedKind):
 
     def findings(self, results: Results) -> list[str]:
         return findings.answer(results)
+
+    def missed(self, results: Results) -> list[str]:
+        return list(told_missed(results))
 
 
 KIND = Portal()

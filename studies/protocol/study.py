@@ -101,6 +101,10 @@ class Kind:
         """The answer in sentences, the most important first; every number comes from the data."""
         return []
 
+    def missed(self, results: Results) -> list[str]:
+        """Which of its findings say what missed its tolerance, so that no line on that status does."""
+        return []
+
     def named(self, results: Results) -> Sequence[Index]:
         """The variants that the answer names: their histories are kept whichever others are."""
         return []

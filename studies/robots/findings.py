@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array, Counts, Mask
+from results_schema.status import Status
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, spanned
 from studies.results.results import extreme
@@ -22,16 +23,18 @@ MOST_NAMED = 4
 
 def answer(results: Results) -> list[str]:
     """Where limits hold, what missed its tolerance, the front, errors, deflections, what causes errors, statuses."""
+    missed = list(told_missed(results))
+    others = {status for status, count in results.status_counts.items() if count and status != Status.OK}
     return [
         *told_limits(results),
-        *told_missed(results),
+        *missed,
         *_front(results),
         *_errors(results),
         *_statics(results),
         *_deflections(results),
         *_causes(results),
         *_beyond_linear(results),
-        *told_statuses(results),
+        *([] if missed and others == {Status.TOLERANCE_MISSED} else told_statuses(results)),
     ]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from results_schema.status import Status
+from results_schema.status import Status, label
 from studies.results.findings_common import in_words
 from studies.results.formatting import counted, listed, percent, quantity
 from studies.results.results import Index, extreme
@@ -40,7 +40,8 @@ def told_missed(results: Results) -> Iterator[str]:
     struck = dict.fromkeys(text for one in found for text in _picked_up(_model(results, one.at), one.time))
     fixed = [] if results.study.solver.steps == "auto" else ['What helps: more solver.steps, or "auto".']
     helps = " ".join([*fixed, *struck]) or _refined(results, found[0].at)
-    yield f"In {int(missed.sum()):,} of {variants} the tolerance of {asked} is missed by {parts}. {helps}"
+    said = f"In {int(missed.sum()):,} of {variants} the tolerance of {asked} is missed by {parts}"
+    yield f"{said}; they are {label(Status.TOLERANCE_MISSED)}, with values kept. {helps}"
 
 
 def _missed(results: Results, among: np.ndarray) -> Iterator[_Missed]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import studies
 from engine.robots.converge import Ladder, Rung, marched
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from results_schema.status import Status
+from studies.commands.cli import main
 from studies.protocol.study import kind_of
 from studies.results.results import Results
 from studies.robots.missed import told_missed
@@ -69,6 +72,21 @@ def test_steps_that_a_study_fixes_are_told_and_when_they_do_the_most() -> None:
     times = found["estimated_error_time"].sel(payload=1.0)
     assert float(times.sel(result="error of lifter")) == coarse.times[int(np.argmax(apart))]
     assert 0.5 < float(times.sel(result="deflection of right")) < 1.0
+
+
+def test_what_is_missed_is_told_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """In the answer, with its time and what helps; by no line on the status, nor in the report. Others have one."""
+    study = lifting(drive(), 6, tolerance=2e-3, steps=120)
+    file, archive = tmp_path / "lifting.toml", tmp_path / "lifting.nc"
+    file.write_text(study.source.text)
+    assert main(["run", str(file), "-o", str(archive)]) == 3
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("tolerance of 0.2 % is missed") == 1 and said.count("tolerance-missed") == 1
+    assert "was asked)" not in said
+    found = studies.run(study)
+    assert sum("tolerance-missed" in text for text in kind_of(study).findings(Results.of(found))) == 1
+    found["status"][0] = Status.NOT_CONVERGED
+    assert "not-converged" in kind_of(study).findings(Results.of(found))[-1]
 
 
 def test_nothing_is_told_where_nothing_is_missed() -> None:
