@@ -15,7 +15,7 @@ from engine.study_file.units import Length
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from studies.results.findings_common import first_carriage
-from studies.results.results import spread
+from studies.results.places import spread
 
 CORRECTED: Sequence[Mapping[str, Any]] = ({"solver.static_correction": True}, {"solver.static_correction": False})
 

@@ -17,7 +17,7 @@ from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
 from studies.commands import planned_numerics as chosen
 from studies.results.formatting import counted
-from studies.results.results import spread
+from studies.results.places import spread
 
 SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before

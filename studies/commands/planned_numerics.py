@@ -15,7 +15,7 @@ from results_schema.arrays import Array
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.findings.numerics_used import NAMES
 from studies.results.formatting import number, scientific, spanned
-from studies.results.results import spread
+from studies.results.places import spread
 
 HEADINGS = ("variants", "model", "modes", "scheme", "steps", "estimated error", "of tolerance")
 MOST_LOOKED_AT = 4096  # variants of a group whose errors are looked at

@@ -10,7 +10,8 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.variable import outputs
-from studies.results.results import Index, Results, extreme
+from studies.results.places import Index, extreme
+from studies.results.results import Results
 
 (DYNAMIC_AMPLIFICATION,) = outputs("""
     dynamic_amplification | sensor | | nan | dynamic amplification

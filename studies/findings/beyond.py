@@ -12,8 +12,9 @@ from engine.study_file.spec import Spec
 from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
+from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import counted, listed
-from studies.results.results import VARIANT, Axis, Results
+from studies.results.results import Results
 
 MOST_PARTS = 3  # of a sweep that are told one by one
 MOST_TOLD = 3  # values of another swept number that are told one by one

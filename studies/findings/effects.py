@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
+from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import ALIKE, listed, number, percent
-from studies.results.results import VARIANT, Axis, Results
+from studies.results.results import Results
 
 MOST_AXES = 4
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent

@@ -6,9 +6,11 @@ import numpy as np
 
 from engine.scene.study import Study
 from studies.findings.beyond import LIMITED, Limits, where_beyond
+from studies.results.axes import PACES, Axis
 from studies.results.findings_common import in_words, uncertainty
 from studies.results.formatting import quantity
-from studies.results.results import PACES, Axis, Results, extreme
+from studies.results.places import extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 4
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from results_schema.arrays import Array, Mask
 from studies.findings import theory
-from studies.results.results import PACES, Index, Results
+from studies.results.axes import PACES
+from studies.results.places import Index
+from studies.results.results import Results
 
 EXPECTED = 2  # peaks of a shuttle between both ends, seen at midspan
 

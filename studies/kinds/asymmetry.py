@@ -19,9 +19,11 @@ from studies.findings import indices, theory
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.settled import LEFT_OVER, Asked, odd_parts, thresholds
 from studies.protocol.study import Kind
+from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, percent, quantity
-from studies.results.results import VARIANT, Index, Results, extreme
+from studies.results.places import Index, extreme
+from studies.results.results import Results
 
 LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 

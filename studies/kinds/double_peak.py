@@ -21,9 +21,11 @@ from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplifica
 from studies.findings.peaks import PEAKS, peaks
 from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
+from studies.results.axes import PACES
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import MINUS, counted, listed, number, percent
-from studies.results.results import PACES, Index, Results, chosen, extreme
+from studies.results.places import Index, chosen, extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 3
 STATIONS = 8192  # of a cycle: all steps of nearly every march, so that whatever rings in it is seen as it was marched

@@ -23,7 +23,8 @@ from studies.at_rest.positions import Asked, all_positions
 from studies.protocol.study import question_of
 from studies.results.findings_common import first_carriage, in_words
 from studies.results.formatting import counted, listed, number, percent, quantity
-from studies.results.results import Results, both_ends, extreme
+from studies.results.places import both_ends, extreme
+from studies.results.results import Results
 
 SHOWN = 3  # frequencies that a sentence lists
 STILL = 1e-3  # relative change along the way below which a frequency counts as constant

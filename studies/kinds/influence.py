@@ -25,7 +25,8 @@ from studies.at_rest.labelling import BODY_PLACES, COORDINATES
 from studies.at_rest.positions import all_positions
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, percent, quantity
-from studies.results.results import Index, Results, both_ends
+from studies.results.places import Index, both_ends
+from studies.results.results import Results
 
 MOST_SENSORS = 6
 LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding

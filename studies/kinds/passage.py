@@ -16,9 +16,11 @@ from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_be
 from studies.findings.effects import told_effects, unchanged
 from studies.findings.residual import check_residual, residuals
 from studies.protocol.study import Kind, question_of
+from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, listed, number, quantity
-from studies.results.results import PACES, VARIANT, Axis, Index, Results, chosen, extreme
+from studies.results.places import Index, chosen, extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 4
 MOST_GROUPS = 5

@@ -8,7 +8,8 @@ import numpy as np
 
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
-from studies.results.results import Results, extreme
+from studies.results.places import extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 4
 

@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Counts
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Work, unlabelled
 from studies.results.formatting import percent, quantity
-from studies.results.results import spread
+from studies.results.places import spread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -31,7 +31,8 @@ from studies.pictures.common.sweep_view import (
 from studies.pictures.common.traces import odd_part, over_position, picked, there_and_back
 from studies.results.findings_common import exceeds
 from studies.results.formatting import percent, quantity, scale_for
-from studies.results.results import Index, Results, chosen, extreme
+from studies.results.places import Index, chosen, extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 3
 BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent

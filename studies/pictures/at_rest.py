@@ -16,7 +16,8 @@ from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, INK, MUTED, VERMILION, Figure, draw, logarithmic, on_method, printed
 from studies.pictures.common.sweep_view import MASSES, SPEEDS, Curve, View, view
 from studies.results.formatting import percent, quantity
-from studies.results.results import Results, spread
+from studies.results.places import spread
+from studies.results.results import Results
 
 MOST_CURVES = 6
 FLOOR = 1e-9  # below it an error is drawn at the floor: what is left there is rounding

@@ -30,7 +30,8 @@ from studies.pictures.common.sweep_view import (
 )
 from studies.pictures.common.traces import picked
 from studies.results.formatting import listed, number, scale_for
-from studies.results.results import Index, Results, chosen, extreme
+from studies.results.places import Index, chosen, extreme
+from studies.results.results import Results
 
 MOST_SENSORS = 3
 MOST_CYCLES = 3

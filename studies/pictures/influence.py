@@ -12,7 +12,8 @@ from studies.pictures import at_rest
 from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve
 from studies.results.formatting import quantity, scale_for
-from studies.results.results import Results, chosen, spread
+from studies.results.places import chosen, spread
+from studies.results.results import Results
 
 MOST_SENSORS = 5
 PANELS = 4  # of errors

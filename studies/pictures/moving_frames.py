@@ -14,7 +14,8 @@ from studies.pictures.common.sweep_view import view
 from studies.pictures.passages.sizes import sizes_of
 from studies.pictures.trajectory import histories, ranging
 from studies.results.formatting import ALIKE, quantity
-from studies.results.results import Index, Results, chosen
+from studies.results.places import Index, chosen
+from studies.results.results import Results
 
 MOST_ROWS, MOST_CURVES = 5, 4
 

@@ -21,7 +21,8 @@ from studies.pictures.passages.sizes import gain, sizes_of, speed_ratio
 from studies.pictures.passages.ways import response
 from studies.protocol.study import question_of
 from studies.results.formatting import number
-from studies.results.results import Index, Results, extreme
+from studies.results.places import Index, extreme
+from studies.results.results import Results
 
 MOST_HISTORIES = 4
 CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor

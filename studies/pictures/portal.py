@@ -25,7 +25,8 @@ from studies.pictures.common.figures import (
 from studies.pictures.common.sweep_view import View, along_axis
 from studies.pictures.moving_shapes import played
 from studies.results.formatting import listed, quantity, scale_for
-from studies.results.results import Index, Results, extreme
+from studies.results.places import Index, extreme
+from studies.results.results import Results
 from studies.robots.findings import accuracy, of_front
 from studies.robots.limits import Limit, limits, longest_axis, words_of
 

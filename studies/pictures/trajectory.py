@@ -13,7 +13,8 @@ from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, 
 from studies.pictures.common.sweep_view import Curve, coincide
 from studies.pictures.common.traces import picked
 from studies.results.formatting import ALIKE, quantity, scale_for
-from studies.results.results import Index, Results, chosen
+from studies.results.places import Index, chosen
+from studies.results.results import Results
 
 MOST_ROWS = 4
 PER_PERIOD = 6  # instants: fewer draw another vibration than there is

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from results_schema.late import xr
 from results_schema.store.rows import Chunk, Rows, RowsOnDisk, joined
-from studies.results.results import VARIANT, Results
+from studies.results.axes import VARIANT
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan

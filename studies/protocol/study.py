@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from results_schema.arrays import Array, Counts
     from studies.pictures.common.figures import Figure
     from studies.protocol.parts import Parts, Piece
-    from studies.results.results import Index, Results
+    from studies.results.places import Index
+    from studies.results.results import Results
 
     AnySpec = TypeVar("AnySpec", bound=Spec)
 else:

@@ -15,9 +15,10 @@ from results_schema.status import Status, label
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
+from studies.results.axes import VARIANT
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
 from studies.results.formatting import ALIKE, NOISE, quantity
-from studies.results.results import VARIANT, Results
+from studies.results.results import Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
 

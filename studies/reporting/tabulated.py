@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.store import files
-from studies.results.results import Axis, Results
+from studies.results.axes import Axis
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     import pandas as pd

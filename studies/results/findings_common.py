@@ -10,7 +10,8 @@ from engine.scene.trains import Train
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity, scientific
-from studies.results.results import Index, Results, extreme, statuses
+from studies.results.places import Index, extreme
+from studies.results.results import Results, statuses
 
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,82 +13,14 @@ from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import LOST, Status, label
+from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.cells import counts_of
-from studies.results.formatting import Scale, axis_title, number, quantity, spanned, swept_quantity, typed_unit
+from studies.results.formatting import number, quantity, typed_unit
+from studies.results.places import Index
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
-
-VARIANT = "variant"
-PACES = (".motion.frequency", ".motion.speed")
-Index = tuple[int, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """One swept number: its dimension in the dataset, and its values (n,) along it, in SI units.
-
-    targets: the numbers of the scene that it sets, by dotted key, each with the factor of the value.
-    typed: the unit in which the study file has it, in which people read it again; None where it was typed without one.
-    """
-
-    name: str
-    dim: str
-    targets: Mapping[str, float]
-    values: Array
-    units: str
-    typed: Scale | None = None
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Dotted keys of the numbers that it sets."""
-        return tuple(self.targets)
-
-    def columns(self, entry: int) -> dict[str, float]:
-        """What it sets at an entry of its values, by dotted key."""
-        return {path: self.values[entry].item() * factor for path, factor in self.targets.items()}
-
-    @property
-    def noun(self) -> str:
-        """Its name as a word."""
-        return self.name.replace("_", " ")
-
-    @property
-    def title(self) -> str:
-        """Name and unit as on a figure's axis."""
-        return f"{self.noun} ({self.typed.unit})" if self.typed else axis_title(self.noun, self.units)
-
-    @property
-    def shown(self) -> Array:
-        """(n,) its values in the unit of its title."""
-        return self.values * self.factor
-
-    @property
-    def factor(self) -> float:
-        """What turns its values (SI) into those of its title."""
-        return self.typed.factor if self.typed else 1.0
-
-    def in_words(self, value: float) -> str:
-        """A value (SI) with its unit."""
-        return swept_quantity(value, self.units, self.typed)
-
-    @property
-    def span(self) -> str:
-        """Its smallest and largest value, or its one value, with units."""
-        return spanned(self.values.tolist(), self.in_words)
-
-    def value(self, index: int) -> str:
-        """One value with its unit."""
-        return self.in_words(float(self.values[index]))
-
-    def at(self, index: int) -> str:
-        """One value with name and unit."""
-        return f"{self.noun} {self.value(index)}"
-
-    def sets(self, *endings: str) -> bool:
-        """Whether one of the keys that it sets ends so."""
-        return any(f".{path}".endswith(ending) for path in self.paths for ending in endings)
 
 
 def _check_whole(dataset: xr.Dataset, study: Study) -> None:
@@ -398,37 +329,3 @@ def statuses(counts: Mapping[Status, int]) -> str:
     return ", ".join(
         f"{count} {label(status)} ({'values kept' if status.values_kept else 'left out'})" for status, count in others
     )
-
-
-def extreme(values: xr.DataArray | Array, by: Any = np.nanargmax) -> Index | None:
-    """Place of the largest value (or of that which `by` picks); None where there are only NaN.
-
-    >>> extreme(np.array([[1.0, np.nan], [3.0, 2.0]]))
-    (1, 0)
-    """
-    array = np.asarray(values, dtype=np.float64)
-    if np.isnan(array).all():
-        return None
-    return tuple(int(i) for i in np.unravel_index(int(by(array)), array.shape)) if array.ndim else ()
-
-
-def both_ends(values: xr.DataArray | Array) -> tuple[Index, Index] | None:
-    """Places of the smallest and of the largest value; None where there are only NaN."""
-    low, high = extreme(values, np.nanargmin), extreme(values)
-    return None if low is None or high is None else (low, high)
-
-
-def spread(count: int, most: int) -> list[int]:
-    """At most `most` of `count` places, evenly spread, with both ends.
-
-    >>> spread(10, 4), spread(2, 4)
-    ([0, 3, 6, 9], [0, 1])
-    """
-    if count <= most:
-        return list(range(count))
-    return sorted({math.floor(0.5 + i * (count - 1) / (most - 1)) for i in range(most)}) if most > 1 else [count // 2]
-
-
-def chosen(items: Sequence[Any], most: int) -> Iterator[Any]:
-    """At most `most` of the items, evenly spread."""
-    return (items[i] for i in spread(len(items), most))

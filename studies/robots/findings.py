@@ -11,7 +11,7 @@ from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, spanned
-from studies.results.results import extreme
+from studies.results.places import extreme
 from studies.robots.limits import DOING, told_limits
 from studies.robots.missed import told_missed
 

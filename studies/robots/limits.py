@@ -12,9 +12,10 @@ import numpy as np
 from engine.study_file.units import Length, unit_of
 from results_schema.arrays import Array, Mask
 from studies.protocol.study import question_of
+from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words
 from studies.results.formatting import Scale, counted, listed, number, quantity
-from studies.results.results import VARIANT, Axis, Index, extreme
+from studies.results.places import Index, extreme
 from studies.robots.question import LIMITED, Question
 
 if TYPE_CHECKING:

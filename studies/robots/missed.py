@@ -10,7 +10,7 @@ import numpy as np
 from results_schema.status import Status, label
 from studies.results.findings_common import in_words
 from studies.results.formatting import counted, listed, percent, quantity
-from studies.results.results import Index, extreme
+from studies.results.places import Index, extreme
 
 if TYPE_CHECKING:
     from engine.robots.model import RobotModel

@@ -12,7 +12,7 @@ import numpy as np
 from engine.march.stepper import Halted
 from studies.protocol.parts import Foreseen, TextTable
 from studies.results.formatting import counted, number, quantity, scientific, spanned
-from studies.results.results import spread
+from studies.results.places import spread
 
 if TYPE_CHECKING:
     from engine.robots.converge import Converged

@@ -13,7 +13,8 @@ from results_schema.late import xr
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations, sensor_unit
 from studies.results.formatting import counted, listed, percent
-from studies.results.results import Results, spread
+from studies.results.places import spread
+from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan

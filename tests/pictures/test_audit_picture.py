@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from studies.pictures.common import estimates
-from studies.results.results import Axis, Results
+from studies.results.axes import Axis
+from studies.results.results import Results
 
 NAN = np.nan
 

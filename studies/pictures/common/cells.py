@@ -11,9 +11,10 @@ from matplotlib.figure import Figure as Drawing
 from results_schema.arrays import Array
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, shades
+from studies.results.axes import PACES, Axis
 from studies.results.cells import CellRange, cell_ranges
 from studies.results.formatting import counted, listed, number, scale_for
-from studies.results.results import PACES, Axis, Results
+from studies.results.results import Results
 
 MOST = 6  # results that are drawn
 

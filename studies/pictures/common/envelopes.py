@@ -11,7 +11,8 @@ from matplotlib.figure import Figure as Drawing
 from studies.pictures.common.figures import HAIR, INK, Figure, draw, legend_of_all, shades, zero_line
 from studies.results.findings_common import told_envelopes
 from studies.results.formatting import counted, scale_for
-from studies.results.results import Index, Results, chosen, spread
+from studies.results.places import Index, chosen, spread
+from studies.results.results import Results
 
 MOST_ENVELOPES = 4
 MOST_CURVES = 4

@@ -12,8 +12,9 @@ from results_schema.late import xr
 from studies.findings.numerics_used import is_marched, known
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, on_method
+from studies.results.axes import PACES, Axis
 from studies.results.formatting import counted, number, percent
-from studies.results.results import PACES, Axis, Results
+from studies.results.results import Results
 from studies.runs.audit import relative_errors
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis

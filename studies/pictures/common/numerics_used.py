@@ -17,8 +17,10 @@ from studies.findings.numerics_used import MODEL, MODES, NAMES, STEPS, WORK, is_
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, logarithmic, on_method
 from studies.pictures.common.sweep_view import DAMPING, MASSES, View, along_axis, draw_map, view
+from studies.results.axes import PACES, VARIANT
 from studies.results.formatting import counted, listed
-from studies.results.results import PACES, VARIANT, Results, spread
+from studies.results.places import spread
+from studies.results.results import Results
 
 NOTHING = "#bcc3cb"  # where no step was marched
 COLOURS = {

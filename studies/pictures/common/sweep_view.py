@@ -16,8 +16,10 @@ from results_schema.late import xr
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
+from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import ALIKE, listed
-from studies.results.results import VARIANT, Axis, Index, Results, spread, statuses
+from studies.results.places import Index, spread
+from studies.results.results import Results, statuses
 
 MOST_CURVES = 6
 DASHED = (0, (3, 2))

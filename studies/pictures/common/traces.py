@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
-from studies.results.results import Index, Results
+from studies.results.places import Index
+from studies.results.results import Results
 
 
 class Way(NamedTuple):

@@ -14,7 +14,8 @@ from studies.pictures.common.figures import Figure, draw, limit_far, limit_line
 from studies.pictures.common.sweep_view import Curve, View, along_axis, draw_curves, one_legend, ratio_above
 from studies.results.findings_common import LOOSE, in_words
 from studies.results.formatting import counted, listed, percent, quantity, scale_for
-from studies.results.results import Index, Results
+from studies.results.places import Index
+from studies.results.results import Results
 
 MOST_SENSORS = 4  # of one quantity
 FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves would be flat under it

@@ -14,7 +14,8 @@ from studies.pictures.common.figures import Figure, draw, legend_of_all, limit_f
 from studies.pictures.common.traces import over_way
 from studies.results.findings_common import LOOSE
 from studies.results.formatting import percent, quantity, scale_for
-from studies.results.results import Index, Results
+from studies.results.places import Index
+from studies.results.results import Results
 
 MOST_SENSORS = 4
 REACHED = 0.5  # of a limit: what stays below has no line, beside which it would be flat

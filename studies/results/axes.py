@@ -1,0 +1,78 @@
+"""Swept numbers: where their values lie in a dataset, in the units that people typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from results_schema.arrays import Array
+from studies.results.formatting import Scale, axis_title, spanned, swept_quantity
+
+VARIANT = "variant"
+PACES = (".motion.frequency", ".motion.speed")
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One swept number: its dimension in the dataset, and its values (n,) along it, in SI units.
+
+    targets: the numbers of the scene that it sets, by dotted key, each with the factor of the value.
+    typed: the unit in which the study file has it, in which people read it again; None where it was typed without one.
+    """
+
+    name: str
+    dim: str
+    targets: Mapping[str, float]
+    values: Array
+    units: str
+    typed: Scale | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted keys of the numbers that it sets."""
+        return tuple(self.targets)
+
+    def columns(self, entry: int) -> dict[str, float]:
+        """What it sets at an entry of its values, by dotted key."""
+        return {path: self.values[entry].item() * factor for path, factor in self.targets.items()}
+
+    @property
+    def noun(self) -> str:
+        """Its name as a word."""
+        return self.name.replace("_", " ")
+
+    @property
+    def title(self) -> str:
+        """Name and unit as on a figure's axis."""
+        return f"{self.noun} ({self.typed.unit})" if self.typed else axis_title(self.noun, self.units)
+
+    @property
+    def shown(self) -> Array:
+        """(n,) its values in the unit of its title."""
+        return self.values * self.factor
+
+    @property
+    def factor(self) -> float:
+        """What turns its values (SI) into those of its title."""
+        return self.typed.factor if self.typed else 1.0
+
+    def in_words(self, value: float) -> str:
+        """A value (SI) with its unit."""
+        return swept_quantity(value, self.units, self.typed)
+
+    @property
+    def span(self) -> str:
+        """Its smallest and largest value, or its one value, with units."""
+        return spanned(self.values.tolist(), self.in_words)
+
+    def value(self, index: int) -> str:
+        """One value with its unit."""
+        return self.in_words(float(self.values[index]))
+
+    def at(self, index: int) -> str:
+        """One value with name and unit."""
+        return f"{self.noun} {self.value(index)}"
+
+    def sets(self, *endings: str) -> bool:
+        """Whether one of the keys that it sets ends so."""
+        return any(f".{path}".endswith(ending) for path in self.paths for ending in endings)
