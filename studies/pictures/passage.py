@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,17 @@ from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import AskedOfPassages, ranked
 from studies.findings.effects import unchanged
 from studies.pictures.common import figures as look
-from studies.pictures.common.figures import Figure, colour_bar, draw, zero_line
-from studies.pictures.common.sweep_view import DAMPING, SPEEDS, View, along_axis, draw_curves, draw_map, view
+from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
+from studies.pictures.common.sweep_view import (
+    DAMPING,
+    MOST_CURVES,
+    SPEEDS,
+    View,
+    along_axis,
+    draw_curves,
+    draw_map,
+    view,
+)
 from studies.pictures.common.traces import picked
 from studies.pictures.passages.sizes import gain, sizes_of, speed_ratio
 from studies.pictures.passages.ways import response
@@ -48,7 +57,8 @@ def pictures(results: Results) -> list[Figure]:
             (first if asked else others).append(_sizes(results, own, limits.limit(name)))
         if seen.y is not None and len(seen.y.values) > MANY and _varies(seen, gain(results, sensors[0])):
             first.append(_map(seen, sensors[0]))
-        first += [_contact(seen, name) for name in results.study.carriage if _has_contact(seen, name)]
+        touching = [name for name in results.study.carriage if _has_contact(seen, name)]
+        first += [_contact(seen, touching)] if touching else []
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
     shown = picked(results, size, MOST_HISTORIES)
     return [*first, *([response(results, sensors, limits, shown, top)] if shown else []), *others]
@@ -101,21 +111,35 @@ def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
     colour_bar(axes, mesh, "dynamic amplification")
 
 
-def _contact(seen: View, carriage: str) -> Figure:
-    force = _relative_force(seen, carriage)
+def _contact(seen: View, carriages: list[str]) -> Figure:
+    """One figure for all carriages: a curve for each, or of many, and in maps, the smallest of all."""
+    force, several = _smallest_force(seen, carriages), len(carriages) > 1
     line = "; the line is where that begins" if _has_line(seen, force) else ""
     caption = seen.caption(
         "Smallest contact force over the weight, without the last 2 % of a way towards a held end.",
+        f"Of {len(carriages)} carriages the smallest." if several and not _apart(seen, carriages) else "",
         f"Below zero the carriage would lift off{line}.",
     )
     least = float(np.nanmin(seen.plane(force)))
-    title = f"{carriage} keeps its contact, with at least {number(least, 2)} of its weight"
+    who, keeps, its = (f"{len(carriages)} carriages", "keep", "their") if several else (carriages[0], "keeps", "its")
+    title = f"{who} {keeps} {its} contact, with at least {number(least, 2)} of {its} weight"
     if least < 0.0:
-        title = f"{carriage} would lift off{_from(seen, force)}"
+        title = f"{f'The first of {who}' if several else who} would lift off{_from(seen, force)}"
     elif float(np.nanmin(force)) < 0.0:
-        title = f"{carriage} keeps its contact in this part of the sweep, and would lift off in another"
+        title = f"{who} {keeps} {its} contact in this part of the sweep, and would lift off in another"
     height = 3.4 if seen.y is not None else 2.8
-    return draw(f"contact-{carriage}", title, caption, height, partial(_draw_contact, seen, carriage))
+    name = "contact" if several else f"contact-{who}"
+    return draw(name, title, caption, height, partial(_draw_contact, seen, carriages))
+
+
+def _apart(seen: View, carriages: list[str]) -> bool:
+    """Whether each carriage has a curve of its own."""
+    return seen.y is None and not seen.is_sampled and len(carriages) <= MOST_CURVES
+
+
+def _smallest_force(seen: View, carriages: list[str]) -> Any:
+    """Of all carriages the smallest contact force over the weight."""
+    return reduce(np.fmin, (_relative_force(seen, carriage) for carriage in carriages))
 
 
 def _from(seen: View, force: Any) -> str:
@@ -140,11 +164,16 @@ def _has_line(seen: View, force: Any) -> bool:
     return bool(on_grid and known.size and known.min() < 0.0 < known.max())
 
 
-def _draw_contact(seen: View, carriage: str, drawing: Drawing) -> None:
-    force = _relative_force(seen, carriage)
+def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
+    force = _smallest_force(seen, carriages)
     axes = drawing.subplots()
-    if seen.y is None:
+    if len(carriages) > 1 and _apart(seen, carriages):
+        each = [(name, seen.curves(_relative_force(seen, name))) for name in carriages]
+        draw_curves(axes, seen, [curve._replace(label=name) for name, (curve,) in each])
+        legend_beside(axes, "carriage")
+    elif seen.y is None:
         draw_curves(axes, seen, seen.curves(force))
+    if seen.y is None:
         zero_line(axes)
         along_axis(axes, seen)
         axes.set_ylabel("smallest contact force / weight")
