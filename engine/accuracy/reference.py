@@ -133,7 +133,8 @@ def converge(
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, Marches(grid, values, levels), share)
-    pushes_along = any(carriage.pushes_along for carriage in asked.study.carriage.values())
+    along = any(carriage.pushes_along for carriage in asked.study.carriage.values())
+    slowly = along and not levels.numerics[0].static_correction
     now, spent = march(np.arange(values.size), 0)
     found = Converged(
         now,
@@ -153,7 +154,7 @@ def converge(
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
         remaining = left_over(apart, change[:, active])
-        if pushes_along:
+        if slowly:
             remaining = np.maximum(remaining, uncorrected(apart, change[:, active]))
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
@@ -186,8 +187,8 @@ def left_over(change: Array, before: Array) -> Array:
 
 
 def uncorrected(change: Array, before: Array) -> Array:
-    """(R, V) what is left of forces along a track, of which no exact static response is added: with twice the modes
-    half of their error stays, so that as much as the change is left; half of the one before it where a level happened
+    """(R, V) what is left of forces along a track to which no exact static response is added: with twice the modes half
+    of their error stays, so that as much as the change is left; half of the one before it where a level happened
     to bring none of the modes that matter. One change alone (NaN before it) tells nothing."""
     return np.where(np.isinf(change), np.nan, np.maximum(change, 0.5 * before))
 

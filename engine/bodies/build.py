@@ -31,5 +31,5 @@ def _read_at(body: Body, spots: Spots) -> ModalBody:
     found = body.read_at(tuple((name, spot) for name, spot in spots if spot.point is None))
     if found.points is None:
         return found
-    at_points = {name: gauge_at(found.points, f"point.{spot.point}") for name, spot in spots if spot.point is not None}
+    at_points = {name: gauge_at(found, f"point.{spot.point}") for name, spot in spots if spot.point is not None}
     return replace(found, gauges={**found.gauges, **at_points}) if at_points else found

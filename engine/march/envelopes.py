@@ -14,13 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.march.tables import SceneTables
+from engine.model.attachment import place
 from engine.observation.readings import Sensor
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import Direction
     from engine.march.tables import Missed, SegmentTable
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
+    from engine.model.ties import Attachment
     from engine.model.timeline import Segment
     from engine.scene.study import Study
 
@@ -36,21 +39,22 @@ SAME_PLACE = 1e-9  # of a length: places that are the same
 class Places(Sensor):
     """All places (X,) m of an envelope that one march watches, whose influence lines are evaluated together.
 
-    known: the lines (X, S) by the array of the loads' places, as long as tables are built.
+    known: the lines (X, S) by the array of the loads' places and their direction, as long as tables are built.
     """
 
     every: Array
-    known: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    known: dict[tuple[int, Direction], tuple[Array, Array]] = field(default_factory=dict)
 
     def places(self, along: Along) -> Array:
         """(X, 1), to be broadcast against loads."""
         return self.every[:, None]
 
-    def lines(self, model: SceneModel, along: Along, loaded: Array) -> Array:
-        """(X, S) static readings per unit force at places of the track (S,)."""
-        found = self.known.get(id(loaded))
+    def lines(self, model: SceneModel, along: Along, attachment: Attachment, loaded: Array) -> Array:
+        """(X, S) static readings per unit force where an attachment holds its track, at places (S,)."""
+        key = id(loaded), attachment.direction
+        found = self.known.get(key)
         if found is None:
-            found = self.known[id(loaded)] = (loaded, self._full(model, along, loaded))
+            found = self.known[key] = (loaded, self._full(model, along, attachment))
         return found[1]
 
 
@@ -61,10 +65,11 @@ class Place(Sensor):
     number: int
     together: Places
 
-    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
+    def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
+        loaded = place(attachment, along)
         if isinstance(loaded, str) or loaded.size == 1:
-            return super()._full(model, along, loaded)
-        return np.asarray(self.together.lines(model, along, loaded)[self.number])
+            return super()._full(model, along, attachment)
+        return np.asarray(self.together.lines(model, along, attachment, loaded)[self.number])
 
 
 @dataclass(eq=False)
@@ -85,8 +90,8 @@ class EnvelopeTables(SceneTables):
 
     def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
         found = super()._build(segments, missed)
-        for place in self.places:
-            place.together.known.clear()
+        for one in self.places:
+            one.together.known.clear()
         return found
 
 

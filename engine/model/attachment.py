@@ -15,8 +15,9 @@ from engine.model.ties import Attachment
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
-    from engine.model.scene_model import BodyPart, SceneModel
+    from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
+    from engine.model.ties import AlongTie
 
 
 def holds(attachment: Attachment, along: Along) -> bool:
@@ -44,7 +45,7 @@ def shape_derivatives(model: SceneModel, attachment: Attachment, along: Along, h
     if attachment.rider is None:
         return attachment.fixed_row(modal).copy()[None, None]
     way = along[attachment.rider]
-    found = way.shapes(modal, highest)
+    found = way.shapes(modal, highest, attachment.direction)
     return found if way.here is None else np.where(way.here[:, None], found, 0.0)
 
 
@@ -57,7 +58,8 @@ def modal_flexibility_between(model: SceneModel, one: Attachment, other: Attachm
 
 def residual_flexibility(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
     """(S or 1,) what they miss of it."""
-    whole = model.bodies[one.body].modal.flexibility_between(place(one, along), place(other, along))
+    places, directions = (place(one, along), place(other, along)), (one.direction, other.direction)
+    whole = model.bodies[one.body].modal.flexibility_between(*places, directions)
     for attachment in (one, other):
         if attachment.rider is not None and (here := along[attachment.rider].here) is not None:
             whole = np.where(here, whole, 0.0)
@@ -81,31 +83,41 @@ def tie_shapes(model: SceneModel, ties: Sequence[int], along: Along) -> Array:
                 shapes = attachment.factor * rows(model, attachment, along)
                 found[:, model.bodies[attachment.body].modes, place] += shapes
         if r >= model.first_push:
-            carriage = model.pushes[r - model.first_push].carriage
-            part, way = model.bodies[model.carriages[carriage].body], along[carriage]
-            on = way.active if way.here is None else way.here[:, None]
-            found[:, part.modes, place] = np.where(on, along_shapes(part, way.s)[0], 0.0)
+            for number, push in enumerate(model.corrected):
+                if number == r - model.first_push:
+                    found[:, model.first_residual + number, place] = residual_mode(model, push, along)
         elif r >= model.first_spring and (mode := model.springs[r - model.first_spring].mode) is not None:
             found[:, mode, place] = -1.0
     return found
 
 
-def along_shapes(part: BodyPart, s: Array, highest: int = 0) -> Array:
-    """(highest + 1, S, N) motion of a body's track along itself, and its derivatives."""
-    assert part.modal.along is not None  # checked
-    return part.modal.along.derivatives(s, range(highest + 1))
+def residual_mode(model: SceneModel, push: AlongTie, along: Along, missed: Array | None = None) -> Array:
+    """(S,) what the residual mode of a push moves its mass by, kg^(-1/2); missed: the flexibility that the kept modes
+    miss there, where it is known.
+
+    A force along the track at s moves that place by R F besides the kept modes, R their residual flexibility, and its
+    mass by as much: F = -m (s'' + D2 u + (R F)''). So there is one more mode for every push, of shape omega R^(1/2) at
+    its mass and nowhere else. Its own inertia, 1/(R omega^2), is one that modes above omega have too, and keeps light
+    masses from swinging faster than these.
+    """
+    [attachment] = push.attachments
+    if missed is None:
+        missed = residual_flexibility(model, attachment, attachment, along)
+    return np.asarray(model.residual_omega(push) * np.sqrt(np.maximum(missed, 0.0)))
 
 
 def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
     """(S, ties, ties) flexibility that the kept modes miss between the contacts of bodies that ride and some ties, by
-    their numbers, m/N; (0, 0, 0) where there are none, or no static correction."""
+    their numbers, and of pushes along tracks at themselves, m/N; (0, 0, 0) where there are none, or no static
+    correction."""
     springs = dict(enumerate(model.springs, start=model.first_spring))
     felt = [place for place, r in enumerate(ties) if r in springs and springs[r].held and not springs[r].rigid]
-    if not felt or not model.numerics.static_correction:
+    pushes = [place for place, r in enumerate(ties) if r >= model.first_push]
+    if not (felt or pushes) or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))
     found, known = np.zeros((along[0].s.size, ties.size, ties.size)), dict[tuple[Attachment, Attachment], Array]()
-    for r in felt:
-        for s in range(ties.size):
+    for r in (*felt, *pushes):
+        for s in [r] if r in pushes else range(ties.size):
             if s in felt and s < r:
                 found[:, r, s] = found[:, s, r]
                 continue

@@ -53,8 +53,8 @@ class BodyPart:
 @dataclass(frozen=True, eq=False)
 class SceneModel:
     """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
-    them. numerics: what it is computed with. contacts: the ways of the contacts of bodies that ride. swept: keys of
-    numbers that differ from variant to variant."""
+    them, then what pushes along tracks adds. numerics: what it is computed with. contacts: the ways of the contacts of
+    bodies that ride. swept: keys of numbers that differ from variant to variant."""
 
     study: Study
     numerics: Numerics
@@ -78,10 +78,25 @@ class SceneModel:
 
     @cached_property
     def omega(self) -> Array:
-        """(N,) natural frequencies of all bodies, rad/s, and 0 for every sprung mass and for the coordinate that stays
-        1, which is there where something pushes along its track."""
-        others = len(self.sprung) + bool(self.pushes)
-        return np.concatenate([*(part.modal.omega for part in self.bodies), np.zeros(others)])
+        """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual modes, and 0 for
+        the coordinate that stays 1, which is there where something pushes along its track."""
+        sprung, constant = np.zeros(len(self.sprung)), np.zeros(int(bool(self.pushes)))
+        bodies, residual = (part.modal.omega for part in self.bodies), [self.residual_omega(r) for r in self.corrected]
+        return np.concatenate([*bodies, sprung, residual, constant])
+
+    @property
+    def corrected(self) -> tuple[AlongTie, ...]:
+        """The pushes along tracks that have a residual mode (`attachment.residual_mode`)."""
+        return self.pushes if self.numerics.static_correction else ()
+
+    def residual_omega(self, push: AlongTie) -> float:
+        """The frequency of its residual mode, rad/s: that of the highest mode kept, which asks for no smaller steps."""
+        return float(self.bodies[push.body].modal.omega[-1])
+
+    @property
+    def first_residual(self) -> int:
+        """Number of the first residual mode among all modes."""
+        return self.body_modes + len(self.sprung)
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:
@@ -149,14 +164,13 @@ class SceneModel:
 
     @cached_property
     def attachments(self) -> tuple[tuple[Attachment, ...], ...]:
-        """Where every tie acts on the bodies across their tracks."""
-        ties: tuple[CarriageTie | DamperTie | SpringTie, ...] = (*self.carriages, *self.dampers, *self.springs)
-        pushes: list[tuple[Attachment, ...]] = [() for _ in self.pushes]
-        return (*(tie.attachments for tie in ties), *pushes)
+        """Where every tie acts on the bodies."""
+        ties: list[CarriageTie | DamperTie | SpringTie | AlongTie] = [*self.carriages, *self.dampers]
+        return tuple(tie.attachments for tie in (*ties, *self.springs, *self.pushes))
 
     def is_pushed(self, body: int) -> bool:
         """Whether the inertia of a carriage acts along the track of a body."""
-        return any(self.carriages[push.carriage].body == body for push in self.pushes)
+        return any(push.body == body for push in self.pushes)
 
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
@@ -332,7 +346,7 @@ def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie]) -> I
                     expected="a motion without jumps of speed",
                     remedy="turn > 0 of an out-and-back, or inertia_along = false",
                 )
-            yield AlongTie(number, numerics.fidelity != "mass-without-convective")
+            yield AlongTie(number, tie.body, numerics.fidelity != "mass-without-convective")
 
 
 def _standing(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
-    from engine.bodies.modal.modal_body import ModalBody
+    from engine.bodies.modal.modal_body import Direction, ModalBody
     from engine.model.rider import Rider
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Segment, Timeline
@@ -36,7 +36,7 @@ class StationPath:
     active: bool
     here: NDArray[np.bool_] | None = None
     highest: int = 0
-    _shapes: dict[int, Array] = field(default_factory=dict)
+    _shapes: dict[tuple[int, Direction], Array] = field(default_factory=dict)
 
     @property
     def on(self) -> NDArray[np.bool_]:
@@ -47,12 +47,12 @@ class StationPath:
         """(S, N) mode shapes of its body along the way."""
         return np.asarray(self.shapes(body, derivative)[derivative])
 
-    def shapes(self, body: ModalBody, highest: int) -> Array:
-        """(``highest`` + 1 or more, S, N) the same with their derivatives, evaluated together once."""
-        found = self._shapes.get(id(body))
+    def shapes(self, body: ModalBody, highest: int, direction: Direction = "across") -> Array:
+        """(``highest`` + 1 or more, S, N) the same in a direction with their derivatives, evaluated together once."""
+        found = self._shapes.get((id(body), direction))
         if found is None or len(found) <= highest:
-            found = body.shape_derivatives(self.s, range(max(highest, self.highest) + 1))
-            self._shapes[id(body)] = found
+            found = body.shapes_in(direction).derivatives(self.s, range(max(highest, self.highest) + 1))
+            self._shapes[id(body), direction] = found
         return found
 
 

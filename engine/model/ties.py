@@ -10,7 +10,7 @@ import numpy as np
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.bodies.modal.modal_body import ModalBody
+    from engine.bodies.modal.modal_body import Direction, ModalBody
     from engine.model.rider import Rider
     from engine.scene.variants import SpringKeys
 
@@ -20,13 +20,14 @@ Inertia = Literal["force", "mass", "mass-without-convective"]
 
 @dataclass(frozen=True)
 class Attachment:
-    """A place where a tie acts on a body with ``factor`` times its force: where a rider is (its number), or a fixed
-    place of the body's track (m) or a point of it (by name)."""
+    """A place where a tie acts on a body with ``factor`` times its force: where a rider is (its number), in a direction
+    there, or a fixed place of the body's track (m) or a point of it (by name)."""
 
     factor: float
     body: int
     rider: int | None = None
     at: float | str = 0.0
+    direction: Direction = "across"
 
     @property
     def unit(self) -> Attachment:
@@ -117,11 +118,18 @@ class DamperTie:
 
 @dataclass(frozen=True, eq=False)
 class AlongTie:
-    """The inertia of a carriage (its number) along its track: F = -m (s'' + D2 u), u the track's motion along itself.
+    """The inertia of a carriage (its number) along the track of a body: F = -m (s'' + D2 u), u the track's motion along
+    itself.
 
     What the motion prescribes, s'', is m per step squared for every lane alike: the rate at which a coordinate that
     stays 1 enters the tie's kinematics. convected: whether D2 has its convective terms.
     """
 
     carriage: int
+    body: int
     convected: bool
+
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """Where its force acts."""
+        return (Attachment(1.0, self.body, self.carriage, direction="along"),)

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
-from engine.model.attachment import along_shapes, holds, residual, shape_derivatives
+from engine.model.attachment import holds, residual, residual_mode, shape_derivatives
 from engine.model.attachment import rows as shape_rows
+from engine.model.station_path import StationPath
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.kernels.layout import Alpha, Newmark
     from engine.model.scene_model import SceneModel
-    from engine.model.station_path import Along, StationPath
-    from engine.model.ties import AlongTie, Attachment, SpringTie
+    from engine.model.station_path import Along
+    from engine.model.ties import Attachment, SpringTie
     from engine.model.timeline import Segment
 
 
@@ -64,6 +65,7 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
     stations = along[0].s.size
     rows, drive = np.zeros((stations, model.omega.size, ties.size, 4)), np.zeros((stations, ties.size))
     level = np.zeros_like(drive)
+    missed = residual(model, along, ties) if missed is None else missed
     for place, r in enumerate(ties):
         for attachment in model.attachments[r]:
             if holds(attachment, along):
@@ -72,9 +74,12 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 first = model.bodies[attachment.body].modes.start
                 add_attachment(rows, place, first, attachment.factor, shapes, motion.factors)
         if r >= model.first_push:
-            push = model.pushes[r - model.first_push]
-            if along[push.carriage].active:
-                _add_push(rows, model, place, push, along[push.carriage])
+            number = int(r) - model.first_push
+            way = along[model.pushes[number].carriage]
+            rows[:, -1, place, CURVE] = np.where(way.on, way.dds, 0.0)
+            if number < len(model.corrected):
+                own = residual_mode(model, model.corrected[number], along, missed[:, place, place])
+                rows[:, model.first_residual + number, place, FORCE] = own
         elif r >= model.first_spring:
             spring = model.springs[r - model.first_spring]
             if spring.mode is not None:
@@ -85,7 +90,7 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
         elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
             drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
-    return TieRows(ties, rows, drive, level, residual(model, along, ties) if missed is None else missed)
+    return TieRows(ties, rows, drive, level, missed)
 
 
 def closed(model: SceneModel, found: TieRows, scheme: Newmark | Alpha) -> Ties:
@@ -103,15 +108,6 @@ def closed(model: SceneModel, found: TieRows, scheme: Newmark | Alpha) -> Ties:
 def tabulate_ties(model: SceneModel, along: Along, scheme: Newmark | Alpha) -> Ties:
     """All ties along a segment."""
     return closed(model, tie_rows(model, along, np.arange(model.ties)), scheme)
-
-
-def _add_push(rows: Array, model: SceneModel, r: int, push: AlongTie, way: StationPath) -> None:
-    """Rows of a push along the track: those of a mass, by the track's motion along itself, and what is prescribed."""
-    part, stations = model.bodies[model.carriages[push.carriage].body], way.s.size
-    motion = np.stack([np.zeros(stations), 2.0 * way.ds, way.dds, way.ds**2]) if push.convected else np.zeros((4, 0))
-    shapes = np.where(way.on[:, None], along_shapes(part, way.s, 2 * push.convected), 0.0)
-    add_attachment(rows, r, part.modes.start, 1.0, shapes, motion)
-    rows[:, -1, r, CURVE] = way.dds
 
 
 def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
@@ -138,7 +134,9 @@ def _motion(model: SceneModel, r: int, attachment: Attachment, along: Along) -> 
     of a damper A = phi, B = s' phi' (mechanics section 4)."""
     stations, number = along[0].s.size, r - model.first_spring
     way = None if attachment.rider is None else along[attachment.rider]
-    if number < 0:
+    if r >= model.first_push:
+        convected, damped = model.pushes[r - model.first_push].convected, False
+    elif number < 0:
         convected = r < len(model.carriages) and model.carriages[r].inertia == "mass"
         damped = r >= len(model.carriages)
     else:
@@ -211,11 +209,13 @@ def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array
         place = np.clip(rider.path(at, segment.start, segment.end).S, 0.0, rider.length)
         strike = next((strike for strike in segment.strikes if strike.rider == owner), None)
         convected = carriage.inertia == "mass" if push is None else push.convected
+        moves = part.modal.shapes_in("across" if push is None else "along").derivatives(place, range(2))
+        shape[number, part.modes], slope[number, part.modes] = moves[:, 0]
         if push is None:
-            shape[number, part.modes], slope[number, part.modes] = part.modal.shape_derivatives(place, range(2))[:, 0]
             sag_slope[number] = model.sag(carriage.body, place, 1)[0]
-        else:
-            shape[number, part.modes], slope[number, part.modes] = along_shapes(part, place, 1)[:, 0]
+        elif push in model.corrected:
+            here = (StationPath(place, np.zeros(1), np.zeros(1), True),) * len(model.riders)
+            shape[number, model.first_residual + model.corrected.index(push)] = residual_mode(model, push, here)[0]
         if strike is not None:
             arrives[number] = float(strike.arrives or push is not None)
             speed[:, number] = convected * strike.speed / time_scale

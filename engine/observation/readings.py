@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from engine.model.attachment import along_shapes, holds, place
+from engine.model.attachment import holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import Along, StationPath
 from engine.model.ties import Attachment
@@ -114,7 +114,7 @@ class Sensor:
         """(1 or stations,) static reading per unit force where an attachment holds its body."""
         if not model.numerics.static_correction:
             return self._kept(model, along, shape_rows(model, attachment, along))
-        whole = self._full(model, along, place(attachment, along))
+        whole = self._full(model, along, attachment)
         here = None if attachment.rider is None else along[attachment.rider].here
         return whole if here is None else np.where(here, whole, 0.0)
 
@@ -181,14 +181,20 @@ class Sensor:
         """What a derivative of w is multiplied by."""
         return self.reads.factor(self._modal(model))
 
-    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
-        """Static reading per unit force at places of the track (m), or at a point (its name)."""
-        sections = self._sections(model)
+    def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
+        """Static reading per unit force where an attachment holds its body."""
+        sections, loaded, modal = self._sections(model), place(attachment, along), self._modal(model)
         if isinstance(loaded, str):
             return self._under_point(model, along, loaded)
-        if sections is not None:
+        if attachment.direction == "along":
+            assert modal.along is not None
+            if sections is not None:
+                return modal.along.section_at(self.quantity, self.places(along), loaded)
+            line = modal.along.influence_at(self.places(along), loaded, self.reads.derivative)
+        elif sections is not None:
             return sections.influence_at(self.quantity, self.places(along), loaded)
-        line = self._modal(model).influence_at(self.places(along), loaded, self.reads.derivative)
+        else:
+            line = modal.influence_at(self.places(along), loaded, self.reads.derivative)
         return np.asarray(self._factor(model) * line)
 
     def _under_point(self, model: SceneModel, along: Along, point: str) -> Array:
@@ -263,15 +269,12 @@ class SpotSensor(Sensor):
         return bool(not modal.rigid_modes and self.largest_influence(model, places) <= SILENT * usual)
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:
-        modal, gauge = self._modal(model), self._gauge(model)
-        found = np.abs([*gauge.along(places), *gauge.points.values()]).max()
-        if not model.is_pushed(self.body):
-            return float(found)
-        pushed = along_shapes(model.bodies[self.body], places)[0] * modal.modal_flexibility @ gauge.row
-        return float(max(found, np.abs(pushed).max()))
+        gauge = self._gauge(model)
+        pushed = gauge.influence(places, "along") if model.is_pushed(self.body) else np.zeros(1)
+        return float(np.abs([*gauge.along(places), *gauge.points.values(), *pushed]).max())
 
-    def _full(self, model: SceneModel, along: Along, loaded: Array | str) -> Array:
-        return self._gauge(model).influence(loaded)
+    def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
+        return self._gauge(model).influence(place(attachment, along), attachment.direction)
 
     def _gauge(self, model: SceneModel) -> Gauge:
         return self._modal(model).gauges[self.name]

@@ -110,7 +110,7 @@ class FrameTrack:
         if quantity == "displacement":
             found = self.track.within(place, load)
         else:
-            found = self._sum(quantity, self.track.at(place)[0], held_forces(self.track, place, load))
+            found = self._sum(quantity, self.track.at(place)[0], held_forces(self.track, place, load, self.track))
         return found.reshape(np.broadcast_shapes(x.shape, s.shape))
 
     def inside(self, s: Array) -> tuple[Array, Array]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,9 +12,10 @@ import numpy as np
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
 from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, loads_everywhere
 from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.pushes import PushedLine, PushStatics, TrackAlong
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import along_shapes, mode_forces, track_shapes
-from engine.bodies.frame.statics import TrackStatics, track_statics
+from engine.bodies.frame.statics import TrackInfluence, TrackStatics, responses, track_statics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Spots
@@ -69,16 +70,29 @@ def _whole(content: Content) -> _Whole:
     return _Whole(assembly, flexibility, track, ends, statics)
 
 
+@lru_cache(maxsize=8)
+def _push_statics(content: Content) -> PushStatics:
+    """What forces along its track do."""
+    whole = _whole(content)
+    push = PushedLine.of(whole.track)
+    patterns, moved = responses(push, whole.ends, whole.assembly, whole.flexibility)
+    across = replace(whole.statics, loads=push, patterns=patterns, flexibility=moved)
+    return PushStatics(TrackInfluence(push, push, patterns, moved), across)
+
+
 def _reduced(frame: Frame, spots: Spots) -> ModalBody:
-    whole = _whole(Content.of(frame, without=ABOUT_MODES))
+    content = Content.of(frame, without=ABOUT_MODES)
+    whole = _whole(content)
     assembly, track, statics = whole.assembly, whole.track, whole.statics
     omega, moved, shapes = _kept(frame, whole)
     masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
-    read = Read(frame, assembly, whole.flexibility, statics, whole.ends, omega, shapes)
+    pushes = partial(_push_statics, content)
+    read = Read(frame, assembly, whole.flexibility, statics, pushes, whole.ends, omega, shapes)
     numbers, everywhere = loads_everywhere(frame, assembly)
     loads = numbers, everywhere[assembly.free]
+    points = frame_points(read, loads, sections) if numbers else None
     bending = track.bending
     return ModalBody(
         length=frame.length,
@@ -92,8 +106,8 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         statics=statics,
         gravity_share=float(track.direction @ gravity),
         sections=sections,
-        points=frame_points(read, loads, sections) if numbers else None,
-        along=along_shapes(track, moved, forces),
+        points=points,
+        along=TrackAlong(along_shapes(track, moved, forces), forces, points, pushes),
         gauges={name: frame_gauge(read, spot, (numbers, everywhere)) for name, spot in spots},
     )
 

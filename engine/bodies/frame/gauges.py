@@ -8,6 +8,7 @@ one element, that bends between its ends besides.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,11 +17,12 @@ import numpy as np
 
 from engine.bodies.frame.assembly import MASSES, Assembly, spring_rows
 from engine.bodies.frame.geometry import DIRECTIONS, unit
+from engine.bodies.frame.pushes import PushStatics, moved_along
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics
 from engine.bodies.frame.supports import frame_support
-from engine.bodies.frame.track import TrackBeams, TrackPoints, elements_of, line_of
+from engine.bodies.frame.track import Line, TrackBeams, TrackPoints, elements_of, line_of
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
 from engine.bodies.modal.modal_body import Array, Gauge, Points
@@ -36,6 +38,7 @@ class Read(NamedTuple):
     assembly: Assembly
     flexibility: Flexibility
     statics: TrackStatics
+    pushes: Callable[[], PushStatics]
     ends: TrackPoints
     omega: Array
     shapes: Array
@@ -80,8 +83,9 @@ class FrameSpot:
         first, second = (ends.loads(part, element + end, size)[:, 0] for end, part in enumerate(acts))
         return np.asarray((first + second)[self.assembly.free])
 
-    def within(self, s: Array) -> Array:
-        """(S,) m/N: what a unit force at s on the track adds where it bends the spot's own element."""
+    def within(self, s: Array, loads: Line | None = None) -> Array:
+        """(S,) m/N: what a unit force at s on the track adds where it bends the spot's own element; loads: the line
+        whose force it is, that of the track across unless given."""
         if self.spot.member is None:
             return np.zeros(len(s))
         beams, _ = self.line
@@ -92,7 +96,7 @@ class FrameSpot:
             return np.zeros(len(s))
         j = here[0]
         place = self.track.places[j] + (beams.beams.length[element] - x if turned[j] else x)
-        held = self.track.held_parts(np.full(len(s), place), s, 0)
+        held = (self.track if loads is None else loads).held_parts(np.full(len(s), place), s, 0)
         return np.asarray((self.track.axes[j] @ self.direction) @ held[:3])
 
     @property
@@ -131,11 +135,16 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
         points={name: float(loads[assembly.free, number] @ moved[:, 0]) for name, number in names.items()},
         rigid=statics.rigid,
         weight=weight,
+        pushed=partial(_pushed, read.pushes, response, place),
     )
 
 
 def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -> Array:
     return statics.under_response(response, s) + place.within(s)
+
+
+def _pushed(pushes: Callable[[], PushStatics], response: Array, place: FrameSpot, s: Array) -> Array:
+    return moved_along(pushes, response, s) + place.within(s, pushes().own.loads)
 
 
 def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:

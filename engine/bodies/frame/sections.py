@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from engine.bodies.frame.elements import deflection_shapes, stiffness
 from engine.bodies.frame.shapes import FORCES, ModeForces
 from engine.bodies.frame.statics import TrackStatics, is_every_pair
-from engine.bodies.frame.track import TrackBeams, track_places
+from engine.bodies.frame.track import Line, TrackBeams, track_places
 from engine.bodies.modal.modal_body import Array, refuse_loose
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
@@ -56,7 +56,7 @@ class TrackSections:
         place, load = places.reshape(-1), loads.reshape(-1)
         element, at = track.at(place)
         moved = self.statics.moved(element, load)
-        forces = forces_from_ends(track, element, at, moved) + held_forces(track, place, load)
+        forces = forces_from_ends(track, element, at, moved) + held_forces(track, place, load, self.statics.loads)
         return np.asarray(np.sum(section_weights(track, quantity)[element] * forces, axis=1).reshape(places.shape))
 
     def _lines(self, quantity: str, x: Array, s: Array) -> Array:
@@ -68,7 +68,7 @@ class TrackSections:
         ends = forces_from_ends(track, element[each], at[each], np.tile(np.eye(12), (len(x), 1)))
         found = self.statics.lines(element, np.sum(weights[each] * ends, axis=1).reshape(-1, 12), s)
         i, j = np.nonzero(element[:, None] == track.at(s)[0])
-        found[i, j] += np.sum(weights[i] * held_forces(track, x[i], s[j]), axis=1)
+        found[i, j] += np.sum(weights[i] * held_forces(track, x[i], s[j], self.statics.loads), axis=1)
         return found
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
@@ -124,11 +124,11 @@ def forces_from_ends(track: TrackBeams, element: Counts, x: Array, moved: Array)
     return found
 
 
-def held_forces(track: TrackBeams, x: Array, s: Array) -> Array:
-    """(S, 6) section forces of an element with held ends under the unit load at s, from `TrackBeams.within`."""
+def held_forces(track: TrackBeams, x: Array, s: Array, loads: Line) -> Array:
+    """(S, 6) section forces of an element with held ends under the unit load of a line at s, from `held_parts`."""
     element, _ = track.at(x)
     beams = track.beams.part(element)
-    along, y, z = track.held_parts(x, s, 1), track.held_parts(x, s, 2), track.held_parts(x, s, 3)
+    along, y, z = (loads.held_parts(x, s, derivative) for derivative in (1, 2, 3))
     found = np.zeros((len(x), FORCES))
     found[:, 0], found[:, 3] = along[0] * beams.axial, along[3] * beams.torsion
     found[:, 1], found[:, 2] = -beams.bending_y * z[1], -beams.bending_z * z[2]

@@ -7,10 +7,10 @@ direction. What it does to the ends of its element, and what the deflection ther
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +24,27 @@ from results_schema.arrays import Counts
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
 
+Bent = Callable[[Array, Array, NDArray[np.bool_], Array, Array, Array, int], Array]
 Members = Sequence[tuple[str, bool]]  # in a row, with whether each runs against it
 _END = 1e-12  # lengths before the end of a track that are its end
 _FELT = 1e-6  # part of a unit load along an axis that counts
+
+
+class Line(Protocol):
+    """A line of elements on which loads act in one way, and whose motion is read in that way; as `TrackBeams`."""
+
+    @property
+    def places(self) -> Array: ...
+
+    def at(self, s: Array) -> tuple[Counts, Array]: ...
+
+    def to_ends(self, s: Array, derivative: int = 0) -> Array: ...
+
+    def where_ends_move(self, ends: Array, s: Array, derivative: int = 0) -> Array: ...
+
+    def within(self, x: Array, s: Array, derivative: int = 0, loads: Line | None = None) -> Array: ...
+
+    def held_parts(self, x: Array, s: Array, derivative: int) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,18 +109,21 @@ class TrackBeams:
         moved = np.concatenate([ends[element], ends[element + 1]], axis=1)
         return np.asarray(np.sum(self.to_ends(s, derivative) * moved, axis=1))
 
-    def within(self, x: Array, s: Array, derivative: int = 0) -> Array:
+    def within(self, x: Array, s: Array, derivative: int = 0, loads: Line | None = None) -> Array:
         """(S,) d^j/dx^j of the deflection at x of an element with held ends under a unit load at s, pair by pair.
 
-        Zero where both stand on different elements. At x = s jumps are taken from the right.
+        loads: the line whose load it is, its own unless given. Zero where both stand on different elements. At x = s
+        jumps are taken from the right.
         """
         element, _ = self.at(x)
         along, across_y, across_z = (part[element] for part in self.parts)
-        held = self.held_parts(x, s, derivative)
+        held = (self if loads is None else loads).held_parts(x, s, derivative)
         return np.asarray(along * held[0] + across_y * held[1] + across_z * held[2] + self.torque[element] * held[3])
 
-    def held_parts(self, x: Array, s: Array, derivative: int) -> Array:
-        """(4, S) the same apart: extension, bending along y and along z (m/N), and twist (1/N)."""
+    def held_parts(self, x: Array, s: Array, derivative: int, bent: Bent | None = None) -> Array:
+        """(4, S) the same apart: extension, bending along y and along z (m/N), and twist (1/N). bent: by what, a force
+        unless given."""
+        bent = _held_bending if bent is None else bent
         element, at = self.at(x)
         other, load = self.at(s)
         beams = self.beams.part(element)
@@ -111,8 +132,8 @@ class TrackBeams:
         bar = _held_bar(at, load, right, beams.length, derivative)
         found = [
             along / beams.axial * bar,
-            across_y * _held_bending(at, load, right, beams.length, beams.bending_y, beams.phi_y, derivative),
-            across_z * _held_bending(at, load, right, beams.length, beams.bending_z, beams.phi_z, derivative),
+            across_y * bent(at, load, right, beams.length, beams.bending_y, beams.phi_y, derivative),
+            across_z * bent(at, load, right, beams.length, beams.bending_z, beams.phi_z, derivative),
             self.torque[element] / beams.torsion * bar,
         ]
         return np.where(element == other, np.array(found), 0.0)
@@ -257,6 +278,21 @@ def _held_bending(
     else:
         found += u / bending if derivative == 2 else np.where(right, 1.0 / bending, 0.0)
     return found
+
+
+def held_turning(
+    x: Array, s: Array, right: NDArray[np.bool_], length: Array, bending: Array, phi: Array, derivative: int
+) -> Array:
+    """Its derivative by s: the deflection of a clamped element under a torque, 1/N."""
+    lever, soft = length - s, phi * length**2 / (12.0 * bending)
+    back = deflection_shapes(x, length, phi, derivative)
+    found: Array = back[2] * (lever**2 / (2.0 * bending) - soft) + back[3] * lever / bending
+    if derivative == 0:
+        u = np.where(right, x - s, 0.0)
+        return found - u**2 / (2.0 * bending) + np.where(right, soft, 0.0)
+    if derivative == 1:
+        return found - np.where(right, x - s, 0.0) / bending
+    return found - np.where(right, 1.0 / bending, 0.0) if derivative == 2 else found
 
 
 def _held_bar(x: Array, s: Array, right: NDArray[np.bool_], length: Array, derivative: int) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.line import (
     SPLINE_NODES,
+    LineAlong,
     LineRecovered,
     LineShapes,
     LineStatics,
@@ -37,6 +39,7 @@ _COLUMNS = 64
 _UNFELT = 1e-9  # of the largest displacement: below it a mode does not move the track
 
 
+Along = Callable[[Array], Array]
 _Parts = tuple[Array, Any, Array, Array, Array]  # mode shapes, track's rows and slopes, own weight, points' loads
 
 
@@ -75,34 +78,62 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
     flexibility = held.flexibility
     statics = LineStatics(
         places=places,
-        flexibility=slopes @ _between(flexibility, rows) @ slopes.T,
+        flexibility=slopes @ _symmetric(_between(flexibility, rows, rows)) @ slopes.T,
         weight=slopes @ (rows.T @ flexibility.solve(pull[:, None]))[:, 0],
         rigid=flexibility.rigid.shape[1],
     )
-    along = LineShapes(places, np.ascontiguousarray(ends))
+    line = LineShapes(places, np.ascontiguousarray(ends))
     names, loads = _point_loads(body, held)
     parts = shapes, rows, slopes, pull, loads
     sections, stresses = _sections(body, held, statics, parts)
     read = [(name, _node_load(body, held, spot.node, spot.direction)) for name, spot in spots]
-    motion = node_rows(held, body.line.nodes, body.line.tangent, 0).T @ shapes  # of the track's nodes along it
+    along, pushed = _along(body, held, (statics, sections), parts, [load for _, load in read])
     found = ModalBody(
         length=body.length,
         mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
         omega=omega,
         participation=shapes.T @ pull,
-        wave_number=_wave_number(along, np.abs(shapes).max(axis=0)),
+        wave_number=_wave_number(line, np.abs(shapes).max(axis=0)),
         bending_stiffness=np.nan,
         dampers=(),
-        shapes=along,
+        shapes=line,
         statics=statics,
         gravity_share=float(unit(body.direction) @ gravity),
         sections=sections,
         points=_points(names, held, (statics, sections, stresses), parts) if names else None,
-        gauges={name: _gauge(held, statics, load, parts, names) for name, load in read},
-        along=LineShapes(places, np.stack([motion, spline_slopes(places) @ motion], axis=1).reshape(ends.shape)),
-        checks=findings(body, held, along),
+        gauges={
+            name: _gauge(held, statics, load, parts, names, partial(statics.under_response, one, derivative=0))
+            for (name, load), one in zip(read, pushed, strict=True)
+        },
+        along=along,
+        checks=findings(body, held, line),
     )
     return found, statics
+
+
+def _along(
+    body: Imported, held: HeldModel, track: tuple[LineStatics, Sections], parts: _Parts, read: list[Array]
+) -> tuple[LineAlong, Array]:
+    """Motion of the track along itself, by the smooth curve through that of its nodes, with its statics; and motions
+    along (loads, 2 P) under some loads (n,)."""
+    (statics, sections), (shapes, rows, slopes, _, loads) = track, parts
+    nodes, count = node_rows(held, body.line.nodes, body.line.tangent, 0), len(body.line.nodes)
+    spread = np.zeros((2 * count, count))
+    spread[::2], spread[1::2] = np.eye(count), spline_slopes(body.line.places)
+    told = [_told(body, held).T] if isinstance(sections, LineRecovered) else []
+    others = [sparse.csc_array(np.asarray(part)) for part in (loads, *(load[:, None] for load in read), *told)]
+    parts_of = [nodes, rows, *others]
+    ends = np.cumsum([part.shape[1] for part in parts_of])
+    moved = _between(held.flexibility, sparse.hstack(parts_of).tocsc(), nodes) @ spread.T
+    own, across, points, *more = np.split(moved, ends[:-1])
+    found = LineAlong(
+        shapes=LineShapes(body.line.places, spread @ (nodes.T @ shapes)),
+        own=replace(statics, flexibility=spread @ own),
+        across=replace(statics, flexibility=slopes @ across),
+        sections=replace(sections, response=more[-1]) if isinstance(sections, LineRecovered) else NoSections(),
+        points=dict(zip(_point_names(body), points, strict=True)),
+    )
+    return found, np.array([one[0] for one in more[: len(read)]]).reshape(len(read), 2 * count)
 
 
 def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) -> tuple[Array, Array, Array]:
@@ -149,14 +180,18 @@ def _rank(mass: Any) -> int:
     return int(np.count_nonzero(values > 1e-10 * values.max(initial=0.0)))
 
 
-def _between(flexibility: Flexibility, rows: Any) -> Array:
-    """(m, m) rows^T G rows."""
-    count = rows.shape[1]
-    found = np.zeros((count, count))
-    for first in range(0, count, _COLUMNS):
+def _between(flexibility: Flexibility, rows: Any, loads: Any) -> Array:
+    """(m, k) rows^T G loads."""
+    found = np.zeros((rows.shape[1], loads.shape[1]))
+    for first in range(0, loads.shape[1], _COLUMNS):
         part = slice(first, first + _COLUMNS)
-        found[:, part] = rows.T @ flexibility.solve(rows[:, part].toarray())
-    return 0.5 * (found + found.T)
+        found[:, part] = rows.T @ flexibility.solve(loads[:, part].toarray())
+    return found
+
+
+def _symmetric(values: Array) -> Array:
+    """Without what rounding left of a difference."""
+    return 0.5 * (values + values.T)
 
 
 def _wave_number(along: LineShapes, size: Array) -> Array:
@@ -179,7 +214,12 @@ def _point_loads(body: Imported, held: HeldModel) -> tuple[dict[str, int], Array
         if not columns[:, number].any():
             what = f"node {point.node} cannot move in this direction"
             raise BadInput(what, where=f"point.{name}", expected="a free node")
-    return {f"point.{name}": number for number, name in enumerate(body.point)}, columns
+    return {name: number for number, name in enumerate(_point_names(body))}, columns
+
+
+def _point_names(body: Imported) -> list[str]:
+    """Of its points, as models know them."""
+    return [f"point.{name}" for name in body.point]
 
 
 def _node_load(body: Imported, held: HeldModel, node: Any, direction: Any) -> Array:
@@ -188,8 +228,10 @@ def _node_load(body: Imported, held: HeldModel, node: Any, direction: Any) -> Ar
     return np.asarray(node_rows(held, np.flatnonzero(held.file.nodes == node), way, 0).toarray()[:, 0])
 
 
-def _gauge(held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, names: dict[str, int]) -> Gauge:
-    """A node that a sensor reads, from its unit force (n,)."""
+def _gauge(
+    held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, names: dict[str, int], pushed: Along
+) -> Gauge:
+    """A node that a sensor reads, from its unit force (n,); pushed: as of gauges."""
     shapes, rows, slopes, pull, loads = parts
     moved = held.flexibility.solve(load[:, None])[:, 0]
     response = slopes @ (rows.T @ moved)
@@ -199,6 +241,7 @@ def _gauge(held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, na
         points={name: float(loads[:, number] @ moved) for name, number in names.items()},
         rigid=statics.rigid,
         weight=float(moved @ pull),
+        pushed=pushed,
     )
 
 
@@ -227,13 +270,7 @@ def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Par
     shapes, rows, slopes, pull, loads = parts
     if not body.recovered:
         return NoSections(), np.zeros((0, loads.shape[1]))
-    units = {"stress": 1.0, "strain": held.pressure}
-    means = [
-        held.recovery[np.array(one) - 1].mean(axis=0) / units[quantity]
-        for quantity, nodes in body.recovered.items()
-        for one in nodes
-    ]
-    told = np.array(means)
+    told = _told(body, held)
     moved = held.flexibility.solve(np.ascontiguousarray(told.T))
     sections = LineRecovered(
         statics=statics,
@@ -243,6 +280,17 @@ def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Par
         weight=moved.T @ pull,
     )
     return sections, moved.T @ loads
+
+
+def _told(body: Imported, held: HeldModel) -> Array:
+    """(K P, n) what its recovery matrix tells at the track's nodes, one quantity after the other."""
+    units = {"stress": 1.0, "strain": held.pressure}
+    means = [
+        held.recovery[np.array(one) - 1].mean(axis=0) / units[quantity]
+        for quantity, nodes in body.recovered.items()
+        for one in nodes
+    ]
+    return np.array(means)
 
 
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass

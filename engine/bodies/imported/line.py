@@ -9,7 +9,7 @@ solve with this interpolation gives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -158,6 +158,38 @@ class LineRecovered:
         at = track_places(x, float(places[-1]))
         left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
         return self.quantities.index(quantity) * len(places) + left, (at - places[left]) / np.diff(places)[left]
+
+
+@dataclass(frozen=True, eq=False)
+class LineAlong:
+    """Motion of a track along itself, and what unit forces along it do: to itself (own), to its deflection (across), to
+    stress and strain (sections) and to the points (by name: motions along, (2 P,), per unit force there)."""
+
+    shapes: LineShapes
+    own: LineStatics
+    across: LineStatics
+    sections: LineRecovered | NoSections
+    points: Mapping[str, Array]
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j psi_k/ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N)."""
+        return self.shapes.derivatives(s, orders)
+
+    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
+        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
+        return self.own.influence_at(x, s)
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
+        return self.across.influence_at(x, s, derivative)
+
+    def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """Stress or strain at `x` per unit force along at `s`, likewise."""
+        return self.sections.influence_at(quantity, x, s)
+
+    def of_point(self, name: str, s: ArrayLike) -> Array:
+        """(S,) motion of a point per unit force along at `s`, m/N."""
+        return self.own.under_response(self.points[name], s)
 
 
 def track_rows(body: Imported, held: HeldModel) -> tuple[Any, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 HELD, PROBED = 1e-9, 9
 # of the length, within which supports are one: a lever this short resists no rotation that a beam could feel
 SAME_PLACE = 1e-9
+
+
+#: In which a contact pushes on its track and feels it move: square to it as its loads act, or along it.
+Direction = Literal["across", "along"]
 
 
 class Shapes(Protocol):
@@ -35,6 +39,25 @@ class Statics(Protocol):
 
     def own_weight_deflection(self, x: ArrayLike, derivative: int) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) under the body's own weight, per unit gravity."""
+
+
+class AlongTrack(Protocol):
+    """Motion of a track along itself, and what unit forces along it do."""
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j psi_k / ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N); unit modal mass."""
+
+    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
+        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
+
+    def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """A section force, stress or strain at `x` per unit force along at `s`, likewise."""
+
+    def of_point(self, name: str, s: ArrayLike) -> Array:
+        """(S,) motion of a point per unit force along at `s`, m/N."""
 
 
 class Sections(Protocol):
@@ -121,7 +144,8 @@ class Gauge:
 
     row (N,): what every mode moves it by, kg^(-1/2); along: its motion per unit force at places (S,) of the track, m/N;
     points: the same at points, by name; weight: its motion under the body's own weight per unit gravity; rigid: number
-    of rigid-body modes; dampers: by the places of those at a support, the part of their force that it carries too.
+    of rigid-body modes; dampers: by the places of those at a support, the part of their force that it carries too;
+    pushed: as `along`, per unit force along the track, where that moves along itself.
     """
 
     row: Array
@@ -130,10 +154,16 @@ class Gauge:
     rigid: int
     weight: float
     dampers: Mapping[float | str, float] = field(default_factory=dict)
+    pushed: Callable[[Array], Array] | None = None
 
-    def influence(self, loaded: Array | str) -> Array:
-        """Its motion per unit force at places (S,) of the track, or at a point (1,); m/N."""
-        return np.array([self.points[loaded]]) if isinstance(loaded, str) else self.along(loaded)
+    def influence(self, loaded: Array | str, direction: Direction) -> Array:
+        """Its motion per unit force at places (S,) of the track in a direction, or at a point (1,); m/N."""
+        if isinstance(loaded, str):
+            return np.array([self.points[loaded]])
+        if direction == "across":
+            return self.along(loaded)
+        assert self.pushed is not None
+        return self.pushed(loaded)
 
     def own_weight(self) -> float:
         """Its motion under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
@@ -141,11 +171,14 @@ class Gauge:
         return self.weight
 
 
-def gauge_at(points: Points, name: str) -> Gauge:
-    """A sensor at a point."""
+def gauge_at(body: ModalBody, name: str) -> Gauge:
+    """A sensor at a point of a body that has such."""
+    assert body.points is not None
+    points = body.points
     between = {other: points.between(name, other) for other in points.numbers}
     weight = float(points.weight[points.numbers[name]])
-    return Gauge(points.row(name), partial(points.influence, name), between, points.rigid, weight)
+    pushed = None if body.along is None else partial(body.along.of_point, name)
+    return Gauge(points.row(name), partial(points.influence, name), between, points.rigid, weight, pushed=pushed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +199,7 @@ class ModalBody:
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
     points              places off the track; None: there are none
     gauges              places that sensors read off the track, by the sensors' names
-    along               motion of the track along itself, as `shapes`; None: it has none
+    along               motion of the track along itself, and what forces along it do; None: it has none
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     """
@@ -186,7 +219,7 @@ class ModalBody:
     sections: Sections | None = None
     points: Points | None = None
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
-    along: Shapes | None = None
+    along: AlongTrack | None = None
     checks: tuple[tuple[str, str], ...] = ()
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
@@ -241,11 +274,25 @@ class ModalBody:
         left, right = sizes[[0, -1]] <= HELD * sizes.max()
         return bool(left), bool(right)
 
-    def flexibility_between(self, one: Array | str, other: Array | str) -> Array:
-        """Deflection at one place per unit force at another one, m/N: places (S,) of the track, broadcast against each
-        other, or a point's name."""
+    def shapes_in(self, direction: Direction) -> Shapes | AlongTrack:
+        """What its modes move its track by in a direction."""
+        if direction == "across":
+            return self.shapes
+        assert self.along is not None
+        return self.along
+
+    def flexibility_between(
+        self, one: Array | str, other: Array | str, directions: tuple[Direction, Direction] = ("across", "across")
+    ) -> Array:
+        """Motion of one place in its direction per unit force at another one in its own, m/N: places (S,) of the track,
+        broadcast against each other, or a point's name."""
         if not isinstance(one, str) and not isinstance(other, str):
-            return self.influence_at(one, other)
+            if directions == ("across", "across"):
+                return self.influence_at(one, other)
+            assert self.along is not None
+            if directions == ("along", "along"):
+                return self.along.own_at(one, other)
+            return self.along.influence_at(*((one, other) if directions[1] == "along" else (other, one)))
         assert self.points is not None
         if isinstance(one, str) and isinstance(other, str):
             return np.array([self.points.between(one, other)])

@@ -80,7 +80,7 @@ def load_body(path: Path | str, modes: Modes = "auto") -> ModalBody:
 
     beams = Beams(**parts("statics.track.beams"))
     track = TrackBeams(places=arrays["place"], beams=beams, **parts("statics.track"))
-    statics = TrackStatics(track=track, rigid=rigid, **parts("statics"))
+    statics = TrackStatics(track=track, loads=track, rigid=rigid, **parts("statics"))
     sections = TrackSections(statics, ModeForces(**parts("sections.modes")))
     points = None
     if stored.points:

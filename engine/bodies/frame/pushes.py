@@ -1,0 +1,118 @@
+"""Forces along the track of a frame, as masses on it push that speed up and brake, and the motion that they feel.
+
+On the axis they stretch its elements; beside it, by a lever, they turn them too. What a force does to the ends of its
+element and what the motion along takes from them are the same numbers, so that influence lines are symmetric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from engine.bodies.frame.sections import TrackSections
+from engine.bodies.frame.shapes import AlongShapes, ModeForces
+from engine.bodies.frame.statics import TrackInfluence, TrackStatics
+from engine.bodies.frame.track import Line, TrackBeams, held_turning
+from engine.bodies.modal.modal_body import Array, Points
+from results_schema.arrays import Counts
+
+
+@dataclass(frozen=True, eq=False)
+class PushedLine:
+    """The motion of a track along itself, as `AlongShapes` has it: that of its axis, less what the slope of the axis
+    takes from a line beside it by a lever (m); and unit forces along it."""
+
+    axis: TrackBeams
+    beside: TrackBeams
+    lever: float
+
+    @classmethod
+    def of(cls, track: TrackBeams) -> PushedLine:
+        """That of a track."""
+        lever, on_axis = float(np.linalg.norm(track.offset)), np.zeros(3)
+        sideways = track.offset / lever if lever else track.direction
+        axis, beside = (replace(track, direction=way, offset=on_axis) for way in (track.axes[0, 0], sideways))
+        return cls(axis, beside, lever)
+
+    @property
+    def places(self) -> Array:
+        """(E + 1,) ends of its elements, m."""
+        return self.axis.places
+
+    def at(self, s: Array) -> tuple[Counts, Array]:
+        """(S,) elements, from the right at a joint, and places in them."""
+        return self.axis.at(s)
+
+    def to_ends(self, s: Array, derivative: int = 0) -> Array:
+        """(S, 12): d^j/ds^j of the motion along from displacements and rotations of its element's ends."""
+        return np.asarray(self.axis.to_ends(s, derivative) - self.lever * self.beside.to_ends(s, derivative + 1))
+
+    def where_ends_move(self, ends: Array, s: Array, derivative: int = 0) -> Array:
+        """(S,) d^j/ds^j of the motion along where the ends of the elements move by (E + 1, 6)."""
+        turned = self.beside.where_ends_move(ends, s, derivative + 1)
+        return np.asarray(self.axis.where_ends_move(ends, s, derivative) - self.lever * turned)
+
+    def within(self, x: Array, s: Array, derivative: int = 0, loads: Line | None = None) -> Array:
+        """(S,) d^j/dx^j of the motion along at x of an element with held ends under a unit load of a line at s."""
+        loads = self if loads is None else loads
+        stretched, turned = self.axis.within(x, s, derivative, loads), self.beside.within(x, s, derivative + 1, loads)
+        return np.asarray(stretched - self.lever * turned)
+
+    def held_parts(self, x: Array, s: Array, derivative: int) -> Array:
+        """(4, S) extension, bending and twist of such an element at x under a unit force along at s."""
+        turned = self.beside.held_parts(x, s, derivative, held_turning)
+        return np.asarray(self.axis.held_parts(x, s, derivative) - self.lever * turned)
+
+
+@dataclass(frozen=True, eq=False)
+class PushStatics:
+    """Under unit forces along a track: its motion along itself, and its deflection."""
+
+    own: TrackInfluence
+    across: TrackStatics
+
+
+@dataclass(frozen=True, eq=False)
+class TrackAlong:
+    """Motion of a frame's track along itself, and what unit forces along it do. find: its statics, which are made when
+    they are first asked for; forces: section forces of its modes; points: places off the track, if there are any."""
+
+    shapes: AlongShapes
+    forces: ModeForces
+    points: Points | None
+    find: Callable[[], PushStatics]
+
+    def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
+        """d^j psi_k/ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N)."""
+        return self.shapes.derivatives(s, orders)
+
+    @cached_property
+    def statics(self) -> PushStatics:
+        """Influence functions."""
+        return self.find()
+
+    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
+        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
+        return self.statics.own.influence_at(x, s)
+
+    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
+        return self.statics.across.influence_at(x, s, derivative)
+
+    def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
+        """A section force, stress or strain at `x` per unit force along at `s`, likewise."""
+        return TrackSections(self.statics.across, self.forces).influence_at(quantity, x, s)
+
+    def of_point(self, name: str, s: ArrayLike) -> Array:
+        """(S,) motion of a point per unit force along at `s`, m/N."""
+        assert self.points is not None
+        return self.statics.own.under_response(self.points.response[:, self.points.numbers[name]], s)
+
+
+def moved_along(find: Callable[[], PushStatics], response: Array, s: Array) -> Array:
+    """(S,) motion of the track along itself at s where its points move by `response` (6 (E + 1),)."""
+    return find().own.under_response(response, s)
