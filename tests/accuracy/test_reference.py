@@ -12,14 +12,16 @@ import studies
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import (
     DEAR,
+    STAYS,
+    STAYS_UNCORRECTED,
     Beyond,
     Converged,
     as_fixed,
     converge,
     in_full,
     is_free,
+    left_along,
     level_work,
-    uncorrected,
 )
 from engine.accuracy.results import differences, results_of
 from engine.batch.plan import make_plan
@@ -202,17 +204,21 @@ def test_a_train_is_told_about_what_it_is_off_by() -> None:
     assert ratios.size == 3 and ratios.min() >= 1.0 and ratios.max() <= 10.0, ratios
 
 
-def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_missing_from_a_level() -> None:
-    """A tail of terms 1/k^2, of which a level brings all that it should or none."""
-    terms = 1.0 / np.arange(1, 200_001) ** 2
+@pytest.mark.parametrize("falls, stays", [(1, STAYS_UNCORRECTED), (3, STAYS)])
+def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_missing_from_a_level(
+    falls: int, stays: float
+) -> None:
+    """A tail of terms 1/k^(1 + order), of which a level brings all that it should or none."""
+    terms = np.arange(1, 200_001, dtype=np.float64) ** -(1.0 + falls)
     for missing in (slice(0, 0), slice(16, 32)):
         own = terms.copy()
         own[missing] = 0.0
         left = [float(own[modes:].sum()) for modes in (8, 16, 32)]
         change, before = np.array([[left[1] - left[2]]]), np.array([[left[0] - left[1]]])
-        assert 0.9 * left[2] < uncorrected(change, before).item() < 3.0 * left[2]
-    assert np.isnan(uncorrected(np.array([np.inf]), np.array([1.0]))).all()
-    assert np.isnan(uncorrected(np.array([0.2]), np.array([np.nan]))).all()
+        told = left_along(change, before, stays).item()
+        assert 0.9 * left[2] < told < (3.0 if falls == 1 else 8.0) * left[2], (told, left)
+    assert np.isnan(left_along(np.array([np.inf]), np.array([1.0]), stays)).all()
+    assert np.isnan(left_along(np.array([0.2]), np.array([np.nan]), stays)).all()
 
 
 def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
