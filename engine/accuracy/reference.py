@@ -191,8 +191,8 @@ def left_over(change: Array, before: Array) -> Array:
 
 def left_along(change: Array, before: Array, stays: float) -> Array:
     """(R, V) what is left of forces along a track, of whose error ``stays`` is left with twice the modes: as much as
-    the change, or that part of the one before it where a level happened to bring none of the modes that matter. One change
-    alone (NaN before it) tells nothing."""
+    the change, or that part of the one before it where a level happened to bring none of the modes that matter. One
+    change alone (NaN before it) tells nothing."""
     return np.where(np.isinf(change), np.nan, np.maximum(change, stays * before))
 
 
