@@ -19,7 +19,7 @@ from engine.unreduced.statics import unreduced_frequencies
 from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.engine.build import mass
-from tests.march.test_inertia_along import GRAVITY, KILOGRAMS, RATIO, READ, WAYS, marched
+from tests.march.along.test_inertia_along import GRAVITY, KILOGRAMS, RATIO, READ, WAYS, marched
 from tests.naive.scene import Phase
 from tests.observation.test_off_track import PORTAL, study
 
