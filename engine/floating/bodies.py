@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from engine.bodies.beam.beam import Beam
 from engine.bodies.frame.frame import Frame as FrameBody
 from engine.bodies.imported.imported import Ansys, Matrices, Nastran
+from engine.bodies.modal.description import MAX_MODES
 from engine.bodies.rigid.rigid import Rigid
+from engine.floating.elastic import Y, Z
 from engine.floating.elastic_beam import elastic_beam, rigid_body
 from engine.floating.elastic_frame import elastic_frame
 from engine.floating.elastic_imported import elastic_imported
@@ -18,6 +24,9 @@ if TYPE_CHECKING:
     from engine.bodies.modal.description import Body
     from engine.floating.elastic import ElasticBody
     from engine.scene.frames import Frame
+
+PROBED = 65  # places along a track at which it is looked for what a mode moves
+UNFELT = 1e-6  # of the largest: a mode that moves its track less along an axis does not bend it that way
 
 BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]] = {
     Beam: elastic_beam,
@@ -30,7 +39,8 @@ BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]]
 
 
 def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> ElasticBody:
-    """A body in its floating frame; modes: of bending, where the study leaves that open. Raises BadInput."""
+    """A body in its floating frame; modes: of bending along y and along z, as far as there are such, where the study
+    leaves that open. Raises BadInput."""
     build = BUILDERS.get(type(body))
     if build is None:
         raise BadInput(
@@ -39,4 +49,31 @@ def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> Ela
             expected="beam, frame, rigid, matrices, ansys or nastran",
             received=body.kind,
         )
+    if modes is not None and body.modes == "auto" and build in (elastic_frame, elastic_imported):
+        modes = enough_modes(_whole(_Content(body.model_dump_json() + body.content, body, frame, where)), modes)
     return build(body, frame, modes, where)
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A body by what its modes depend on."""
+
+    text: str
+    body: Body = field(compare=False)
+    frame: Frame = field(compare=False)
+    where: str = field(compare=False)
+
+
+@lru_cache(maxsize=8)
+def _whole(content: _Content) -> ElasticBody:
+    """A body with all the modes that may count."""
+    return BUILDERS[type(content.body)](content.body, content.frame, MAX_MODES, content.where)
+
+
+def enough_modes(body: ElasticBody, bending: int) -> int:
+    """How many of its modes hold so many that bend its track along y, and as many along z, as far as there are such:
+    others twist, or bend what carries the track, and a level of more modes might bring none that counts."""
+    shapes = np.abs(body.fields(np.linspace(0.0, body.length, PROBED), (0,))[0]).max(axis=0)
+    most = shapes[: Z + 1].max()
+    bent = [np.flatnonzero(shapes[axis] > UNFELT * most) + 1 for axis in (Y, Z)]
+    return int(max([bending, *(modes[:bending][-1] for modes in bent if modes.size)]))

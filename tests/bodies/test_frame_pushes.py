@@ -108,3 +108,18 @@ def test_a_node_and_a_place_of_a_member_read_what_the_track_does() -> None:
     place = SPAN - 1.8 - 0.7  # the member runs against the track, and x too
     wanted = -modal.along.own_at(np.full_like(s, place), s)
     np.testing.assert_allclose(modal.gauges["sway"].influence(s, "along"), wanted, rtol=1e-9)
+
+
+def test_supports_carry_what_pushes_along_the_track() -> None:
+    """Both feet together the whole of it, against its direction, wherever it stands; and together no load upwards."""
+    feet = {
+        f"{foot}_{way}": {"body": "portal", "node": foot, "quantity": "support_reaction", "direction": way}
+        for foot in "ad"
+        for way in "xz"
+    }
+    car = mass(1.0, shuttle(0.8, 3.1, 2.0, 0.3, 1), on="portal", inertia_along=True)
+    study = Study(schema_version=1, kind="passage", body={"portal": PORTAL}, carriage={"car": car}, sensor=feet)
+    gauges, s = study.body["portal"].read_at(study.spots("portal")).gauges, np.array([0.2, 1.0, 1.9, 3.3])
+    carried = {name: gauge.influence(s, "along") for name, gauge in gauges.items()}
+    np.testing.assert_allclose(carried["a_x"] + carried["d_x"], -1.0, atol=1e-9)  # the track runs against x
+    np.testing.assert_allclose(carried["a_z"] + carried["d_z"], 0.0, atol=1e-9)

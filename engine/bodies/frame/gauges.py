@@ -17,7 +17,6 @@ import numpy as np
 
 from engine.bodies.frame.assembly import MASSES, Assembly, spring_rows
 from engine.bodies.frame.geometry import DIRECTIONS, unit
-from engine.bodies.frame.pushes import PushStatics, moved_along
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics
@@ -29,6 +28,7 @@ from engine.bodies.modal.modal_body import Array, Gauge, Points
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
+    from engine.bodies.frame.pushes import PushStatics
 
 
 class Read(NamedTuple):
@@ -47,6 +47,10 @@ class Read(NamedTuple):
     def pull(self) -> Array:
         """(n,) own weight per unit gravity."""
         return np.asarray(self.assembly.drag @ unit(self.frame.gravity))
+
+    def moved_along(self, response: Array) -> Callable[[Array], Array]:
+        """Motion of the track along itself at places (S,) where its points move by `response` (6 (E + 1),)."""
+        return partial(_moved_along, self.pushes, response)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +147,12 @@ def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -
     return statics.under_response(response, s) + place.within(s)
 
 
+def _moved_along(pushes: Callable[[], PushStatics], response: Array, s: Array) -> Array:
+    return pushes().own.under_response(response, s)
+
+
 def _pushed(pushes: Callable[[], PushStatics], response: Array, place: FrameSpot, s: Array) -> Array:
-    return moved_along(pushes, response, s) + place.within(s, pushes().own.loads)
+    return _moved_along(pushes, response, s) + place.within(s, pushes().own.loads)
 
 
 def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:

@@ -111,8 +111,3 @@ class TrackAlong:
         """(S,) motion of a point per unit force along at `s`, m/N."""
         assert self.points is not None
         return self.statics.own.under_response(self.points.response[:, self.points.numbers[name]], s)
-
-
-def moved_along(find: Callable[[], PushStatics], response: Array, s: Array) -> Array:
-    """(S,) motion of the track along itself at s where its points move by `response` (6 (E + 1),)."""
-    return find().own.under_response(response, s)

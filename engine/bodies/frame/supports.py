@@ -15,7 +15,6 @@ import numpy as np
 
 from engine.bodies.frame.assembly import Assembly
 from engine.bodies.frame.geometry import DIRECTIONS, unit
-from engine.bodies.frame.pushes import moved_along
 from engine.bodies.modal.modal_body import Array, Gauge
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ def frame_support(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) 
         rigid=statics.rigid,
         weight=weight,
         dampers=support.dampers,
-        pushed=partial(moved_along, read.pushes, response),
+        pushed=read.moved_along(response),
     )
 
 
