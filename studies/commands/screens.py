@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from studies.reporting.summary import Range
     from studies.runs.runner import Outcome
 
+BESIDE = ("_position", "_time", "_rms", "_used", "elapsed")  # endings of what `info` lists with --all alone
+LONGEST_LIST = 300  # letters
 MOST_ALIKE = 4  # results that are the same in every variant and told with their value
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
@@ -61,7 +63,7 @@ def show_archive(summary: Summary) -> None:
     own = [v.name for v in root if v.dims[: len(grid)] == grid and v.name not in grid and v.units]
     if "status_name" in summary.dimensions:
         own = [v.name for v in root if v.dims[: len(grid) + 1] == (*grid, "result") and v.dtype != "text"]
-    results = [name for name in own if not name.endswith("_position")]
+    results = [name for name in own if not name.endswith(BESIDE)]
     histories = [v.name for v in root if "history" in v.dims]
     groups = sorted({v.group for v in summary.variables} - {"/"})
     said = {
@@ -69,7 +71,7 @@ def show_archive(summary: Summary) -> None:
         "kind": attributes.get("study_kind", ""),
         "variants": f"{sum(summary.status_counts.values()):,}{f' = {shape}' if len(grid) > 1 else ''}",
         "status": ", ".join(f"{name} {count:,}" for name, count in summary.status_counts.items()),
-        "results": ", ".join(results),
+        "results": _some(results),
         "histories": ", ".join(histories),
         "groups": ", ".join(groups),
         "made": attributes.get("history", ""),
@@ -231,6 +233,17 @@ def _about_work(outcome: Outcome) -> str:
     resumed = f"{outcome.resumed:,} of them" if is_marched(outcome.results) else counted(outcome.resumed, "piece")
     earlier = f", {resumed} finished by an earlier start" if outcome.resumed else ""
     return f"{outcome.archive}: {variants} in {number(outcome.seconds)} s{earlier}"
+
+
+def _some(names: Sequence[str]) -> str:
+    """Names as far as they fit into some lines, and how many more there are.
+
+    >>> _some(["midspan_max"] * 3), len(_some(["midspan_max"] * 40))
+    ('midspan_max, midspan_max, midspan_max', 309)
+    """
+    fitting = [name for place, name in enumerate(names) if len(", ".join(names[: place + 1])) <= LONGEST_LIST]
+    more = len(names) - len(fitting)
+    return f"{', '.join(fitting)}{f' and {more} more' if more else ''}"
 
 
 def _line(value: Any) -> str:

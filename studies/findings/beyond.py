@@ -62,6 +62,12 @@ def ranked(results: Results, limits: Limits) -> list[str]:
     return [*sorted(parts, key=lambda name: -parts[name]), *rest]
 
 
+def of_every_quantity(results: Results, most: int) -> list[str]:
+    """So many sensors in the order of the file: the first of every quantity, then the second, and so on."""
+    first = ranked(results, Limits())[:most]
+    return [name for name in results.sensors if name in first]
+
+
 def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
     """In which part of the sweep values (in its shape) exceed a threshold: along one swept number, for each value of
     another where these are few; without one in how many variants."""

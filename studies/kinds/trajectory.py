@@ -8,7 +8,7 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
-from studies.findings.beyond import Limits
+from studies.findings.beyond import Limits, of_every_quantity
 from studies.findings.residual import check_residual, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
@@ -63,7 +63,7 @@ class Trajectory(Kind):
         traced = results.traced()
         said = [_kept(results)] if traced else ["No history was kept."]
         said += residuals(results, question_of(results.study, Asked).residual)
-        said += [_span(results, sensor) for sensor in list(results.sensors)[:MOST_SENSORS]]
+        said += [_span(results, sensor) for sensor in of_every_quantity(results, MOST_SENSORS)]
         return [*said, *told_statuses(results)]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from studies.findings.beyond import of_every_quantity
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
@@ -54,7 +55,7 @@ def sliding(results: Results) -> Iterator[str]:
 
 
 def _sensors(results: Results) -> Iterator[str]:
-    for sensor, units in list(results.sensors.items())[:MOST_SENSORS]:
+    for sensor in of_every_quantity(results, MOST_SENSORS):
         low, high = (results.dataset[f"{sensor}_{end}"] for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
@@ -62,7 +63,7 @@ def _sensors(results: Results) -> Iterator[str]:
         largest = np.maximum(np.abs(low), np.abs(high))
         index = extreme(largest)
         assert index is not None
-        span = _span(low.values[index], high.values[index], units)
+        span = _span(low.values[index], high.values[index], results.sensors[sensor])
         yield f"{sensor}: from {span}{in_words(results, index)}."
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import largest, sizes
+from studies.findings.beyond import of_every_quantity
 from studies.findings.effects import unchanged
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
 from studies.pictures.common.sweep_view import view
@@ -68,7 +69,7 @@ def _own(results: Results, traced: list[Index]) -> Index:
 
 def _rows(results: Results) -> dict[str, str]:
     """Histories that are drawn, with their units."""
-    rows = dict(results.sensors)
+    rows = {name: results.sensors[name] for name in of_every_quantity(results, MOST_ROWS)}
     for name, carriage in results.study.carriage.items():
         ends = ("position", "acceleration_x", "acceleration_z") if carriage.motion.slides else ("acceleration_z",)
         rows |= {f"{name}_{end}": str(results.dataset[f"{name}_{end}"].attrs["units"]) for end in ends}

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import sizes
+from studies.findings.beyond import of_every_quantity
 from studies.findings.theory import first_omega
 from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve, coincide
@@ -24,7 +25,7 @@ MOST_ALIKE = 3.0  # longest over shortest history that can share an axis of seco
 
 def pictures(results: Results) -> list[Figure]:
     """The sensors, then the carriages' own motion, over time; none where no history was kept."""
-    sensors = list(chosen(list(results.sensors), MOST_ROWS))
+    sensors = of_every_quantity(results, MOST_ROWS)
     if not results.traced():
         return []
     own = picked(results, sizes(results, sensors[0]), results.size)[-1:]

@@ -79,6 +79,14 @@ def test_a_limit_far_off_is_told_and_does_not_flatten_the_curves() -> None:
     assert "within the limit of 2 m" in found["largest-displacement"].title
 
 
+def test_a_trajectory_draws_and_tells_every_quantity() -> None:
+    dataset = scenes.run("trajectory", extra=f"{SENSORS}\n{SHAKEN}")
+    sensors = next(figure for figure in answers.figures(dataset) if figure.name == "sensors")
+    assert list(panels(sensors)) == ["midspan", "moment", "place 1", "shaken"]
+    told = [sentence.partition(":")[0] for sentence in answers.answer(dataset)]
+    assert [name for name in told if name in Results.of(dataset).sensors] == ["midspan", "moment", "place_1", "shaken"]
+
+
 def test_limited_quantities_stand_unfolded() -> None:
     found = list(figures(run('[question]\nbending_moment = "1 kN m"\nacceleration = 1.0')))
     assert {"largest-bending-moment", "largest-acceleration"} <= set(found[:2])
