@@ -36,6 +36,7 @@ BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]]
     Ansys: elastic_imported,
     Nastran: elastic_imported,
 }
+COUNTED = (FrameBody, Matrices, Ansys, Nastran)  # whose modes count where they bend the track
 
 
 def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> ElasticBody:
@@ -49,7 +50,7 @@ def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> Ela
             expected="beam, frame, rigid, matrices, ansys or nastran",
             received=body.kind,
         )
-    if modes is not None and body.modes == "auto" and build in (elastic_frame, elastic_imported):
+    if modes is not None and body.modes == "auto" and type(body) in COUNTED:
         modes = enough_modes(_whole(_Content(body.model_dump_json() + body.content, body, frame, where)), modes)
     return build(body, frame, modes, where)
 
