@@ -3,8 +3,6 @@
 And with NO_SKIPS set in the environment a skipped test fails.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Generator
 from pathlib import Path

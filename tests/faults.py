@@ -3,8 +3,6 @@
 A test says which it covers by `@pytest.mark.fault(NUMBER, ...)`.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path

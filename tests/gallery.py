@@ -1,7 +1,5 @@
 """Makes docs/gallery.md, its pictures and the times of `wanderlast list`: python -m tests.gallery [NAME ...]."""
 
-from __future__ import annotations
-
 import json
 import sys
 import tempfile

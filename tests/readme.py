@@ -1,7 +1,5 @@
 """The documentation that is made from the code: `python -m tests.readme` writes docs/results.md anew."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from results_schema.status import flag_meanings, flag_values

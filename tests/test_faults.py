@@ -1,7 +1,5 @@
 """Every fault of docs/faults.md has a test that says so."""
 
-from __future__ import annotations
-
 from tests import faults
 
 NUMBERS = [number for section in faults.FAULTS.values() for number in section]

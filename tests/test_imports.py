@@ -1,7 +1,5 @@
 """Imports flow one way, heavy packages stay where they belong, and importing ours costs next to nothing."""
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess

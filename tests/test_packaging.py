@@ -1,7 +1,5 @@
 """What is shipped, and that README, constraints and continuous integration say the same."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

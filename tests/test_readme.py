@@ -1,7 +1,5 @@
 """The documentation tells the truth: its table of results, its examples, its links."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Things answer for themselves: nobody asks what class or kind a thing is, or whether it has something."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 

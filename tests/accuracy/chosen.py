@@ -1,7 +1,5 @@
 """Sweeps for whose variants something is chosen."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, NamedTuple
 

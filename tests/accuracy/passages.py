@@ -1,7 +1,5 @@
 """Sweeps of passages for the tests of what is measured."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from engine.accuracy.grids import SceneGrid

@@ -1,7 +1,5 @@
 """What variants are computed with, by the measured errors of pilots near them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One grid for all marches of a scene: they meet at its stations, and none breaks a rule of its scheme."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

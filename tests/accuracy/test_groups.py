@@ -1,7 +1,5 @@
 """Variants that are computed alike: what is told of each, and what its status says."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

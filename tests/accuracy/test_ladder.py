@@ -1,7 +1,5 @@
 """The ladder of what a variant may be computed with, and what pilots measure on it."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

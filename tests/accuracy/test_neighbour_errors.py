@@ -1,7 +1,5 @@
 """What pilots tell of the variants around them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a variant is computed with is a value beside the study, which stays as it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Levels of more and more modes and steps: what they converge to, and what is told of what they miss."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every reported number, the tolerance that it is held to, and how far two marches differ."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which variants an audit takes, and what it finds of them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

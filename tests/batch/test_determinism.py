@@ -1,8 +1,6 @@
 """Bits that do not depend on chunks, threads, order or neighbours; statuses; stopping, resuming, and where the sink
 is called."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import threading

@@ -1,7 +1,5 @@
 """One hash over chunks, threads and workers, for every scheme and every sort of scene."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext

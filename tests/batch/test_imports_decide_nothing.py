@@ -1,7 +1,5 @@
 """What the engine computes does not depend on what else was imported."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

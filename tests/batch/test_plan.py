@@ -1,7 +1,5 @@
 """How many steps, which scenes and groups: rules with numbers, refusals with their texts, sweeps of anything."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

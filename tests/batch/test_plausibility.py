@@ -1,7 +1,5 @@
 """What is allowed and yet often a mistake is remarked; an ordinary study is not."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A scheduler and its worker that speak TLS alone, set up as docs/workers.md says: certificates by openssl."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Workers: the same bits, whatever dies; what ends every process is found; whom a study is not given to."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

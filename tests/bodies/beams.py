@@ -1,7 +1,5 @@
 """Uniform beams by their numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from engine.bodies.beam.beam import Beam, Spring

@@ -1,7 +1,5 @@
 """Files of models for the tests of bodies, read in the tests' own process."""
 
-from __future__ import annotations
-
 import pytest
 
 from engine.bodies.imported import imported

@@ -1,7 +1,5 @@
 """Frames for tests, small and of round numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

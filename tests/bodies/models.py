@@ -1,7 +1,5 @@
 """Finite-element files for tests: a frame of ours as matrices, small texts of ANSYS and Nastran, and damage to them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Modes of beams: frequencies, shapes, orthonormality, limits, and what a bad beam says."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

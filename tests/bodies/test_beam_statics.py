@@ -1,7 +1,5 @@
 """Influence lines: closed forms, reciprocity, equilibrium, inertia relief and the modal sums they complete."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Craig-Bampton reductions of frames, rigid-body modes, groups of equal frequencies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

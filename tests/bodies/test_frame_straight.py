@@ -1,7 +1,5 @@
 """A straight frame is a beam: against the engine's uniform beam and closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

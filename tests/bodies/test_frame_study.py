@@ -1,7 +1,5 @@
 """A frame in a study file: every key mutated, every refusal with its place, and the march on it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reduced bodies in files: bit for bit the same body, and damaged or foreign files refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 `WaveBeam`: the exact solution, four waves between neighbouring springs. `hermite_model`: dense cubic elements.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ passages (speed, mass and damping drawn at random), or scenes of the calibration
 pilots are marched with 13 numbers of modes x 16 of steps x 2 schemes, beside 64 modes and 64,000 steps or more.
 """
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -7,8 +7,6 @@ of the level that told its error and, where modes are open, 1.5 times and twice 
 by how much they differ is its doubt.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections import Counter

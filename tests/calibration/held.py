@@ -6,8 +6,6 @@ more than the references of pilots have. Every scene follows from seed and numbe
 numerics fixed, and what counts is what is told of its errors.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Sequence

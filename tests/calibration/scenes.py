@@ -3,8 +3,6 @@
 A beam has L = E I = rho A = 1, so that a carriage's mass is its mass ratio mu, and alpha = v/(omega_1 L/pi).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

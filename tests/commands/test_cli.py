@@ -1,7 +1,5 @@
 """The command: what it prints, what it writes, and every exit code."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

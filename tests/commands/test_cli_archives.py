@@ -1,7 +1,5 @@
 """What commands do with finished archives: tables, comparisons, the study's text; and the same from Python."""
 
-from __future__ import annotations
-
 import csv
 import json
 import tomllib

@@ -1,7 +1,5 @@
 """`bench` times the march that `run` uses, and that march computes the right numbers."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

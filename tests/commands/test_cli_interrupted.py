@@ -1,7 +1,5 @@
 """Runs that are interrupted: exit codes, what is kept, and that what goes on ends as if nothing had happened."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Built-in studies and files to start from: valid, commented, and refused for the right reason when a key is spoilt."""
 
-from __future__ import annotations
-
 import tomllib
 
 import pytest

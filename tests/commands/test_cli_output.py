@@ -1,7 +1,5 @@
 """Standard output that is closed, full, or read by somebody who leaves; colours and the progress bar."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

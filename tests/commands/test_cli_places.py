@@ -1,7 +1,5 @@
 """The command: places where nothing can be written, other people's words, and remarks."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Mistakes that people make: the exit code, and the words by which they find out what to change."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

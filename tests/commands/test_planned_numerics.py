@@ -1,7 +1,5 @@
 """The table of `check` that tells what variants are computed with, and what some seconds of measuring forecast."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

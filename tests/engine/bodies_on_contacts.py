@@ -1,7 +1,5 @@
 """Bodies that ride on contacts, and studies of one of them on a bed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from engine.scene.study import Study

@@ -9,8 +9,6 @@ accelerations and the ties' forces together:
     mass:     F + m D^2(p^T x + level) = m g;  rigid contact:  D^2(P^T x + level) = 0
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

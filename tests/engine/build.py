@@ -1,7 +1,5 @@
 """Studies for the tests of the engine, from a few words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

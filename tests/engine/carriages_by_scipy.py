@@ -4,8 +4,6 @@ Coordinates are the modes of all bodies. What a table's contact carries at rest 
 statics; forces, masses and tables may ride on any body, tables too. Only rigid tables, no static correction.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

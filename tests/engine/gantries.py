@@ -1,7 +1,5 @@
 """Gantries on two runway beams, and the trolleys that cross on them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from engine.scene.study import Study

@@ -1,7 +1,5 @@
 """A reduction that keeps the cycles it is given, for tests of what studies are handed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

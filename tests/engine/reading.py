@@ -1,7 +1,5 @@
 """What a study's sensors read on a twin."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

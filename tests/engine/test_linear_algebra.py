@@ -1,7 +1,5 @@
 """Linear algebra keeps to one thread while something of ours computes, and has its own threads again afterwards."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Iterator

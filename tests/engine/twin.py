@@ -3,8 +3,6 @@
 Pinned beams come from closed forms; for other supports the modal body is the engine's, which has tests of its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Errors of what a study derives from other results."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """The vectorised indices against their plain twins, closed forms, and against themselves in other company."""
 
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -1,7 +1,5 @@
 """Along lines through the parameter space no result of a study jumps where another model is chosen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Sentences on what variants were given."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import studies

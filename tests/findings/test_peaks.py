@@ -1,7 +1,5 @@
 """The vectorised peaks against their plain twins, closed forms, and against themselves in other company."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -6,8 +6,6 @@ in full, and contact forces are theirs; with stiffening after some repetitions, 
 before, and with torques, which are linearised, if the arm is stiff. Then each term is switched off in turn.
 """
 
-from __future__ import annotations
-
 from types import ModuleType
 
 import numpy as np

@@ -6,8 +6,6 @@ and the ground. A force does the work f . J u at its place, J by complex steps; 
 there; a spring has an energy. Then each term is switched off in turn.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from engine.floating.model import build

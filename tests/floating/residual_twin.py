@@ -8,8 +8,6 @@ shape integral and no rotating frame appears. Then each term of the equations is
 agree any more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from types import ModuleType

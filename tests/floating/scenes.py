@@ -1,7 +1,5 @@
 """Small scenes with frames that move, and their marches with fixed steps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import ModuleType
 

@@ -6,8 +6,6 @@ coordinates, so that these are small here, and what it adds is compared, not the
 in turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

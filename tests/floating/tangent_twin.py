@@ -5,8 +5,6 @@ change of the accelerations does to the residual, by itself and through the coor
 it in a step. Then each way is switched off in turn.
 """
 
-from __future__ import annotations
-
 from types import ModuleType
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ways of carriages that are given: as pieces beside their law, and beside bodies that stand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

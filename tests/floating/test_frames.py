@@ -1,8 +1,6 @@
 """Frames that are driven, hinged and free: closed forms, conserved quantities, published numbers, another
 formulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

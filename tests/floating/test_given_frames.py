@@ -1,7 +1,5 @@
 """Frames that are given in time, whose steps are linear equations, beside the floating frame."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

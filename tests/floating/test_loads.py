@@ -1,8 +1,6 @@
 """Loads at places of bodies and along them, and springs between places: statics, buckling, energy, another
 formulation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """The equations of motion in space, their tangent, and each of their terms, beside particles over the ground, virtual
 work and differences."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

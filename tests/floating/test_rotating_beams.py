@@ -1,8 +1,6 @@
 """Beams that turn steadily about the vertical, beside their static equilibrium by SciPy: pulled by themselves, by the
 radius of a hub, by a carriage."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

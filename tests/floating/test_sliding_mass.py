@@ -1,7 +1,5 @@
 """A mass that slides freely on a bending beam (section 2.3 of Hartweg and Heckmann 2012)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the theory of frames that move ends: statuses, and the times from which they hold."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

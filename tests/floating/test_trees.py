@@ -1,7 +1,5 @@
 """Bodies in a tree: two links, rigid and flexible, and a spring-driven joint."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

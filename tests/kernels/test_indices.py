@@ -1,8 +1,6 @@
 """Kernels of frames that move, robots and scenes at rest (those of the march: `test_kernels`), compiled with checks of
 every index: none is out of range, and one that is would be found."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

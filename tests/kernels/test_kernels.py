@@ -1,7 +1,5 @@
 """The kernels themselves: no index out of range, the same numbers without the compiler, one tie as many, the cache."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

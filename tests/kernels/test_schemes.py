@@ -1,7 +1,5 @@
 """What a scheme says of itself against its amplification matrix, and what is refused because of it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The march of several ties as a kernel: against dense matrices, on systems that no study file need describe."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sines, cosines and exponentials of our own: against long doubles, exact identities, themselves in other company."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

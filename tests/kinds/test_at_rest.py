@@ -1,7 +1,5 @@
 """The kinds `eigenfrequencies` and `influence`: grids, refusals, comparisons, sentences, figures, commands."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

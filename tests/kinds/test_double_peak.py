@@ -1,7 +1,5 @@
 """What a double-peak study samples, and how two of its answers are compared."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

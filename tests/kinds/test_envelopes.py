@@ -1,7 +1,5 @@
 """Envelopes from the study file to the archive and its report, for every kind of study that marches."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What each kind refuses, declares and says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

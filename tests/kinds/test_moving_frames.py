@@ -1,7 +1,5 @@
 """Studies of bodies whose frames move: from the study file to the dataset and its sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

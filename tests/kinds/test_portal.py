@@ -1,7 +1,5 @@
 """Studies of robots on rails: from the study file to the dataset and its sentences."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

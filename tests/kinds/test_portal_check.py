@@ -1,7 +1,5 @@
 """What `check` tells of studies of robots, against what their runs take."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Where all tools stay within a limit that a study of robots names: sentences and the line in the figure."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What studies of robots say of variants that missed their tolerance."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

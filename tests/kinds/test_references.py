@@ -3,8 +3,6 @@
 Unit beam (L = rho A = E I = 1), weight 48 whatever the mass, so that the static midspan deflection is 1.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

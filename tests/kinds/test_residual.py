@@ -1,7 +1,5 @@
 """What answers say of residual vibrations, and of the documentation's own study of them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

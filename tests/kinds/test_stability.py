@@ -1,7 +1,5 @@
 """The maps of stability: what they must show, on the real kernels; and the kind that makes a study of them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

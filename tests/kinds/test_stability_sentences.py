@@ -1,7 +1,5 @@
 """What the maps of stability say, from data made up for it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Work and precision: errors from a second source, fitted orders, fronts and sentences recomputed by plain loops."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from itertools import product

@@ -1,7 +1,5 @@
 """What a study of work and precision says: from the points by plain loops, and from points made up for it."""
 
-from __future__ import annotations
-
 import re
 from itertools import product
 

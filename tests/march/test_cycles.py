@@ -1,7 +1,5 @@
 """What a study's reduction is given of a cycle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Envelopes along a body: against the naive twin, against sensors at the same places, against statics; the same bits
 however the work is cut."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

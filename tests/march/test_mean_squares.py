@@ -1,7 +1,5 @@
 """Root mean squares: time averages, whatever the steps, against closed forms and statics."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """What loads cannot feel stays out of the results: motions that do not move the track, rounding, ends that are held."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What the equations promise whatever the numbers: linearity, mirror images, reversibility, energy, orders, and that
 every term is felt."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """fidelity = "static": influence lines in place of a march, against closed forms and slow marches."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

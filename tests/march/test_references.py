@@ -1,7 +1,5 @@
 """Every reference number that a passage, a shuttle or a train of the engine can produce."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,8 +1,6 @@
 """Residual vibration: how far sensors swing about their static values when all carriages rest, against closed forms, an
 ODE and the kept history."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Richardson pairs: of fourth order against DOP853, with estimates of the finer march's error that can be believed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """Several carriages at once, on each other too: the engine against the scene's differential equations, by scipy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The loop that all steppers share, and the codes of lanes that come out of the kernels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

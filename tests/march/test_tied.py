@@ -1,7 +1,5 @@
 """Sprung masses: the engine's march against the naive twin, limits, energy, order, and what each term is worth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Sprung masses: published numbers, limits of the spring, energy, order, lanes, steps, and what is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

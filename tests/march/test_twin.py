@@ -1,7 +1,5 @@
 """The engine's march against the naive twin at the same instants: every sensor, every contact force."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

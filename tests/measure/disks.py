@@ -7,8 +7,6 @@ fails says where, with the bytes that are free there, and ends with 74; the same
 archive that equals that of a run without such trouble.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import re

@@ -4,8 +4,6 @@ Each study is run again and again, and most of its runs are killed (SIGKILL). No
 checksum, or not to be read), and each archive that comes to its end equals that of an uninterrupted run.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -4,8 +4,6 @@ The scene is that of `wanderlast bench --ties`, on one thread. The twin has one 
 the march observes the contact forces too. Times are of the processor, so that other programs count less.
 """
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import tempfile

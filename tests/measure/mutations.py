@@ -7,8 +7,6 @@ comes (another code, a signal, a traceback, more than SECONDS) is told with its 
 Needs the extras `nastran` and `ansys`.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

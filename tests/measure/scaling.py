@@ -4,8 +4,6 @@ Passages of random speed, mass and damping with fixed modes and steps and withou
 process of its own. CPU times depend little on what else runs on the machine; wall times do.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess

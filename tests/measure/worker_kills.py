@@ -6,8 +6,6 @@ four times in a row (the next start goes on then), no part is ever bad, and each
 threads.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """The comparison schemes: the same numbers as dense matrices, their orders, their limits, and how they fail."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

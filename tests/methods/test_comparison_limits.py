@@ -1,7 +1,5 @@
 """Where the comparison schemes turn unstable: bisection on what their kernels make of unit states at a held place."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Transition matrices of the kernels against a twin that assembles dense matrices and steps one state at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Bodies that ride on contacts: what is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scene in normalised time: windows, sides of events, who is where; and what a study's reduction is given."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

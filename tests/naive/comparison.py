@@ -1,7 +1,5 @@
 """The comparison schemes with dense matrices: one load, one variant, one solve per step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ positions over the cruise; a double peak looks at one periodic cycle whose sampl
 first sample not repeated at the end.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Prescribed motions as tuples of phases with exact derivatives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Newmark's method with dense matrices, one solve per step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

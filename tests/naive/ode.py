@@ -1,7 +1,5 @@
 """The same equations by an explicit Runge-Kutta method of order 8, piecewise between events."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

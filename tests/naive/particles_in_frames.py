@@ -5,8 +5,6 @@ sum m J^T (J u' + dJ/dt u) = sum m J^T g - K y - D u. J comes from complex steps
 No shape integral, no rotating frame, no term of (9) or (20) appears; SciPy solves the equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """Robots on rails as clouds of particles over the ground, in long doubles: positions alone are written down, velocities
 and accelerations are differences of them. Another formulation than the chain that is followed from its base."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The naive march against the order-8 integration, closed forms, and what the equations conserve."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A plane frame of Euler-Bernoulli beams assembled by hand: dense, with a node wherever something stands."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

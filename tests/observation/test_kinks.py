@@ -1,7 +1,5 @@
 """Where a load passes a sensor of moments its influence line has a kink, which no step may jump over."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Sensors at nodes, members and points off the track: statics against a frame assembled by hand, marches against the
 unreduced model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

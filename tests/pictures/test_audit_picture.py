@@ -1,7 +1,5 @@
 """The figure of what an audit observed."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """Drawings: every study has one, what it shows stands where it should, and shapes move as the modes do."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Figures draw with any sweep, show what they say, and are safe to put into one page."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """What every variant was computed with and its errors: pictures and sentences, from numbers that are put in here."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 from typing import Any

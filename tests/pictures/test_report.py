@@ -1,7 +1,5 @@
 """The report: one page that stands by itself, honest and safe whatever the study file holds."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path

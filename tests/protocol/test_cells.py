@@ -1,7 +1,5 @@
 """Archives of cells against numpy on the archive of all variants of the same study."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

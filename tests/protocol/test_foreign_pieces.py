@@ -1,7 +1,5 @@
 """Pieces that other packages bring: the documentation's examples, installed and run."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """What pilots found is kept while a study runs, for the run that goes on."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

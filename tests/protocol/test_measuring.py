@@ -1,7 +1,5 @@
 """Studies that measure: refused options, pieces that are kept, runs that are interrupted, and the commands."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The variants that an answer names have a history in the archive, the same as if all had one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Archives of studies whose results stay on the disk against those of the same studies put together in memory."""
 
-from __future__ import annotations
-
 import errno
 import os
 import tracemalloc

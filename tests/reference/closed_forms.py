@@ -3,8 +3,6 @@
 Lengths, stiffnesses and masses in any consistent units; w positive along the load.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ Shares nothing with the naive march: here F is eliminated by hand (Sherman and M
     conv = 2 s' phi'.q' + (s'^2 phi'' + s'' phi').q
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

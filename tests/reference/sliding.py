@@ -5,8 +5,6 @@
 conv = 2 phi' q' s' + phi'' q s'^2, so that s'' = w' (g - a_z) with a_z the mass's vertical acceleration.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

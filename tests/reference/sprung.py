@@ -5,8 +5,6 @@ z is the body's displacement from where its spring just carries the weight on a 
     F = m g + k (z - w),   m z'' = -k (z - w),   q'' + omega^2 q = phi F
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

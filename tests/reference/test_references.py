@@ -1,7 +1,5 @@
 """Every number of `values` against an integration or closed form of its own; nothing here imports the engine."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -6,8 +6,6 @@ correction, unless said otherwise. Extremes are over time. The numbers are print
 within half a unit of it at best.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 WEIGHT = 48.0

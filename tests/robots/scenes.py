@@ -1,7 +1,5 @@
 """Small scenes of robots on rails."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

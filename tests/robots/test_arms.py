@@ -1,7 +1,5 @@
 """Chains of links and jerk-limited plans against published numbers and particles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The march of robots on rails against particles over the ground, a whole frame, energy and momentum."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Largest values between steps, against recordings that are much denser."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

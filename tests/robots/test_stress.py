@@ -1,7 +1,5 @@
 """Bending stresses of rails against closed forms, a finer rail and all modes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

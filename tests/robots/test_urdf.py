@@ -1,7 +1,5 @@
 """Robots out of URDF files, against the file's own poses and against another program."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

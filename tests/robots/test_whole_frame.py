@@ -1,8 +1,6 @@
 """A robot on all degrees of freedom of its rail, marched step by step by another program: the robot as particles that
 follow their plan, their places linear in the motion of the rail, and all matrices made anew at every step."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import eigh
 

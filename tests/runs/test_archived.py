@@ -1,7 +1,5 @@
 """Reports of archives alone: nothing else is opened, and what they say of their study is what they hold (fault 47)."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Audits of runs: what they find, their group in the archive, what is told of them, going on after an interruption."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Audits of kinds that are computed in pieces: robots on rails, frames that move."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whole runs that fail or die in their N-th operation on files, for every N, go on to the same archive."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

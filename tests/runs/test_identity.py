@@ -1,7 +1,5 @@
 """What archives and parts belong to: the study, the contents of its files, and the program (faults 41, 42 and 43)."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Studies that compare themselves with the unreduced finite-element model: archive, sentences, figure, refusals."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

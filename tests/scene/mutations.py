@@ -3,8 +3,6 @@
 Use: `@pytest.mark.parametrize("how", HOW)` and `accepted(how, distinct(text), read)`.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

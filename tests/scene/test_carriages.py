@@ -1,7 +1,5 @@
 """A kind of carriage is one class: the march, the statics and the unreduced model ask nothing but it."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Faults 1, 4 and 5: files that are no study files, and numbers that no study can mean."""
 
-from __future__ import annotations
-
 import hashlib
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Laws of motion against numerical derivatives, closed forms, symmetry and the naive twins."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Faults 2, 3 and 4 for every key of a study that uses most of them."""
 
-from __future__ import annotations
-
 import pytest
 
 from engine.scene.study import load

@@ -1,7 +1,5 @@
 """What a study means, and the words with which a wrong one is refused."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import tomllib

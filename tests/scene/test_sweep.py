@@ -1,7 +1,5 @@
 """Axes of a sweep, their cases, and faults 9, 10, 14 and 15."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Trains: every axle is the carriage that could have been written by itself, and one key sweeps all of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers with units: exact, of the right dimension, or refused."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

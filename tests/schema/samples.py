@@ -1,7 +1,5 @@
 """Small datasets as a study would hand them over, and ways to let the disk fail."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

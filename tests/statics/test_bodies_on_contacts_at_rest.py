@@ -1,7 +1,5 @@
 """Bodies that ride on contacts, at rest: against a dense twin, levers and slow marches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Coupled natural frequencies against closed forms, the transcendental equation and dense matrices of many modes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Static readings over the position against closed forms, lever rules and slow marches."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small studies of the kinds that compute a scene at rest."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import xarray as xr

@@ -1,7 +1,5 @@
 """Small studies, one of each way in which studies are computed, and archives compared bit for bit."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

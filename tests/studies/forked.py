@@ -1,7 +1,5 @@
 """The command in forked processes of this one, which has loaded and compiled everything that they need."""
 
-from __future__ import annotations
-
 import os
 
 import dask.threaded

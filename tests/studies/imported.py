@@ -1,7 +1,5 @@
 """Small studies of bodies out of files, in a folder of their own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small study of work and precision, run once for all tests that look at it."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import xarray as xr

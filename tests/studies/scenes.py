@@ -1,7 +1,5 @@
 """Small studies of each kind, and datasets of them with variants that failed."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

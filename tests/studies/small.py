@@ -1,7 +1,5 @@
 """Small studies for tests of the command, and the command itself in this process and in one of its own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

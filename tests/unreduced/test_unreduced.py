@@ -1,7 +1,5 @@
 """The unreduced finite-element model: against closed forms, influence lines, and the march of modes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

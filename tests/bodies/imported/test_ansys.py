@@ -1,7 +1,5 @@
 """The solid beam that comes with ansys-mapdl-reader: its frequencies, and statics along its top edge."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Bad files and keys of imported bodies (faults 6 and 7): each refused with its place, before anything is computed."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

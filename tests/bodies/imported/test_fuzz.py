@@ -1,7 +1,5 @@
 """Mutation fuzz of 1,000 files (faults 6-8): each is refused as bad input, or it is a body of finite numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Bodies of plain files against the frames that they were written from, and every refusal with its place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

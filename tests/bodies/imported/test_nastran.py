@@ -1,7 +1,5 @@
 """Craig-Bampton models that come with pyyeti: their published frequencies and masses, and DMIG cards of our own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

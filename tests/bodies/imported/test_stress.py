@@ -1,7 +1,5 @@
 """Stress of imported bodies by recovery matrices: a frame's own bending stress, and the element forces of a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,8 +1,6 @@
 """Texts of ANSYS and Nastran models: faults with file, line and card, includes that stay in the folder, and limits of
 the process that reads."""
 
-from __future__ import annotations
-
 import os
 import sys
 import zipfile

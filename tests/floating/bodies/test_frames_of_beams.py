@@ -1,7 +1,5 @@
 """Frames of beams as bodies whose frames move: beside a beam, finite elements, and what is conserved."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigid bodies in space: torque-free tumbling in closed form, a chain of six joints by another Newton-Euler."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solid models out of files as bodies whose frames move: beside their matrices, and what is conserved."""
 
-from __future__ import annotations
-
 from itertools import combinations, pairwise, product
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Masses that push along their track when they speed up and brake: against a dense twin, the unreduced model, momentum
 that is kept, and what the motion of the track along itself is made of."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any

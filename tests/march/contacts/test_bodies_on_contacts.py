@@ -1,7 +1,5 @@
 """Bodies that ride on contacts: the engine against a dense twin, lanes, steps, histories and separation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bodies that ride on contacts where the answer is known: masses, sprung masses, forces, rigid joints, orders."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

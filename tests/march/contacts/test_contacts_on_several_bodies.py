@@ -1,7 +1,5 @@
 """A gantry on two beams and what crosses on it: against dense saddle systems, and the whole finite-element model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 
