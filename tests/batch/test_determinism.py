@@ -3,6 +3,8 @@ is called."""
 
 import hashlib
 import math
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 from functools import cache
@@ -13,18 +15,21 @@ import pytest
 import xarray as xr
 
 import engine.march.march
+from engine.accuracy.ladder import ladder_of
 from engine.batch.dataset import build
 from engine.batch.execution import execute, run
 from engine.batch.places import Threads
-from engine.batch.plan import Plan, make_plan
+from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.model.lane_table import LaneTable, to_blocks
 from engine.model.scene_model import SceneModel
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput, Interrupted
 from results_schema.store.rows import Chunk, Collector
+from studies.protocol.study import kind_of
 from tests.engine.build import beam, cruise, fixed, force, mass, study, swing, under
 from tests.reference import closed_forms, values
+from tests.studies import scenes
 
 
 def mixed() -> Study:
@@ -314,3 +319,45 @@ def test_stop_before_the_start() -> None:
 def test_no_threads_is_bad_input() -> None:
     with pytest.raises(BadInput, match="threads"):
         run(mixed(), threads=0)
+
+
+# What the engine computes does not depend on what else was imported
+
+
+SLOW = "[solver]\ntolerance = 1e-2\n"
+RUN = """
+import sys
+{imports}
+import engine
+from hashlib import sha256
+found = engine.run(engine.load(sys.argv[1]), threads=1)
+text = [found.attrs, sorted((name, array.dims, array.values.tolist()) for name, array in found.variables.items())]
+print(int(found.fidelity_used), sha256(repr(text).encode()).hexdigest())
+"""
+IMPORTS = ("", "import studies", "import studies\nfor kind in studies.kind_names(): studies.kind_named(kind)")
+
+
+def test_a_run_is_the_same_with_and_without_studies() -> None:
+    """The choice of the model and what is kept, in fresh processes with different imports."""
+    told = {
+        subprocess.run(
+            [sys.executable, "-c", RUN.format(imports=imports), scenes.text_of("trajectory", extra=SLOW)],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for imports in IMPORTS
+    }
+    assert len(told) == 1
+    assert told.pop().startswith("3 ")  # so few that each converges with all terms
+
+
+def test_a_study_says_whose_results_it_keeps() -> None:
+    """Accelerations, which a trajectory keeps and statics have not, take more than statics."""
+    study = scenes.study("trajectory").with_values({"body.bed.modes": "auto", "carriage.table.mass": 1.0})
+    kind = kind_of(study)
+    plans = {results: make_plan(study, results=results) for results in (EVERY_MARCH, kind.name)}
+    lowest = {results: ladder_of(plan.asked, plan.grids[0]).columns[0].fidelity for results, plan in plans.items()}
+    assert lowest == {EVERY_MARCH: "static", "trajectory": "force"}
+    with pytest.raises(BadInput, match="no such kind of results"):
+        make_plan(study, results="nonsense")

@@ -1,6 +1,7 @@
 """Bodies that ride on contacts: the engine against a dense twin, lanes, steps, histories and separation."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,14 +11,16 @@ import engine
 import studies
 from engine.batch.plan import make_plan
 from engine.march.march import march
+from engine.march.richardson import march_scheme
 from engine.march.step_rules import contact_omega
 from engine.model.lane_table import padded
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
-from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, SHOES, THREE, TWO, UNEVEN, riding
+from results_schema.errors import BadInput
+from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
 from tests.engine.bodies_on_contacts_dense import Twin, Where
-from tests.engine.build import Table, beam, cruise, fixed, shuttle, swing
+from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, shuttle, study, swing, under
 
 
 def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, list[Where]], NDArray[np.bool_]]:
@@ -132,3 +135,165 @@ def test_separation_is_judged_at_every_contact() -> None:
     assert int(found.status) == 1
     assert float(found.car_contact_force_min) == pytest.approx(min(float(found.rear_min), float(found.front_min)))
     assert np.isfinite(float(found.car_separation_position))
+
+
+# Bodies that ride on contacts where the answer is known: masses, sprung masses, forces, rigid joints, orders
+
+
+def test_on_one_rigid_contact_it_is_a_rigid_mass() -> None:
+    bed, way = beam(modes=6, own_weight=True), swing(0.4, 0.3, 0.9, 1)  # starts with a speed, on a slope
+    changes: Table = {"solver": {"steps": 900}, "sensor": {"place": fixed(0.61), "below": under("car")}}
+    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
+    joined = engine.run(riding(way, one, RIGID, bed, **changes))
+    single = engine.run(study(bed, mass(0.5, way), **changes))
+    for name in ("place_max", "place_min", "below_max", "car_contact_force_max", "car_contact_force_min"):
+        assert float(joined[name]) == pytest.approx(float(single[name]), rel=1e-9), name
+
+
+def test_on_one_spring_it_is_a_sprung_mass() -> None:
+    way, bed = cruise(0.0, 1.0, 0.8), beam(modes=6)
+    plain: Table = {"solver": {"steps": 900, "static_correction": False}, "sensor": {"place": fixed(0.61)}}
+    one = {"only": {"at": 0.2, "stiffness": 40.0, "damping": 1.5}}
+    joined = engine.run(riding(way, one, RIGID, bed, **plain))
+    single = engine.run(study(bed, oscillator(0.5, 40.0, way, damping=1.5), **plain))
+    for name in ("place_max", "place_min", "car_contact_force_max", "car_contact_force_min"):
+        assert float(joined[name]) == pytest.approx(float(single[name]), rel=1e-9), name
+
+
+def test_rigid_joints_are_the_limit_of_stiff_springs() -> None:
+    """Two joints hold heave and pitch; stiffer and stiffer springs tend to them, as 1/k."""
+    bed, way = beam(modes=3, damping_ratio=0.05), shuttle(0.3, 0.7, 0.8, 0.5, 1)
+    changes: Table = {"solver": {"steps": 20000, "static_correction": False}, "sensor": {"place": fixed(0.61)}}
+
+    def largest(stiffness: float | str) -> float:
+        contacts = {name: {"at": at, "stiffness": stiffness} for name, at in (("rear", 0.05), ("front", 0.35))}
+        return float(engine.run(riding(way, contacts, RIGID, bed, **changes)).place_max)
+
+    joint = largest("rigid")
+    gaps = [abs(largest(stiffness) - joint) / joint for stiffness in (2e3, 2e4, 2e5)]
+    assert gaps[1] < 0.15 * gaps[0] < 0.15 * 0.02 and gaps[2] < 0.15 * gaps[1]
+
+
+def test_a_rigid_contact_stays_on_the_track() -> None:
+    """From the first instant on, with the speed that a slope gives it, on a bed that sags by itself too."""
+    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
+    sensors = {"below": under("car"), "own": fixed(0.2, body="table")}
+    changes: Table = {
+        "solver": {"steps": 4000, "static_correction": False},
+        "sensor": sensors,
+        "kind": "trajectory",
+        "output": {"histories": "all"},
+    }
+    for motion in (shuttle(0.3, 0.7, 0.8, 0.1, 1), swing(0.4, 0.3, 0.9, 1)):
+        found = studies.run(riding(motion, one, RIGID, beam(modes=4, own_weight=True, damping_ratio=0.02), **changes))
+        gap = np.abs(found.own.values - found.below.values)
+        assert gap.max() < 1e-4 * np.abs(found.below.values).max()
+
+
+def test_its_weight_alone() -> None:
+    """fidelity = "force": the shares of level ground as moving forces."""
+    changes: Table = {"sensor": {"place": fixed(0.61)}, "solver": {"steps": 300, "fidelity": "force"}}
+    found = engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN, **changes))
+    forces = {
+        name: {"on": "bed", "kind": "force", "force": 0.5 * 9.81 * share, "motion": cruise(a, a + 0.4, 0.8)}
+        for name, share, a in (("rear", 0.22 / 0.3, 0.15), ("front", 0.08 / 0.3, 0.45))
+    }
+    base = beam(damping_ratio=0.02, modes=5)
+    single = engine.run(study(base, forces, **(changes | {"solver": {"steps": 300}})))
+    assert float(found.place_max) == pytest.approx(float(single.place_max), rel=1e-9)
+    assert float(found.car_contact_force_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3)
+    assert float(found.car_contact_force_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
+    sensors = {name: {"carriage": "car", "contact": name, "quantity": "contact_force"} for name in TWO}
+    read = engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN, **(changes | {"sensor": sensors})))
+    assert float(read.rear_max) == pytest.approx(0.5 * 9.81 * 0.22 / 0.3) == float(read.rear_static)
+    assert float(read.front_min) == pytest.approx(0.5 * 9.81 * 0.08 / 0.3)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "order"),
+    [
+        ({}, 2.0),
+        ({"scheme": "hht-alpha", "alpha": -0.1}, 2.0),
+        ({"scheme": "generalized-alpha", "rho_inf": 0.8}, 2.0),
+        ({"scheme": "richardson"}, 4.0),
+    ],
+)
+def test_orders(scheme: Table, order: float) -> None:
+    def largest(steps: int, solver: Table) -> Array:
+        case = riding(shuttle(0.3, 0.7, 0.8, 0.3, 1), THREE, FLEXIBLE, solver={"steps": steps} | solver)
+        plan = make_plan(case)
+        (group,) = plan.groups
+        counts = np.linspace(0, group.tables.timeline.steps, 41).astype(np.int64)
+        marched = march_scheme(group.tables, plan.values(group, padded(group.variants)), counts, 1)
+        return marched.history[:, :, 0]
+
+    exact = largest(25600, {"scheme": "richardson"})
+    errors = [np.nanmax(np.abs(largest(steps, scheme) - exact), axis=0) for steps in (1600, 3200)]
+    fitted = np.log2(errors[0] / errors[1])[[0, 1, 2, 4, 7]]
+    assert np.all(np.abs(fitted - order) < 0.06 * order)
+
+
+# Bodies that ride on contacts: what is refused
+
+
+def change(case: Study, path: str, value: Any) -> Study:
+    return case.with_values({path: value})
+
+
+WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("carriage.car.body", "bed", r"carriage\.car\.body: a body cannot ride on itself"),
+        ("carriage.car.body", "tabel", r"carriage\.car\.body: no such body"),
+        ("carriage.car.contacts.front.at", 0.5, r"contacts\.front\.at: a place off the track of the body that rides"),
+        ("carriage.car.contacts.front.at", 0.1, r"carriage\.car\.contacts: this body would tip over"),
+        ("carriage.car.contacts", {}, r"carriage\.car\.contacts"),
+        ("carriage.car.contacts.rear", {"at": 0.35, "stiffness": 1.0}, r"this body would tip over"),
+        ("carriage.car.contacts.front.stiffness", 0.0, r"contacts\.front\.stiffness"),
+        ("carriage.car.contacts.front.stiffness", "stiff", r"contacts\.front\.stiffness"),
+        ("carriage.car.contacts.front.stiffness", "rigid", r"a rigid contact has no damper"),
+        ("carriage.car.contacts.front.point", "toe", r"exactly one place"),
+        ("carriage.car.contacts.front", {"point": "toe", "offset": 0.1, "stiffness": 1.0}, r"no such point"),
+        ("carriage.car.contacts.front", {"point": "toe", "stiffness": 1.0}, r"a point needs an offset"),
+        ("carriage.car.motion.end", 0.9, r"contacts\.front: this contact leaves the body"),
+        ("carriage.car.reference", 0.6, r"carriage\.car\.reference: a place off the track"),
+        ("solver.fidelity", "mass", r"solver\.fidelity: .*has no meaning"),
+        ("body.table.own_weight", True, r"nothing holds this body fully"),
+        ("body.table", beam(length=0.4, modes=4), r"something holds this body"),
+        ("body.table.centre", 0.41, r"body\.table\.centre"),
+        ("sensor.rear.contact", "raer", r"sensor\.rear\.contact: no such contact"),
+        ("sensor.rear.quantity", "displacement", r"sensor\.rear: only contact forces"),
+        ("sensor.total.quantity", "velocity", r"has no sprung mass"),
+    ],
+)
+def test_refused(path: str, value: Any, words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        make_plan(change(WHOLE, path, value))
+
+
+def test_rigid_contacts_meet_no_shocks() -> None:
+    rigid = {name: {"at": contact["at"], "stiffness": "rigid"} for name, contact in TWO.items()}
+    for motion in (cruise(-0.4, 1.4, 0.8), shuttle(0.3, 0.7, 0.8, 0.0, 1), cruise(0.3, 0.7, 0.8, after=1.0)):
+        with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
+            make_plan(riding(motion, rigid))
+    whole = swing(0.5, 0.2, 0.7, 2)  # sets off and stops at once, as a scene of its own begins and ends
+    make_plan(riding(whole, rigid))
+    car = {"on": "bed", "kind": "body", "body": "table", "contacts": rigid}
+    push = {"on": "bed", "kind": "force", "force": 1.0, "motion": cruise(0.0, 1.0, 0.1)}
+    late = {"motion": cruise(0.3, 0.7, 0.8), "delay": 0.1}  # it is not there before
+    for cars in ({"car": car | {"motion": whole}, "push": push}, {"car": car | late}):
+        with pytest.raises(BadInput, match="a rigid contact would meet a shock"):
+            make_plan(study(beam(), cars, body={"bed": beam(), "table": RIGID}))
+
+
+@pytest.mark.parametrize(
+    ("bed", "places", "most"), [(5, np.linspace(0.05, 0.35, 8), 7), (5, [0.2, 0.2], 1), (1, [0.0, 0.1, 0.2, 0.4], 3)]
+)
+def test_rigid_contacts_that_the_modes_cannot_meet_are_refused(bed: int, places: Any, most: int) -> None:
+    """A rigid body moves in two ways, and the bed in as many as it has modes."""
+    rigid = {f"c{number}": {"at": float(at), "stiffness": "rigid"} for number, at in enumerate(places)}
+    with pytest.raises(BadInput, match=rf"carriage\.car\.contacts: .*at most {most} of them rigid"):
+        make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), rigid, bed=beam(modes=bed)))
