@@ -1,7 +1,5 @@
 """Numbers in slices of their first axis, of which one at a time is in memory."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Tables of pieces by name: the program's own, and those that other packages bring by entry points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What a sensor can read: one row for every quantity, from which everything else follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol

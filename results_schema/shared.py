@@ -1,7 +1,5 @@
 """The outputs that kinds of study share: coordinates, what every kind has, marches, and the groups of an archive."""
 
-from __future__ import annotations
-
 from results_schema.status import Fidelity, SchemeUsed, Status
 from results_schema.variable import AXES, EVERY_KIND, declare, outputs
 

@@ -1,7 +1,5 @@
 """What became of a variant, which model computed it, and by which scheme it was marched."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 _MESSAGES = (

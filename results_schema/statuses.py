@@ -1,7 +1,5 @@
 """Statuses of many variants at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ those that each kind of study adds with `declare`. Names are templates: `{sensor
 for every sensor's, carriage's and envelope's name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """A reduced body in a netCDF-4 file: everything that the march knows of it, and nothing of its mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -4,8 +4,6 @@ A file appears under its name whole or not at all: it is written beside, closed,
 the folder is synced.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os

@@ -5,8 +5,6 @@ that it brought along is asked directly. Where that library cannot be found (an 
 statically), the check is left out: the system's rights on files are then the only guard.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from functools import cache

@@ -3,8 +3,6 @@
 xarray carries them as it carries those of files that it opens itself: to select or to rename reads nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -5,8 +5,6 @@ computed from, and the study's name), the parts, and the SHA-256 of each. A part
 carries the same key.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """Tables into one netCDF-4 file: the same tables give the same bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What findings and figures of studies at rest share: errors over the number of modes, and whether contacts vary."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from results_schema.arrays import Array, Mask

@@ -1,7 +1,5 @@
 """Where the first carriage stands in studies at rest, what they are asked, and scenes with other numbers of modes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 

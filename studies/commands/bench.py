@@ -1,7 +1,5 @@
 """Throughput of the march that `run` uses, on a fixed scene, so that machines and versions can be compared."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

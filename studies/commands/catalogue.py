@@ -1,7 +1,5 @@
 """The study files that come with the program: built-in studies, and commented files to start from."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping

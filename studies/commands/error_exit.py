@@ -1,7 +1,5 @@
 """From an error to an exit code: one readable message on standard error, and a log file for a bug of our own."""
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

@@ -1,7 +1,5 @@
 """What a run will take, from some seconds of it: how some variants converge, and pilots of a large sweep."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

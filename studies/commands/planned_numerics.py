@@ -1,7 +1,5 @@
 """What variants of a plan are computed with, as rows for people, from what was measured before a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What a run would do, from its plan and a few seconds of measuring: the scene, the work and its time, as tables."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the command sets up where it is the whole process: streams, warnings, memory, threads, signals."""
 
-from __future__ import annotations
-
 import codecs
 import io
 import os

@@ -1,7 +1,5 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated
 

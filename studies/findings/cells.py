@@ -1,7 +1,5 @@
 """What an archive of cells of variants says: extremes of sensors and contact forces, and how many variants it is of."""
 
-from __future__ import annotations
-
 from studies.results.cells import CellRange, End, cell_ranges, words_of
 from studies.results.findings_common import told_statuses
 from studies.results.formatting import counted, listed, quantity

@@ -5,8 +5,6 @@ need not close; then sensors and variants. Sums run station by station, so that 
 others are computed with it. Peaks are in `studies.findings.peaks`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

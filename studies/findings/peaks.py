@@ -1,7 +1,5 @@
 """Peaks of a cycle (mechanics.md, section 9), for many variants at once."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

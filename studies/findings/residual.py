@@ -1,7 +1,5 @@
 """How far sensors swing about their static values after all carriages have come to rest or left, in sentences."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from engine.scene.study import Study

@@ -1,7 +1,5 @@
 """Which variants of an asymmetry have settled, and how far forward and backward differ in these."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the pattern of two peaks per cycle breaks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from results_schema.arrays import Array, Mask

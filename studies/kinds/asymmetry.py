@@ -1,7 +1,5 @@
 """Does the response differ forward and backward? Indices of an out-and-back cycle at equal positions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

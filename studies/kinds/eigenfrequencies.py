@@ -1,7 +1,5 @@
 """How do the natural frequencies of the whole scene change with the place of the carriage? At rest, without a march."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What do gravity and the weights do at rest, against the place of the carriage? Static readings, without a march."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

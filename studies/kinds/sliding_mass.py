@@ -1,7 +1,5 @@
 """Where does a mass slide that lies on a bending beam? Section 2.3 of Hartweg and Heckmann (2012)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from engine.scene.study import Study

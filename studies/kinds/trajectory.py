@@ -1,7 +1,5 @@
 """What happens when? Histories of every sensor and of the carriages' own motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from engine.scene.study import Study

@@ -1,7 +1,5 @@
 """What studies of bodies in moving frames answer, in sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What studies of bodies in moving frames report, declared once."""
 
-from __future__ import annotations
-
 from engine.floating.results import ENDS, OF_CARRIAGES
 from results_schema.variable import outputs
 from results_schema.variables import Variable

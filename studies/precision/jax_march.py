@@ -3,8 +3,6 @@
 A plain transcription of mechanics section 2 for comparison with the march's kernels, which never use it.
 """
 
-from __future__ import annotations
-
 import time
 from importlib import import_module
 from importlib.util import find_spec

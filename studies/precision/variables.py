@@ -1,7 +1,5 @@
 """What a work-precision study compares, and what its archive holds, declared."""
 
-from __future__ import annotations
-
 from results_schema.variable import outputs
 
 #: Schemes in words: those of the march, and those that are offered for comparison alone.

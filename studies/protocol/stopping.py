@@ -4,8 +4,6 @@ A thread of its own hears them, as the main one may be in compiled code for long
 once is safe at any time: whatever is written is written whole or not at all.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """What the results of a run belong to: the study, the contents of the files that it names, and the program."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Sequence
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """What an archive says of its making: the study, the program and its packages, the machine, the time."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Killed at any moment it leaves finished parts behind, and goes on from them when it is started again.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Mapping
