@@ -146,7 +146,7 @@ def test_variants_that_are_done_are_left_out(many: bool) -> None:
         assert rest.arrays[name][left].tobytes() == array[left].tobytes(), name
 
 
-# Every reported number, the tolerance that it is held to, and how far two marches differ
+# ---- results, their tolerances, and how far two marches differ ----
 
 
 def held(given: Study) -> dict[str, float]:

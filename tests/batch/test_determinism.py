@@ -321,7 +321,7 @@ def test_no_threads_is_bad_input() -> None:
         run(mixed(), threads=0)
 
 
-# What the engine computes does not depend on what else was imported
+# ---- what else was imported ----
 
 
 SLOW = "[solver]\ntolerance = 1e-2\n"

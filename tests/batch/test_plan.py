@@ -209,7 +209,7 @@ def test_nothing_moves() -> None:
         make_plan(study(beam(), {}))
 
 
-# What is allowed and yet often a mistake is remarked; an ordinary study is not
+# ---- what is allowed and yet often a mistake is remarked ----
 
 
 WAY = cruise(0.0, 1.0, 0.5)

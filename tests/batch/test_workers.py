@@ -241,7 +241,7 @@ def test_a_study_of_which_every_variant_ends_its_process_is_given_up(make: Calla
         execute(make_plan(make()), Collector(48).add, Fatal(1))
 
 
-# A scheduler and its worker that speak TLS alone, set up as docs/workers.md says: certificates by openssl
+# ---- a scheduler and its worker that speak TLS alone, as docs/workers.md says: certificates by openssl ----
 
 
 WHOSE = ("SCHEDULER", "WORKER", "CLIENT")

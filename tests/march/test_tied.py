@@ -134,7 +134,7 @@ def test_the_sag_counts(term: str, monkeypatch: pytest.MonkeyPatch) -> None:
         compare(given, 1e-4)
 
 
-# Sprung masses: published numbers, limits of the spring, energy, order, lanes, steps, and what is refused
+# ---- published numbers, limits of the spring, energy, order, steps, and what is refused ----
 
 
 WHOLE = {"histories": "all"}
@@ -290,9 +290,9 @@ def test_steps_follow_the_springs() -> None:
         assert least[-1] >= 1.25 * float(contact_omega(model, one)[0]) / (2.0 * np.pi)
         assert int(run(given, threads=1).steps_used) >= least[-1]
     assert least[1] > 5 * least[0]
-    for scheme in ({}, {"solver.scheme": "hht-alpha", "solver.alpha": -0.05}):
+    for solver in ({}, {"solver.scheme": "hht-alpha", "solver.alpha": -0.05}):
         with pytest.raises(BadInput, match="period of the contact"):
-            run(given.with_values({"solver.steps": 100} | scheme), threads=1)
+            run(given.with_values({"solver.steps": 100} | solver), threads=1)
     with pytest.raises(BadInput, match="stability limit"):
         run(given.with_values({"solver.steps": 200, "solver.scheme": "central-difference"}), threads=1)
     auto = given.with_values({"solver.scheme": "central-difference"})

@@ -274,7 +274,7 @@ def test_what_they_do_not_march_is_refused() -> None:
         wilson_theta(1.0)
 
 
-# Where the comparison schemes turn unstable: bisection on what their kernels make of unit states at a held place
+# ---- where they turn unstable: bisection on what kernels make of unit states at a held place ----
 
 
 def held(modes: int, kilograms: float, damping: float = 0.0) -> SceneModel:

@@ -203,7 +203,7 @@ def test_one_held_result_without_a_number_is_not_held(tmp_path: Path) -> None:
     assert verdict.unknown == 1 and not verdict.held
 
 
-# Audits of kinds that are computed in pieces: robots on rails, frames that move
+# ---- kinds that are computed in pieces: robots on rails, frames that move ----
 
 
 LOADS = {"mass": {"of": "carriage.load.mass", "values": [50.0, 100.0]}}

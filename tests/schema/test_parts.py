@@ -266,7 +266,7 @@ def test_a_full_disk_at_any_operation_keeps_finished_chunks_whole(path, monkeypa
     raise AssertionError("no clean run")
 
 
-# A run killed in its N-th operation, for every N, goes on and gives the bytes of an uninterrupted one
+# ---- kills ----
 
 
 SHAPE = (4, 3)

@@ -88,7 +88,7 @@ def test_contacts_of_a_table_carry_by_levers() -> None:
     assert contact_names(base_scene(riding(cruise(0.3, 0.7, 1.0), TWO, UNEVEN))) == ["car.rear", "car.front"]
 
 
-# Bodies that ride on contacts, at rest: against a dense twin, levers and slow marches
+# ---- bodies that ride on contacts ----
 
 
 @pytest.mark.parametrize("name", ["flexible", "frame", "own weight"])

@@ -1,4 +1,4 @@
-"""Bodies that ride on contacts: the engine against a dense twin, lanes, steps, histories and separation."""
+"""Bodies that ride on contacts: the engine against a dense twin, lanes, steps, histories, separation, limits."""
 
 from collections.abc import Callable
 from typing import Any
@@ -137,7 +137,7 @@ def test_separation_is_judged_at_every_contact() -> None:
     assert np.isfinite(float(found.car_separation_position))
 
 
-# Bodies that ride on contacts where the answer is known: masses, sprung masses, forces, rigid joints, orders
+# ---- where the answer is known: masses, sprung masses, forces, rigid joints, orders ----
 
 
 def test_on_one_rigid_contact_it_is_a_rigid_mass() -> None:
@@ -233,7 +233,7 @@ def test_orders(scheme: Table, order: float) -> None:
     assert np.all(np.abs(fitted - order) < 0.06 * order)
 
 
-# Bodies that ride on contacts: what is refused
+# ---- what is refused ----
 
 
 def change(case: Study, path: str, value: Any) -> Study:

@@ -69,7 +69,7 @@ def test_peaks_where_the_cycle_is_closed() -> None:
     assert gap <= 2.0 * float(one.error_estimate + two.error_estimate)
 
 
-# Sentences on what variants were given
+# ---- sentences ----
 
 
 ZETA = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.4]}}
