@@ -165,12 +165,15 @@ def test_a_diverging_variant_among_others() -> None:
     """Parametric resonance without damping grows until nothing is left; light carriages beside it do not."""
     way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 200)
     sweep = {"weight": {"of": "carriage.car.mass", "values": [0.001, 1.0, 0.002]}}
-    ds = run(study(beam(modes=3), mass(0.5, way), sweep=sweep, solver={"steps": 4800, "tolerance": 0.1}))
+    solver, shape = {"steps": 4800, "tolerance": 0.1}, {"body": "bed", "quantity": "displacement", "places": 5}
+    ds = run(study(beam(modes=3), mass(0.5, way), sweep=sweep, solver=solver, envelope={"shape": shape}))
     assert ds.status.values.tolist() == [0, 5, 0]
     assert ds.diverged_step.values[0] == ds.diverged_step.values[2] == -1
     assert 400 < ds.diverged_step.values[1] < 200 * int(ds.steps_used[1])
     assert np.isnan(ds.midspan_max.values[1])
     assert np.isfinite(ds.midspan_max.values[[0, 2]]).all()
+    for end in ("max", "min"):
+        assert np.isnan(ds[f"shape_envelope_{end}"].values).tolist() == [[False] * 5, [True] * 5, [False] * 5]
 
 
 @pytest.mark.fault(16)
