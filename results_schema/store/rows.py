@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -12,6 +13,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from results_schema.blocks import BLOCK_BYTES
+from results_schema.errors import OutputFailed
 from results_schema.store import files
 from results_schema.store.tables import Table, from_arrays
 
@@ -19,6 +21,7 @@ Arrays = dict[str, np.ndarray]
 
 VARIANTS = "variants"
 _SELECTED = "/selected"
+SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 
 
 class Rows(NamedTuple):
@@ -90,6 +93,40 @@ class Collector:
     def selected(self) -> Rows | None:
         """The rows of a few, ascending by variant."""
         return joined(self._selected)
+
+
+class Gatherer:
+    """Takes finished chunks and writes them, joined, about twice a second (a part costs as much time as a small chunk);
+    the last ones when the block ends. A process that is killed loses no more than the chunks of the last half second.
+    """
+
+    def __init__(self, write: Callable[[Chunk], object]) -> None:
+        self._write = write
+        self._chunks: list[Chunk] = []
+        self._bytes, self._started = 0, time.monotonic()
+
+    def __enter__(self) -> Gatherer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # Work that is finished is kept, whatever stopped the rest; a failed write would only fail again.
+        if kind is None or not issubclass(kind, OutputFailed | MemoryError):
+            self.flush()
+
+    def add(self, chunk: Chunk) -> None:
+        """Take one chunk; as the sink of `engine.batch.execution.execute`."""
+        self._chunks.append(chunk)
+        self._bytes += sum(array.nbytes for array in chunk.rows.arrays.values())
+        if time.monotonic() - self._started >= SECONDS_PER_PART or self._bytes >= BYTES_PER_PART:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has gathered."""
+        chunks, self._chunks, self._bytes = self._chunks, [], 0
+        rows = joined([chunk.rows for chunk in chunks])
+        if rows is not None:
+            self._write(Chunk(rows, joined([chunk.selected for chunk in chunks if chunk.selected is not None])))
+        self._started = time.monotonic()
 
 
 class RowsOnDisk:

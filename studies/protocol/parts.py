@@ -5,7 +5,6 @@ so a killed run goes on from there, and put together at the end.
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -17,9 +16,9 @@ from numpy.typing import NDArray
 from engine.accuracy.jobs import Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Counts
-from results_schema.errors import Interrupted, OutputFailed, WorkersGaveUp
+from results_schema.errors import Interrupted, WorkersGaveUp
 from results_schema.late import xr
-from results_schema.store.rows import Chunk, Collector, Rows, RowsOnDisk, joined
+from results_schema.store.rows import Chunk, Collector, Gatherer, Rows, RowsOnDisk, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
 from studies.protocol.kept_pilots import NAME as PILOTS
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 PIECES_BYTES = 64 * 2**20  # more than what studies that measure leave on the disk
 GRACE_SECONDS = 1.0  # for a piece to end by itself when it is to stop
 USED = "_used"  # the end of the names of what a variant was computed with
-SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 
 
 class Work:
@@ -256,40 +254,6 @@ class Variants:
 
         dataset = summarised(self.kind, build(self.plan, found.arrays, found.selected), self.plan.study)
         return with_coordinates(self.kind, dataset, self.plan.study)
-
-
-class Gatherer:
-    """Takes finished chunks and writes them, joined, about twice a second (a part costs as much time as a small chunk);
-    the last ones when the block ends. A process that is killed loses no more than the chunks of the last half second.
-    """
-
-    def __init__(self, write: Callable[[Chunk], object]) -> None:
-        self._write = write
-        self._chunks: list[Chunk] = []
-        self._bytes, self._started = 0, time.monotonic()
-
-    def __enter__(self) -> Gatherer:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # Work that is finished is kept, whatever stopped the rest; a failed write would only fail again.
-        if kind is None or not issubclass(kind, OutputFailed | MemoryError):
-            self.flush()
-
-    def add(self, chunk: Chunk) -> None:
-        """Take one chunk; as the sink of `engine.batch.execution.execute`."""
-        self._chunks.append(chunk)
-        self._bytes += sum(array.nbytes for array in chunk.rows.arrays.values())
-        if time.monotonic() - self._started >= SECONDS_PER_PART or self._bytes >= BYTES_PER_PART:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write what has gathered."""
-        chunks, self._chunks, self._bytes = self._chunks, [], 0
-        rows = joined([chunk.rows for chunk in chunks])
-        if rows is not None:
-            self._write(Chunk(rows, joined([chunk.selected for chunk in chunks if chunk.selected is not None])))
-        self._started = time.monotonic()
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,9 @@ import xarray as xr
 import engine
 from results_schema.errors import Interrupted, OutputFailed
 from results_schema.store.archive import open_archive
-from results_schema.store.rows import Chunk, Rows
+from results_schema.store.rows import Chunk, Gatherer, Rows
 from studies.commands.cli import main
 from studies.protocol.options import RunOptions
-from studies.protocol.parts import Gatherer
 from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
 from studies.runs.runner import run_to_archive
 from tests.studies.every_way import assert_same_results

@@ -152,7 +152,7 @@ SCHEMES: dict[str, tuple[dict[str, Any], float]] = {
     "generalized-alpha": ({"scheme": "generalized-alpha", "rho_inf": 0.8}, 2.0),
     "generalized-alpha, most": ({"scheme": "generalized-alpha", "rho_inf": 0.0}, 2.0),
 }
-COUNTS = (3200, 6400, 12800)
+COUNTS = (1600, 3200, 6400)
 
 
 @pytest.fixture(scope="module")

@@ -19,9 +19,10 @@ from results_schema.arrays import Counts
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.statuses import lost
+from results_schema.store import rows
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command
-from studies.protocol.parts import Memory, Work
+from studies.protocol.parts import Memory, Variants, Work
 from studies.protocol.study import kind_of
 from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED
@@ -82,11 +83,16 @@ def told(whole: xr.Dataset, name: str, one_cell: bool) -> np.ndarray:
 
 @pytest.mark.parametrize("kept", ["extremes", "percentiles", "one cell"])
 def test_cells_have_what_numpy_finds_in_all_variants(whole: xr.Dataset, kept: str) -> None:
+    """And count them by their statuses."""
     found, one = studies.run(study(kept)), kept == "one cell"
     assert found["status"].dims == (() if one else ("speed",))
     names = found["result"].values.tolist()
     assert {"midspan_max", "quarter_min", "trolley_contact_force_min", "dynamic_amplification quarter"} <= set(names)
     cells = 1 if one else 3
+    statuses = columns(whole, "status", one)
+    wanted = [[np.count_nonzero(row == status) for status in Status] for row in statuses]
+    assert (statuses == Status.SEPARATED).any()
+    np.testing.assert_array_equal(found["status_count"].values.reshape(-1, len(Status)), wanted)
     numbers = np.arange(900).reshape(cells, -1)
     swept = {"speed": np.repeat(whole["speed"].values, 300).reshape(cells, -1)}
     swept |= {name: np.tile(whole[name].values, 3).reshape(cells, -1) for name in ("mass", "damping")}
@@ -94,25 +100,16 @@ def test_cells_have_what_numpy_finds_in_all_variants(whole: xr.Dataset, kept: st
         values = columns(whole, name, one)
         for end, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
             at = pick(values, axis=1)
-            rows = np.arange(cells), at
+            places = np.arange(cells), at
             own = found.isel(result=place)
-            np.testing.assert_array_equal(own[end].values.ravel(), values[rows])
-            np.testing.assert_array_equal(own[f"{end}_error"].values.ravel(), told(whole, name, one)[rows])
-            np.testing.assert_array_equal(own[f"{end}_variant"].values.ravel(), numbers[rows])
+            np.testing.assert_array_equal(own[end].values.ravel(), values[places])
+            np.testing.assert_array_equal(own[f"{end}_error"].values.ravel(), told(whole, name, one)[places])
+            np.testing.assert_array_equal(own[f"{end}_variant"].values.ravel(), numbers[places])
             for axis, column in swept.items():
-                np.testing.assert_array_equal(own[f"{end}_at"].sel(swept=axis).values.ravel(), column[rows])
+                np.testing.assert_array_equal(own[f"{end}_at"].sel(swept=axis).values.ravel(), column[places])
         if "percentile" in found:
-            wanted = np.nanpercentile(values, PERCENT, axis=1).T
-            np.testing.assert_array_equal(own["percentile"].values.reshape(cells, -1), wanted)
-
-
-@pytest.mark.parametrize("kept", ["extremes", "one cell"])
-def test_every_variant_is_counted(whole: xr.Dataset, kept: str) -> None:
-    found = studies.run(study(kept))
-    statuses = whole["status"].transpose("speed", "variant").values.reshape(found["status"].size, -1)
-    wanted = [[np.count_nonzero(row == status) for status in Status] for row in statuses]
-    assert (statuses == Status.SEPARATED).any()
-    np.testing.assert_array_equal(found["status_count"].values.reshape(-1, len(Status)), wanted)
+            percentiles = np.nanpercentile(values, PERCENT, axis=1).T
+            np.testing.assert_array_equal(own["percentile"].values.reshape(cells, -1), percentiles)
 
 
 def test_variants_that_fail_are_counted_and_have_no_extreme(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,8 +175,6 @@ def test_variants_that_end_every_process_are_counted_as_crashed(whole: xr.Datase
 
 @pytest.mark.parametrize("kept", ["extremes", "percentiles"])
 def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from studies.protocol import parts
-
     monkeypatch.chdir(tmp_path)
     Path("study.toml").write_text(TEXT + KEPT[kept], encoding="utf-8")
     assert command(["run", "study.toml", "-o", "whole.nc"]) == 3
@@ -190,10 +185,10 @@ def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: str, monkeypatch
         written.append(chunk)
         raise KeyboardInterrupt
 
-    keep = parts.Variants._keep
+    keep = Variants._keep
     with monkeypatch.context() as patched:
-        patched.setattr(parts, "BYTES_PER_PART", 1)
-        patched.setattr(parts.Variants, "_keep", stopped)
+        patched.setattr(rows, "BYTES_PER_PART", 1)
+        patched.setattr(Variants, "_keep", stopped)
         assert command(["run", "study.toml", "-o", "again.nc"]) == 130
     assert written and not Path("again.nc").exists()
     assert command(["run", "study.toml", "-o", "again.nc"]) == 3

@@ -46,7 +46,7 @@ def on_disk_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("engine.batch.plan.SHOWN", 4)
-    monkeypatch.setattr("studies.protocol.parts.SECONDS_PER_PART", 0.0)
+    monkeypatch.setattr("results_schema.store.rows.SECONDS_PER_PART", 0.0)
 
 
 def ran(kind: str, path: Path, *options: str) -> Path:
