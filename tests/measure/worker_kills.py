@@ -26,7 +26,7 @@ from tests.studies.small import LONG
 
 SECONDS = 1.0, 6.0  # between two kills: a worker takes about two to start
 STUDIES = {
-    "marched": LONG.replace("to = 1300, count = 300", "to = 1100, count = 40").replace("40000", "10000\naudit = 0"),
+    "marched": LONG.replace("1300, count = 300", "1100, count = 40").replace("40000\naudit = 2", "10000\naudit = 0"),
     "at rest": TEXTS["at rest"],
     "frames that move": TEXTS["frames that move"].replace("[7000.0, 8500.0]", f"{[7e3 + 10.0 * n for n in range(40)]}"),
     "robots": TEXTS["robots"],

@@ -227,7 +227,7 @@ FORGED: Mapping[str, tuple[Change, str]] = {
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The archive of a small study with an audit."""
     folder = tmp_path_factory.mktemp("small")
-    path = write(folder, SMALL.replace('steps = "auto"', 'steps = "auto"\naudit = 1'))
+    path = write(folder, SMALL.replace("audit = 2", "audit = 1"))
     assert main(["run", str(path), "-o", str(folder / "small.nc")]) == 0
     return folder / "small.nc"
 

@@ -170,7 +170,7 @@ def test_the_command_says_it_and_ends_with_3(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    write(tmp_path, SMALL.replace('steps = "auto"', "steps = 200\naudit = 5\ntolerance = 1e-7"))
+    write(tmp_path, SMALL.replace('"auto"\naudit = 2', "200\naudit = 5\ntolerance = 1e-7"))
     assert main(["run", "small.toml", "-v"]) == 3
     told = " ".join(capsys.readouterr().out.split())
     assert "of 5 variants computed again with more of everything, 5 variants did not hold it" in told

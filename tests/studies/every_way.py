@@ -29,7 +29,7 @@ def portal() -> str:
 
 
 TEXTS = {
-    "marched": SCENES.replace("count = 8", "count = 3").replace('steps = "auto"', "steps = 200\naudit = 1"),
+    "marched": SCENES.replace("count = 8", "count = 3").replace('"auto"\naudit = 2', "200\naudit = 1"),
     "at rest": at_rest.text_of("influence", "positions = 3"),
     "frames that move": sliding(),
     "robots": portal(),

@@ -39,6 +39,7 @@ mass = { of = "carriage.trolley.mass", values = [0.1, 1.0] }
 
 [solver]
 steps = "auto"
+audit = 2
 """
 
 # The heavy ones lift off near the exit.
