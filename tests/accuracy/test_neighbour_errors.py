@@ -107,3 +107,13 @@ def test_what_the_study_fixes_makes_nothing_dearer() -> None:
     found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0))
     np.testing.assert_allclose(found.held[:, 0], 0.1, rtol=1e-12)
     np.testing.assert_array_equal(found.wanted, found.held)
+
+
+def test_margins_are_those_of_the_whole_error_where_the_study_fixes_all() -> None:
+    """The march that is wanted is the one that is taken, so that nothing is held; what is told still needs a margin."""
+    error = np.full(COUNT, 0.1 * TOLERANCE)
+    error[[4, 14, 24, 34]] *= 2.0
+    given = replace(measured(error), held=np.zeros((1, 1, COUNT)), free=False)
+    found = neighbour_errors_of(asked(), given, others(), (1.0, 1.0))
+    np.testing.assert_allclose(found.error[21], 0.2 * TOLERANCE, rtol=1e-12)
+    np.testing.assert_array_equal(found.held, 0.0)
