@@ -32,12 +32,19 @@ from studies.runs.audit import (
     told_accuracy,
     told_audit,
 )
+from studies.runs.runner import Outcome
 from tests.engine.build import beam
 from tests.floating.scenes import sliding_mass
 from tests.robots.scenes import scene
 from tests.studies import at_rest
 from tests.studies.audits import FINE, POOR, RICH, by_hand, crossing, group_of, outcome
 from tests.studies.small import SMALL, write
+
+
+@pytest.fixture(scope="module")
+def fine(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    """A run whose audit holds."""
+    return outcome(crossing(RICH, FINE), tmp_path_factory.mktemp("fine"))
 
 
 def test_few_modes_and_steps_are_found_out(tmp_path: Path) -> None:
@@ -62,45 +69,40 @@ def test_what_is_observed_is_what_a_finer_march_by_hand_says(tmp_path: Path) -> 
         assert 0.98 * gap <= observed <= 5.0 * gap + 2e-4
 
 
-def test_plenty_holds(tmp_path: Path) -> None:
-    found = outcome(crossing(RICH, FINE), tmp_path)
-    verdict = Verdict.of(group_of(found))
-    assert verdict.held and 0.0 < verdict.worst < 1.0 and exit_code(found) == 0
-    (told,) = told_audit(found.audit, Results.of(found.results))
-    sample = group_of(found).isel(sample=verdict.place)
+def test_plenty_holds(fine: Outcome) -> None:
+    verdict = Verdict.of(group_of(fine))
+    assert verdict.held and 0.0 < verdict.worst < 1.0 and exit_code(fine) == 0
+    (told,) = told_audit(fine.audit, Results.of(fine.results))
+    sample = group_of(fine).isel(sample=verdict.place)
     at = f"speed {float(sample['speed']):g} m/s, mass {float(sample['mass']):g} kg"
     assert told.startswith("asked 2e-3, audit of 3 variants found at most ") and f"worst at {at} (midspan" in told
 
 
-def test_the_group_is_as_declared_and_the_same_however_it_was_run(tmp_path: Path) -> None:
-    first = outcome(crossing(RICH, FINE), tmp_path)
-    group = open_archive(first.archive).groups[GROUP]
+def test_the_group_is_as_declared_and_the_same_however_it_was_run(fine: Outcome, tmp_path: Path) -> None:
+    group = open_archive(fine.archive).groups[GROUP]
     validate(group, GROUP, expand(GROUP))
     assert {"speed", "mass", "sample", "result"} == set(group.coords) and int(group["left_out"]) == 0
     flat = np.ravel_multi_index((np.searchsorted([0.2, 0.5, 0.9], group["speed"]), group["mass"] > 0.2), (3, 2))
     np.testing.assert_array_equal(group["sample"].values, flat)
-    (tmp_path / "other").mkdir()
-    xr.testing.assert_identical(group_of(outcome(crossing(RICH, FINE), tmp_path / "other", threads=2)), group_of(first))
-    finished = outcome(crossing(RICH, FINE), tmp_path)
+    xr.testing.assert_identical(group_of(outcome(crossing(RICH, FINE), tmp_path, threads=2)), group_of(fine))
+    finished = outcome(crossing(RICH, FINE), fine.archive.parent)
     assert finished.was_finished and exit_code(finished) == 0
     xr.testing.assert_identical(group_of(finished), group)
 
 
-def test_it_goes_on_to_the_same_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_goes_on_to_the_same_group(fine: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped after the march, before the audit."""
-    whole = group_of(outcome(crossing(RICH, FINE), tmp_path))
 
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    (tmp_path / "again").mkdir()
     with monkeypatch.context() as patched:
         patched.setattr("studies.runs.runner.audit_group", stopped)
         with pytest.raises(KeyboardInterrupt):
-            outcome(crossing(RICH, FINE), tmp_path / "again")
-    resumed = outcome(crossing(RICH, FINE), tmp_path / "again")
+            outcome(crossing(RICH, FINE), tmp_path)
+    resumed = outcome(crossing(RICH, FINE), tmp_path)
     assert resumed.resumed == 6
-    xr.testing.assert_identical(group_of(resumed), whole)
+    xr.testing.assert_identical(group_of(resumed), group_of(fine))
 
 
 def test_it_is_on_by_default_and_covers_every_result(tmp_path: Path) -> None:
@@ -194,9 +196,8 @@ def test_what_marches_nothing_refuses_it() -> None:
         studies.run(at_rest.study("influence").with_values({"solver.audit": 3}))
 
 
-def test_one_held_result_without_a_number_is_not_held(tmp_path: Path) -> None:
-    found = outcome(crossing(RICH, FINE), tmp_path)
-    group = group_of(found).copy(deep=True)
+def test_one_held_result_without_a_number_is_not_held(fine: Outcome) -> None:
+    group = group_of(fine).copy(deep=True)
     held = int(np.flatnonzero(np.isfinite(group["tolerance"].values))[-1])
     group["observed_error"].values[0, held] = np.nan
     verdict = Verdict.of(group)

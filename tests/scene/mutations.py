@@ -20,14 +20,19 @@ OWN_NAMES_OF_FRAMES = ("node", "section", "member", "point", "point_mass", "spri
 
 @dataclass(frozen=True)
 class Mutation:
-    """The text of a study with one change at a dotted key."""
+    """The data of a study with one change at a dotted key."""
 
     how: How
     path: tuple[str, ...]
-    text: str
+    data: dict[str, Any]
 
     def __str__(self) -> str:
         return f"{self.how} {'.'.join(self.path)}"
+
+    @property
+    def text(self) -> str:
+        """The study file."""
+        return write_document(self.data)
 
     @property
     def must_fail(self) -> bool:
@@ -41,11 +46,7 @@ class Mutation:
 def mutations(text: str) -> list[Mutation]:
     """All mutations of a study file."""
     data = tomllib.loads(text)
-    return [
-        Mutation(how, path, write_document(changed))
-        for path in _paths(data, ())
-        for how, changed in _changes(data, path)
-    ]
+    return [Mutation(how, path, changed) for path in _paths(data, ()) for how, changed in _changes(data, path)]
 
 
 def distinct(*texts: str) -> list[Mutation]:

@@ -1,5 +1,7 @@
 """Small studies of each kind, and datasets of them with variants that failed."""
 
+from functools import lru_cache
+
 import numpy as np
 import xarray as xr
 
@@ -68,9 +70,14 @@ def study(kind: str, sweep: str = "", **options: str) -> Study:
     return engine.load(text_of(kind, sweep, **options))
 
 
-def run(kind: str, sweep: str = "", **options: str) -> xr.Dataset:
-    """A small study, run."""
+@lru_cache(maxsize=64)
+def _found(kind: str, sweep: str, **options: str) -> xr.Dataset:
     return studies.run(study(kind, sweep, **options))
+
+
+def run(kind: str, sweep: str = "", **options: str) -> xr.Dataset:
+    """A small study, run once for all tests; a copy of what it found."""
+    return _found(kind, sweep, **options).copy(deep=True)
 
 
 def with_failures(dataset: xr.Dataset, every: int) -> xr.Dataset:
