@@ -164,7 +164,7 @@ def test_a_tolerance_of_a_sensors_own_is_held_beside_a_looser_one() -> None:
 
 def test_statics_are_chosen_where_they_are_enough() -> None:
     slow = {
-        "speed": axis(SPEED, 2e-4, 2e-3, 150),
+        "speed": axis(SPEED, 1e-3, 2e-3, 150),
         "weight": axis(WEIGHT, 0.01, 0.02, 2),
     }
     run = executed(passages(sweep=slow))
