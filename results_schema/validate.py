@@ -1,5 +1,7 @@
 """A dataset against the declarations: what is there, in which shape and unit, and why numbers are missing."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from typing import Any
 

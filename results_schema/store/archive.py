@@ -3,6 +3,8 @@
 `xarray.open_dataset` and Debian's `ncdump` read it as well; the functions here add the checks.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -1,5 +1,7 @@
 """A netCDF-4 file back into tables, with every check that is possible before its data are loaded."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

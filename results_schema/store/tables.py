@@ -5,6 +5,8 @@ values) nor scalars, strings and attributes: a digest over all of them, with a C
 archive, together with the list of its variables.
 """
 
+from __future__ import annotations
+
 import hashlib
 import zlib
 from collections.abc import Iterator, Mapping

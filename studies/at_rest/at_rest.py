@@ -2,6 +2,8 @@
 starts. Nothing is marched; a kind says what it computes of a scene, and this cuts the work into pieces.
 """
 
+from __future__ import annotations
+
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import partial

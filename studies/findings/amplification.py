@@ -1,5 +1,7 @@
 """Largest absolute over largest absolute static value, as more than one kind of study reports it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What every variant was computed with, the errors estimated for it and its work: sentences, and entries for JSON."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Closed forms that figures and findings compare with, for every variant of a sweep (mechanics.md, 7 and 9)."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """How often does the response peak in a cycle? Peaks and harmonics of the last cycle of a periodic motion."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

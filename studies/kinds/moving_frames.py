@@ -1,5 +1,7 @@
 """What do bodies do whose frames move, and carriages that slide on them by themselves?"""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

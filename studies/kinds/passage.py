@@ -1,5 +1,7 @@
 """How large does it get? Extremes of every sensor and of the contact force, and the dynamic amplification."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,7 @@
 """How many steps keep the march from resonating with itself? Growth per passage over the number of steps."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Is a speed critical because a frozen station says so? Mass held at midspan with its speed's terms, and passages."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """From which mass on does a staggered coupling blow up? Lagged inertia over mass, modes and step, at midspan."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from results_schema.arrays import Array

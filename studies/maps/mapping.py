@@ -1,5 +1,7 @@
 """What a map is: a question about a method, computed by running it, with the theory beside."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

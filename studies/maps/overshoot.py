@@ -1,5 +1,7 @@
 """How far does a scheme overshoot in its first steps when the step is long? An undamped oscillator, deflected."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from results_schema.arrays import Array

@@ -1,5 +1,7 @@
 """What if the mass is tied to the body by its place instead of by its inertia? The contact force then rings."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from results_schema.arrays import Array

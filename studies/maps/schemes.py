@@ -1,5 +1,7 @@
 """Up to which step is a scheme stable? Growth per step of an undamped oscillator over omega h."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

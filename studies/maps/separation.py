@@ -1,5 +1,7 @@
 """From which speed on would the mass lift off? Smallest contact force of a passage over speed and mass."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

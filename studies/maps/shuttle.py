@@ -1,5 +1,7 @@
 """When does a mass that swings to and fro make its body vibrate ever more? Floquet multipliers of one period."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """What a work-precision study says, from the archive's points alone."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Callable, Sequence
 

@@ -1,5 +1,7 @@
 """Error against cost, from the points alone: fitted orders, the Pareto front, the cheapest choice for an accuracy."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,6 +5,8 @@ static value; "extremes", the difference of the largest values over the same; "c
 over time over the weight, on 0-98 % of the span.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -1,5 +1,7 @@
 """A dataset that `studies.run` gave, as the archive that the command `run` would have written, without its audit."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 from engine.model.distinct_models import base_scene

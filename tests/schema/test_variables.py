@@ -131,7 +131,7 @@ def test_importing_the_package_is_cheap():
     assert "numpy" not in loaded
 
 
-#
+# ---- what is compared with the declarations ----
 
 
 def found(dataset, kind="march"):
