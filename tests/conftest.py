@@ -15,8 +15,9 @@ for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
+    """An empty working folder, and a screen wide enough for sentences."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "300")
     return tmp_path
 
 

@@ -22,14 +22,7 @@ from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED, SMALL, write
 
 Captured = pytest.CaptureFixture[str]
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def run_json(capsys: Captured, *arguments: str) -> tuple[int, dict[str, Any]]:

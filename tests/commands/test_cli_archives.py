@@ -23,11 +23,9 @@ Captured = pytest.CaptureFixture[str]
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, and a screen of 80 columns."""
-    monkeypatch.chdir(tmp_path)
+def narrow(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A screen of 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
-    return tmp_path
 
 
 def output(capsys: Captured, *arguments: str, code: int = 0) -> str:

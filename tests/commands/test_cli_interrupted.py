@@ -22,11 +22,9 @@ from tests.studies.small import LONG, SCENES, start, write
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with a study."""
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path, SCENES)
-    return tmp_path
+def study(here: Path) -> None:
+    """A study in the working folder."""
+    write(here, SCENES)
 
 
 def after_parts(monkeypatch: pytest.MonkeyPatch, number: int, number_of_signal: int) -> None:

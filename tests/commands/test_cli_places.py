@@ -12,11 +12,9 @@ from engine.scene.study import load
 from results_schema.store import files
 from studies.commands.cli import main
 from studies.protocol.study import kind_of
-from tests.commands.test_cli import Captured, here, refused
+from tests.commands.test_cli import Captured, refused
 from tests.commands.test_cli_interrupted import interrupted
 from tests.studies.small import SCENES, SMALL, write
-
-__all__ = ["here"]  # a fixture
 
 
 @pytest.mark.fault(27)

@@ -8,6 +8,7 @@ from studies.commands.cli import main
 from tests.studies.small import SMALL
 
 SWEEP = SMALL[SMALL.index("speed = { of") : SMALL.index("[solver]")]
+pytestmark = pytest.mark.usefixtures("here")
 OTHER = SMALL.replace("density = 1000.0", "density = 7850.0")
 
 
@@ -61,13 +62,6 @@ MISTAKES = {
     "Latin-1": (SMALL.replace("small", "kl\u00f6ner").encode("latin-1"), 2, ["line 2", "save it as UTF-8"]),
     "a byte-order mark": (b"\xef\xbb\xbf" + SMALL.encode(), 0, ["16 = 8 speed x 2 mass"]),
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty working folder, and a screen wide enough for sentences."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "300")
 
 
 def told(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> str:

@@ -174,8 +174,7 @@ def test_variants_that_end_every_process_are_counted_as_crashed(whole: xr.Datase
 
 
 @pytest.mark.parametrize("kept", ["extremes", "percentiles"])
-def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_resumed_run_has_the_same_bytes(here: Path, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("study.toml").write_text(TEXT + KEPT[kept], encoding="utf-8")
     assert command(["run", "study.toml", "-o", "whole.nc"]) == 3
     written = []
@@ -195,10 +194,7 @@ def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: str, monkeypatch
     assert_same_archives(open_archive("again.nc"), open_archive("whole.nc"))
 
 
-def test_every_command_reads_archives_of_cells(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_every_command_reads_archives_of_cells(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("study.toml").write_text(TEXT + KEPT["percentiles"], encoding="utf-8")
     assert command(["check", "study.toml"]) == 0
     assert "percentiles of 3 cells" in capsys.readouterr().out

@@ -166,12 +166,10 @@ def test_measuring_kinds_are_such_and_some_refuse_a_sweep(kind: str) -> None:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder with the small study."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    (tmp_path / "small.toml").write_text(precision.TEXT, encoding="utf-8")
-    return tmp_path
+def here(here: Path) -> Path:
+    """A working folder with the small study."""
+    (here / "small.toml").write_text(precision.TEXT, encoding="utf-8")
+    return here
 
 
 def after_pieces(monkeypatch: pytest.MonkeyPatch, number: int) -> None:

@@ -168,11 +168,8 @@ def test_what_the_archive_marks_itself_is_told_apart() -> None:
     assert np.isnan(Verdict.of(marked).worst) and as_json(marked, Results.of(dataset))["marked"] == 6
 
 
-def test_the_command_says_it_and_ends_with_3(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path, SMALL.replace('"auto"\naudit = 2', "200\naudit = 5\ntolerance = 1e-7"))
+def test_the_command_says_it_and_ends_with_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(here, SMALL.replace('"auto"\naudit = 2', "200\naudit = 5\ntolerance = 1e-7"))
     assert main(["run", "small.toml", "-v"]) == 3
     told = " ".join(capsys.readouterr().out.split())
     assert "of 5 variants computed again with more of everything, 5 variants did not hold it" in told
@@ -182,9 +179,9 @@ def test_the_command_says_it_and_ends_with_3(
     assert audit["held"] is False and audit["variants"] == 5 and set(audit["at"]) == {"speed", "mass"}
     assert audit["largest_observed_error"] > audit["tolerance"] == 1e-7
     assert main(["report", "small.nc"]) == 0
-    page = (tmp_path / "small-report" / "report.html").read_text(encoding="utf-8")
+    page = (here / "small-report" / "report.html").read_text(encoding="utf-8")
     assert "Asked 1e-7, audit of 5 variants found at most" in page and "The audit found errors of at most" in page
-    assert list((tmp_path / "small-report").glob("*-audit.svg"))
+    assert list((here / "small-report").glob("*-audit.svg"))
 
 
 def test_it_is_said_that_no_audit_was_worth_its_time() -> None:
