@@ -12,6 +12,7 @@ from results_schema.store import files
 from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from studies.reporting import answers
 from studies.reporting.report import PAGE, write_report
+from tests.schema.samples import FailNth
 from tests.studies import scenes
 
 KINDS = tuple(scenes.MOTIONS)
@@ -164,17 +165,7 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
 @pytest.mark.fault(26)
 def test_a_full_disk_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = archive(tmp_path, scenes.run("passage", scenes.pace("passage")))
-
-    class Full(files.Faults):
-        count = 0
-
-        def before(self, operation: str, path: Path) -> None:
-            if operation == "write":
-                self.count += 1
-                if self.count == 3:
-                    raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(files, "FAULTS", Full())
+    monkeypatch.setattr(files, "FAULTS", FailNth(3, lambda operation, path: operation == "write"))
     with pytest.raises(OutputFailed, match="No space left"):
         write_report(source, tmp_path / "out")
     written = sorted(path.name for path in (tmp_path / "out").iterdir())

@@ -1,7 +1,5 @@
 """Archives of studies whose results stay on the disk against those of the same studies put together in memory."""
 
-import errno
-import os
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +22,7 @@ from studies.protocol.parts import Variants
 from studies.protocol.study import kind_of
 from studies.reporting import tabulated
 from tests.protocol.test_named import KINDS, swept
+from tests.schema.samples import FailNth
 from tests.studies.every_way import assert_same_archives
 
 BLOCK = 3000  # bytes, of some of a hundred variants
@@ -98,25 +97,16 @@ def test_what_stays_on_the_disk_takes_no_memory(monkeypatch: pytest.MonkeyPatch)
             run(given)
 
 
-class FullOnTheWay(files.Faults):
-    """No space where results are put between parts and archive, the second time."""
-
-    count = 0
-
-    def before(self, operation: str, path: Path) -> None:
-        self.count += path.name.endswith(".parts") and operation == "write"
-        if self.count == 2:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-
-
 @pytest.mark.fault(26)
 def test_a_disk_that_is_full_then_is_code_74(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """Where results are put between parts and archive, the second time."""
     many_parts(monkeypatch)
     whole = open_archive(ran("passage", tmp_path / "whole.nc"))
     on_disk_alone(monkeypatch)
-    monkeypatch.setattr(files, "FAULTS", FullOnTheWay())
+    on_the_way = FailNth(2, lambda operation, path: path.name.endswith(".parts") and operation == "write")
+    monkeypatch.setattr(files, "FAULTS", on_the_way)
     assert command(["run", str(tmp_path / "whole.toml"), "-o", str(tmp_path / "a.nc")]) == 74
     said = capsys.readouterr().err
     assert "a.nc.parts" in said and "bytes free there" in said

@@ -93,16 +93,16 @@ def groups() -> dict[str, xr.Dataset]:
 
 
 class FailNth(files.Faults):
-    """Lets the N-th operation meet a full disk; `count` tells how many there were."""
+    """Lets the N-th operation among some meet a full disk; `count` tells how many there were."""
 
-    def __init__(self, number: int) -> None:
-        self.number = number
-        self.count = 0
+    def __init__(self, number: int, among: Callable[[str, Path], bool] = lambda operation, path: True) -> None:
+        self.number, self.among, self.count = number, among, 0
 
     def before(self, operation: str, path: Path) -> None:
-        self.count += 1
-        if self.count == self.number:
-            self.fail(operation, path)
+        if self.among(operation, path):
+            self.count += 1
+            if self.count == self.number:
+                self.fail(operation, path)
 
     def fail(self, operation: str, path: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
