@@ -119,7 +119,7 @@ def test_points_at_the_track_are_places_of_it() -> None:
     moment = frame.sections.influence_at("bending_moment", x[:-1], LENGTH)
     np.testing.assert_allclose(frame.points.section_influence("bending_moment", "point.tip", x[:-1]), moment, atol=1e-9)
     assert frame.points.between("point.tip", "point.tip") == pytest.approx(frame.influence_at([LENGTH], [LENGTH])[0])
-    assert gauge_at(frame.points, "point.tip").own_weight() == pytest.approx(frame.own_weight_deflection([LENGTH])[0])
+    assert gauge_at(frame, "point.tip").own_weight() == pytest.approx(frame.own_weight_deflection([LENGTH])[0])
     assert frame.points.between("point.side", "point.side") == pytest.approx(LENGTH**3 / (3.0 * 2.1e11 * 3e-6))
     # The spring's upward elongation is the axis's deflection, downwards and without twist.
     assert frame.points.between("spring.prop.z", "point.tip") == pytest.approx(

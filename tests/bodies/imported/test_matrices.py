@@ -205,7 +205,7 @@ def test_points_and_other_directions(loose: Files) -> None:
     assert found.points.between("point.tip", "point.tip") == pytest.approx(found.influence([LENGTH], [LENGTH])[0, 0])
     assert np.abs(found.points.influence("point.tip", X) - found.influence(X, [LENGTH])[:, 0]).max() < 1e-15
     assert abs(found.points.between("point.tip", "point.side")) < 1e-15
-    assert gauge_at(found.points, "point.tip").own_weight() == pytest.approx(found.own_weight_deflection([LENGTH])[0])
+    assert gauge_at(found, "point.tip").own_weight() == pytest.approx(found.own_weight_deflection([LENGTH])[0])
     lateral = loose.table(supports=supports)
     lateral["track"] |= {"direction": [0.0, 1.0, 0.0]}
     sideways, frame = modal(lateral), body(straight(CLAMPED_FREE, elements=12, track_direction=[0.0, 1.0, 0.0]))
