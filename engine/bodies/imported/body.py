@@ -15,6 +15,7 @@ from engine.bodies.imported.line import (
     SPLINE_NODES,
     LineAlong,
     LineRecovered,
+    LineSections,
     LineShapes,
     LineStatics,
     NoSections,
@@ -112,7 +113,7 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
 
 
 def _along(
-    body: Imported, held: HeldModel, track: tuple[LineStatics, Sections], parts: _Parts, read: list[Array]
+    body: Imported, held: HeldModel, track: tuple[LineStatics, LineSections], parts: _Parts, read: list[Array]
 ) -> tuple[LineAlong, Array]:
     """Motion of the track along itself, by the smooth curve through that of its nodes, with its statics; and motions
     along (loads, 2 P) under some loads (n,)."""
@@ -120,7 +121,7 @@ def _along(
     nodes, count = node_rows(held, body.line.nodes, body.line.tangent, 0), len(body.line.nodes)
     spread = np.zeros((2 * count, count))
     spread[::2], spread[1::2] = np.eye(count), spline_slopes(body.line.places)
-    told = [_told(body, held).T] if isinstance(sections, LineRecovered) else []
+    told = [_told(body, held).T] if body.recovered else []
     others = [sparse.csc_array(np.asarray(part)) for part in (loads, *(load[:, None] for load in read), *told)]
     parts_of = [nodes, rows, *others]
     ends = np.cumsum([part.shape[1] for part in parts_of])
@@ -130,7 +131,7 @@ def _along(
         shapes=LineShapes(body.line.places, spread @ (nodes.T @ shapes)),
         own=replace(statics, flexibility=spread @ own),
         across=replace(statics, flexibility=slopes @ across),
-        sections=replace(sections, response=more[-1]) if isinstance(sections, LineRecovered) else NoSections(),
+        sections=sections.under_loads(*more[len(read) :]),
         points=dict(zip(_point_names(body), points, strict=True)),
     )
     return found, np.array([one[0] for one in more[: len(read)]]).reshape(len(read), 2 * count)
@@ -264,7 +265,7 @@ def _points(
     )
 
 
-def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> tuple[Sections, Array]:
+def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Parts) -> tuple[LineSections, Array]:
     """Stress and strain along the track where the body has a recovery matrix: means of rows at the track's nodes, those
     of one quantity after the other's (K P,); and (K P, Q) there per unit force at points."""
     shapes, rows, slopes, pull, loads = parts

@@ -10,7 +10,7 @@ solve with this interpolation gives.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -107,6 +107,10 @@ class NoSections:
 
     influence_at = own_weight = under_response = rows
 
+    def under_loads(self) -> NoSections:
+        """There are none under other loads."""
+        return self
+
 
 @dataclass(frozen=True, eq=False)
 class LineRecovered:
@@ -119,6 +123,10 @@ class LineRecovered:
     values: Array
     response: Array
     weight: Array
+
+    def under_loads(self, response: Array) -> LineRecovered:
+        """The same of other unit loads, of values and slopes along the track."""
+        return replace(self, response=response)
 
     def rows(self, quantity: str, s: ArrayLike) -> Array:
         """A quantity of every mode at the stations `s` (S,), as (S, N). Raises BadInput for one that is not told."""
@@ -160,6 +168,9 @@ class LineRecovered:
         return self.quantities.index(quantity) * len(places) + left, (at - places[left]) / np.diff(places)[left]
 
 
+LineSections = LineRecovered | NoSections
+
+
 @dataclass(frozen=True, eq=False)
 class LineAlong:
     """Motion of a track along itself, and what unit forces along it do: to itself (own), to its deflection (across), to
@@ -168,7 +179,7 @@ class LineAlong:
     shapes: LineShapes
     own: LineStatics
     across: LineStatics
-    sections: LineRecovered | NoSections
+    sections: LineSections
     points: Mapping[str, Array]
 
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
