@@ -22,17 +22,20 @@ MOST_ROWS, MOST_CURVES = 5, 4
 
 
 def pictures(results: Results) -> list[Figure]:
-    """Largest values over the sweep, sensors and carriages over time, the phase portrait of what slides, the energy."""
+    """Largest values over the sweep, sensors and carriages over time, the phase portrait of what slides (these first),
+    the energy."""
     traced = results.traced()
     if not traced:
         return []
     shown, own = list(chosen(traced, MOST_CURVES)), [_own(results, traced)]
-    rows, found = _rows(results), list(_over_sweep(results))
+    rows, over_time = _rows(results), list[Figure]()
     caption = f"At {results.at(own[0])}; one of {len(traced)} kept histories." if len(traced) > 1 else ""
     if rows:
         name = next(iter(rows))
-        found.append(histories(results, "histories", ranging(results, name, rows[name], own), caption, rows, own))
-    found += [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
+        over_time.append(histories(results, "histories", ranging(results, name, rows[name], own), caption, rows, own))
+    sliding = [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
+    over_sweep = list(_over_sweep(results))
+    found = [*over_time, *sliding, *over_sweep] if sliding else [*over_sweep, *over_time]
     energies = {"kinetic_energy": "J", "potential_energy": "J"}
     change = float(np.nanmax(results.dataset["energy_change"].values))
     whole = max(float(np.abs(results.trace(name, index).values).max()) for name in energies for index in traced)
