@@ -212,7 +212,10 @@ def export(archive: Path, file: Path, names: str) -> None:
 
     chosen = [name.strip() for name in names.split(",") if name.strip()]
     left_out = write_table(results_of(open_archive(archive)), file, chosen)
-    console.say(f"wrote {file}", *([f"without {', '.join(left_out)}"] if left_out else []))
+    console.say(
+        f"wrote {file}",
+        *([f"without what has other dimensions than its rows: {', '.join(left_out)}"] if left_out else []),
+    )
 
 
 @commands.command()

@@ -103,7 +103,9 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
         told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(places[-1])}"
     if among is None:
         told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
-    return listed(told) if len(told) <= MOST_PARTS else f"first {told[0]}, last {told[-1]}"
+    if len(told) <= MOST_PARTS:
+        return listed(told)
+    return f"in {len(told)} parts of the sweep, first {told[0]}, last {told[-1]}"
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:

@@ -300,7 +300,8 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     if verdict.marked:
         told.append(_of_marked(verdict, results))
     if verdict.left_out:
-        told.append(f"{counted(verdict.left_out, 'further variant')} picked for the audit could not be compared")
+        more = counted(verdict.left_out, "further variant")
+        told.append(f"{more} picked for the audit could not be compared: without values, or nothing finer is left")
     return told
 
 

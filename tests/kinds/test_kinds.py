@@ -307,6 +307,13 @@ def test_between_speeds_that_lie_far_apart_nothing_is_said() -> None:
     assert wanted in answers.answer(dataset)[0]
 
 
+def test_many_parts_of_a_sweep_are_counted() -> None:
+    dataset = scenes.run("passage", 'pace = { of = "carriage.table.motion.speed", from = 1, to = 9, count = 9 }')
+    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [1.3, 1.0, 1.3, 1.0, 1.3, 1.3, 1.0, 1.0, 1.3]
+    wanted = "exceeds 1.1 in 4 parts of the sweep, first at 1 m/s, last at 9 m/s."
+    assert wanted in answers.answer(dataset)[0]
+
+
 def test_a_passage_tells_where_a_limit_of_the_question_is_exceeded() -> None:
     pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 4] }'
     dataset = scenes.run("passage", pace, extra='[question]\ndisplacement = "5 mm"')

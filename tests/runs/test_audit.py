@@ -136,7 +136,9 @@ def test_variants_without_values_are_left_out_and_counted() -> None:
     assert int(less["left_out"]) == 1
     xr.testing.assert_identical(less["observed_error"], whole["observed_error"].isel(sample=[0, 2, 3]))
     told = told_audit(less, Results.of(dataset))
-    assert told[-1] == "1 further variant picked for the audit could not be compared"
+    assert told[-1] == (
+        "1 further variant picked for the audit could not be compared: without values, or nothing finer is left"
+    )
     assert audit_group(plan, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
     assert told_audit(None, Results.of(dataset)) == []
     auto = studies.run(crossing(RICH, {}))
