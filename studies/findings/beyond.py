@@ -71,7 +71,7 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
     another where these are few; without one in how many variants."""
     beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
     if axis is None or axis.dim == VARIANT:
-        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}"
+        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}" if beyond.any() else "nowhere"
     others = [other for other in results.axes if other.name != axis.name]
     if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
         return _along(results, axis, beyond)

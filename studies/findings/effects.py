@@ -10,6 +10,7 @@ from studies.results.formatting import ALIKE, listed, number, percent
 from studies.results.results import Results
 
 MOST_AXES = 4
+HARDLY = 0.005  # of the smallest value: what no figure shows
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
 
 
@@ -53,11 +54,15 @@ def _effect(axis: Axis, line: Array) -> str:
     'changes by up to 10 % over speed 1 m/s to 4 m/s (largest at 1 m/s)'
     >>> _effect(speed, np.array([1.0, 0.9, 0.8])), _effect(speed, np.ones(3))
     ('falls by 20 % over speed 1 m/s to 4 m/s', 'stays the same over speed 1 m/s to 4 m/s')
+    >>> _effect(speed, np.array([1.0, 1.0004, 1.0003]))
+    'hardly changes over speed 1 m/s to 4 m/s'
     """
     over, ratio = f"over {axis.noun} {axis.span}", float(line.max() / line.min())
     steps = np.diff(line)
     if ratio - 1.0 <= ALIKE:
         return f"stays the same {over}"
+    if ratio - 1.0 <= HARDLY:
+        return f"hardly changes {over}"
     if (steps >= 0.0).all():
         return f"grows {'' if ratio >= TIMES else 'by '}{_times(ratio)} {over}"
     if (steps <= 0.0).all():

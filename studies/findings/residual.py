@@ -3,9 +3,10 @@
 import numpy as np
 
 from engine.scene.study import Study
+from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.beyond import LIMITED, Limits, where_beyond
 from studies.results.axes import PACES, Axis
-from studies.results.findings_common import in_words, uncertainty
+from studies.results.findings_common import in_words
 from studies.results.formatting import quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -34,8 +35,9 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
     place = extreme(np.where(results.with_values, values, np.nan))
     if place is None:
         return f"{sensor}: no variant has a residual vibration."
-    largest = f"{quantity(float(values[place]), units)}{uncertainty(results, name, place)}{in_words(results, place)}"
-    said = f"{sensor}: at rest it still swings by up to {largest}"
+    size = float(values[place])
+    off = told_error(float(absolute_errors(results, name)[place]), size, units)  # parts of a static value mislead here
+    said = f"{sensor}: at rest it still swings by up to {quantity(size, units)}{off}{in_words(results, place)}"
     limit = limits.limit(results.study.sensor[sensor].quantity)
     if limit is None:
         return f"{said}."

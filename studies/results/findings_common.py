@@ -70,7 +70,7 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     error = results.error_at(result, place)
     if not error > LOOSE:
         return ""
-    ends = ("max", "min", "residual")
+    ends = ("max", "min")
     sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
     free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
     remedy = f"; a `tolerance` of its own on sensor {sensor} asks for more" if free else ""

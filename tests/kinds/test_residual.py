@@ -43,6 +43,25 @@ def test_it_is_said_where_a_limit_is_exceeded(kind: str) -> None:
     assert short == said.replace(f"; {where}", "")
 
 
+def test_its_error_stands_beside_it_in_its_own_unit() -> None:
+    """Told errors are parts of the static value, which may be far from what still swings."""
+    found = studies.run(stops())
+    static = float((found.midspan_max / found.dynamic_amplification.sel(sensor="midspan"))[1])
+    found["estimated_error"].loc[{"result": "midspan_residual"}] = 5e-3 / static
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert "up to 19.3 mm ± 5 mm at acceleration 6 m/s²" in said
+    found["estimated_error"].loc[{"result": "midspan_residual"}] = 1e-3 / static
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert "up to 19.3 mm at acceleration 6 m/s²" in said
+
+
+def test_no_variant_beyond_a_limit_is_said_so() -> None:
+    twice = SWEPT | {"zeta": {"of": "body.bed.damping_ratio", "values": [0.01, 0.02]}}
+    found = studies.run(stops(sweep=twice, question={"residual": {"displacement": 1.0}}))
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert said.endswith("it exceeds 1 m nowhere.")
+
+
 def test_what_is_not_asked_is_not_told() -> None:
     found = studies.run(stops(output={"histories": "none"}))
     assert not [name for name in found.variables if "residual" in str(name)]
