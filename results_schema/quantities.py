@@ -31,8 +31,7 @@ class Quantity:
     factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
     of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
-    carries. told: its error makes no status, as forces
-    that enter excite every mode. meant: other words for it.
+    carries. told: its error makes no status, as forces that enter excite every mode. meant: other words for it.
     """
 
     name: str

@@ -11,8 +11,8 @@ from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import of_every_quantity
 from studies.findings.effects import unchanged
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
+from studies.pictures.common.sizes import sizes_of
 from studies.pictures.common.sweep_view import view
-from studies.pictures.passages.sizes import sizes_of
 from studies.pictures.trajectory import histories, ranging
 from studies.results.formatting import ALIKE, quantity
 from studies.results.places import Index, chosen

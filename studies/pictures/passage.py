@@ -15,6 +15,8 @@ from studies.findings.beyond import AskedOfPassages, ranked
 from studies.findings.effects import unchanged
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
+from studies.pictures.common.response import response
+from studies.pictures.common.sizes import gain, sizes_of, speed_ratio
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MOST_CURVES,
@@ -26,8 +28,6 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import picked
-from studies.pictures.passages.sizes import gain, sizes_of, speed_ratio
-from studies.pictures.passages.ways import response
 from studies.protocol.study import question_of
 from studies.results.formatting import number
 from studies.results.places import Index, extreme
