@@ -16,7 +16,7 @@ from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import Flat, histories
-from engine.observation.histories import counts_shown
+from engine.observation.histories import counts_at_rest, counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import WorkersGaveUp
@@ -110,6 +110,8 @@ def _marched_again(
     values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
         counts = counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)
+        if tables.watches_rest and plan.study.output.histories == "auto":
+            counts = np.union1d(counts, counts_at_rest(tables.timeline))
         yield Rows(variants[own], histories(tables, values.part(own), counts, halted))
 
 

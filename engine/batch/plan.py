@@ -28,7 +28,7 @@ from engine.model.distinct_models import base_scene, scenes, split
 from engine.model.scene_model import SceneModel, check_moves
 from engine.model.timeline import Window
 from engine.observation.cycle_reduction import Reduction
-from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_shown
+from engine.observation.histories import CYCLE_STATIONS, REST_STATIONS, WHOLE_STATIONS, counts_shown
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
 from engine.scene.variants import VariantValues, cases_tolerance
@@ -162,7 +162,7 @@ class Plan:
     def stations_shown(self) -> int:
         """About the most stations that a kept history has."""
         if self.study.output.histories == "auto":
-            return WHOLE_STATIONS
+            return WHOLE_STATIONS + REST_STATIONS * self.study.output.residual
         units = max(rider.end for rider in self.base.riders)
         return int(np.ceil(units * max((group.usual_steps for group in self.groups), default=0)))
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 CYCLE_STATIONS = 200  # of a kept history over the last cycle
 WHOLE_STATIONS = 401  # of a kept history over a whole run
+REST_STATIONS = 201  # more over its rest, where it is told how far sensors swing on
 
 
 def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "none", "all"] | Every) -> Counts:
@@ -32,6 +33,12 @@ def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "no
         steps = last - first
         return np.unique(first + np.rint(np.arange(CYCLE_STATIONS) * (steps / CYCLE_STATIONS)).astype(np.int64))
     return np.unique(np.rint(np.linspace(first, last, WHOLE_STATIONS)).astype(np.int64))
+
+
+def counts_at_rest(timeline: Timeline) -> Counts:
+    """Stations by their count over the end of a run, from where all carriages rest."""
+    first, last = min(segment.first for segment in timeline.segments if segment.rests), timeline.window[1]
+    return np.unique(np.rint(np.linspace(first, last, REST_STATIONS)).astype(np.int64))
 
 
 def counts_reduced(timeline: Timeline, stations: int) -> Counts:

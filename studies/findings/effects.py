@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.late import xr
 from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import ALIKE, listed, number, percent
 from studies.results.results import Results
@@ -23,6 +24,17 @@ def unchanged(results: Results, values: Array) -> str:
         return ""
     over = [f"{axis.noun} {axis.span}" for axis in varied[:MOST_AXES]]
     return f"does not change over {listed(over) if len(varied) <= MOST_AXES else 'the sweep'}"
+
+
+def by_effect(results: Results, values: Array) -> list[Axis]:
+    """The swept numbers, that first along which values (in the sweep's shape) change most on average; those of samples
+    as they stand in the file."""
+    varied = [axis for axis in results.axes if axis.values.size > 1]
+    if VARIANT in results.dims:
+        return varied
+    known = xr.DataArray(np.where(results.with_values, values, np.nan), dims=results.dims)
+    ranges = {axis.name: known.max(axis.dim) - known.min(axis.dim) for axis in varied}
+    return sorted(varied, key=lambda axis: -float(ranges[axis.name].fillna(0.0).mean()))
 
 
 def told_effects(results: Results, values: Array, what: str) -> str:

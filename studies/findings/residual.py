@@ -3,15 +3,24 @@
 import numpy as np
 
 from engine.scene.study import Study
+from engine.study_file.spec import Spec
+from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.beyond import LIMITED, Limits, where_beyond
-from studies.results.axes import PACES, Axis
+from studies.findings.effects import by_effect
 from studies.results.findings_common import in_words
 from studies.results.formatting import quantity
-from studies.results.places import extreme
+from studies.results.places import Index, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+
+
+class AskedOfRest(Spec):
+    """The table [question] of a trajectory. residual: limits of residual vibrations, of which is told where they are
+    exceeded."""
+
+    residual: Limits = Limits()
 
 
 def check_residual(study: Study, limits: Limits) -> None:
@@ -21,32 +30,46 @@ def check_residual(study: Study, limits: Limits) -> None:
         raise study.source.fault("question.residual", what, expected="[output] residual = true beside it")
 
 
-def residuals(results: Results, limits: Limits) -> list[str]:
-    """The largest residual vibration of sensors, and where limits are exceeded, those with a limit first; nothing where
-    the study does not tell it."""
+def residual_of(results: Results, sensor: str) -> Array:
+    """The residual vibration of a sensor, in the sweep's shape; NaN where it does not count."""
+    values = results.dataset[f"{sensor}_residual"].transpose(*results.dims).values
+    return np.where(results.with_values, values, np.nan)
+
+
+def ringing(results: Results, limits: Limits) -> list[str]:
+    """Sensors whose residual vibration is told: what is the largest part of its limit first, then those without one;
+    none where the study does not tell it."""
     told = list(results.sensors) if results.study.output.residual else []
-    told.sort(key=lambda sensor: limits.limit(results.study.sensor[sensor].quantity) is None)
-    return [_residual(results, sensor, limits) for sensor in told[:MOST_SENSORS]]
+    named = {sensor: limits.limit(results.study.sensor[sensor].quantity) for sensor in told}
+    part = {s: np.nanmax(residual_of(results, s), initial=0.0) / limit for s, limit in named.items() if limit}
+    return sorted(told, key=lambda sensor: -part.get(sensor, -np.inf))
+
+
+def residuals(results: Results, limits: Limits) -> list[str]:
+    """The largest residual vibration of sensors, and where limits are exceeded."""
+    return [_residual(results, sensor, limits) for sensor in ringing(results, limits)[:MOST_SENSORS]]
+
+
+def most_ringing(results: Results) -> list[Index]:
+    """For every sensor whose residual vibration is told the variant with the largest."""
+    places = [extreme(residual_of(results, sensor)) for sensor in ringing(results, Limits())]
+    return [place for place in places if place is not None]
 
 
 def _residual(results: Results, sensor: str, limits: Limits) -> str:
-    name, units = f"{sensor}_residual", results.sensors[sensor]
-    values = np.asarray(results.dataset[name].transpose(*results.dims).values, dtype=np.float64)
-    place = extreme(np.where(results.with_values, values, np.nan))
+    units, values = results.sensors[sensor], residual_of(results, sensor)
+    place = extreme(values)
     if place is None:
         return f"{sensor}: no variant has a residual vibration."
     size = float(values[place])
-    off = told_error(float(absolute_errors(results, name)[place]), size, units)  # parts of a static value mislead here
-    said = f"{sensor}: at rest it still swings by up to {quantity(size, units)}{off}{in_words(results, place)}"
+    error = float(absolute_errors(results, f"{sensor}_residual")[place])  # parts of a static value mislead here
+    said = (
+        f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
+        f"{told_error(error, size, units)}{in_words(results, place)}"
+    )
     limit = limits.limit(results.study.sensor[sensor].quantity)
     if limit is None:
         return f"{said}."
-    axis = _axis(results)
+    axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None else ""
     return f"{said}; it exceeds {quantity(limit, units)} {where_beyond(results, values, limit, axis)}{over}."
-
-
-def _axis(results: Results) -> Axis | None:
-    """The swept pace, or the one number that is swept at all."""
-    varied = [axis for axis in results.axes if axis.values.size > 1]
-    return results.axis(*PACES) or (varied[0] if len(varied) == 1 else None)

@@ -14,7 +14,7 @@ from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
 from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
 from studies.findings.effects import told_effects, unchanged
-from studies.findings.residual import check_residual, residuals
+from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
@@ -58,9 +58,10 @@ class Passage(Kind):
         return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
-        """For every sensor of the answer the variants with the largest value and the largest amplification."""
+        """For every sensor of the answer the variants with the largest value and the largest amplification, and those
+        that swing on most."""
         places = (place for sensor in _told(results) for place in _extremes(results, sensor))
-        return [place for place in places if place is not None]
+        return [*(place for place in places if place is not None), *most_ringing(results)]
 
 
 KIND = Passage()

@@ -3,14 +3,14 @@
 import numpy as np
 
 from engine.scene.study import Study
-from engine.study_file.spec import Spec
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
-from studies.findings.beyond import Limits, of_every_quantity
-from studies.findings.residual import check_residual, residuals
+from studies.findings.beyond import of_every_quantity
+from studies.findings.residual import AskedOfRest, check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
+from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_SENSORS = 4
@@ -29,26 +29,20 @@ RESULTS = outputs("""
 declare("trajectory", *MARCH, *RESULTS)
 
 
-class Asked(Spec):
-    """The table [question]. residual: limits of residual vibrations, of which is told where they are exceeded."""
-
-    residual: Limits = Limits()
-
-
 class Trajectory(Kind):
     """The kind "trajectory"."""
 
     name = "trajectory"
     summary = "histories of every sensor and of the carriages' motion"
     question = "What do the sensors and the carriages do over time?"
-    settings = Asked
+    settings = AskedOfRest
     drawn_by = "studies.pictures.trajectory"
 
     def check(self, study: Study) -> None:
         """Something moves, something is measured, and histories are kept."""
         first_carriage(study)
         check_sensors(study)
-        check_residual(study, question_of(study, Asked).residual)
+        check_residual(study, question_of(study, AskedOfRest).residual)
         if study.output.histories == "none":
             raise study.source.fault(
                 "output.histories",
@@ -57,10 +51,14 @@ class Trajectory(Kind):
                 received='"none"',
             )
 
+    def named(self, results: Results) -> list[Index]:
+        """The variants that swing on most."""
+        return most_ringing(results)
+
     def findings(self, results: Results) -> list[str]:
         traced = results.traced()
         said = [_kept(results)] if traced else ["No history was kept."]
-        said += residuals(results, question_of(results.study, Asked).residual)
+        said += residuals(results, question_of(results.study, AskedOfRest).residual)
         said += [_span(results, sensor) for sensor in of_every_quantity(results, MOST_SENSORS)]
         return [*said, *told_statuses(results)]
 

@@ -14,6 +14,7 @@ from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import AskedOfPassages, ranked
 from studies.findings.effects import unchanged
 from studies.pictures.common import figures as look
+from studies.pictures.common import residual
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
 from studies.pictures.common.response import response
 from studies.pictures.common.sizes import gain, sizes_of, speed_ratio
@@ -40,8 +41,8 @@ FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 
 def pictures(results: Results) -> list[Figure]:
-    """All figures that the sweep and the kept histories allow: sizes of the first quantity and of those with a limit
-    come first, those of others last."""
+    """All figures that the sweep and the kept histories allow: what rings on, where that is told, sizes of the first
+    quantity and of those with a limit come first, those of others last."""
     limits = question_of(results.study, AskedOfPassages)
     sensors = [name for name in ranked(results, limits) if np.isfinite(sizes(results, name)).any()]
     if not sensors:
@@ -61,7 +62,8 @@ def pictures(results: Results) -> list[Figure]:
         first += [_contact(seen, touching)] if touching else []
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
     shown = picked(results, size, MOST_HISTORIES)
-    return [*first, *([response(results, sensors, limits, shown, top)] if shown else []), *others]
+    on_the_way = [response(results, sensors, limits, shown, top)] if shown else []
+    return [*residual.pictures(results, limits.residual), *first, *on_the_way, *others]
 
 
 def _top(results: Results, sensor: str) -> Index:

@@ -9,25 +9,30 @@ from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import sizes
 from studies.findings.beyond import of_every_quantity
-from studies.findings.theory import first_omega
+from studies.findings.residual import AskedOfRest
+from studies.pictures.common import residual
 from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve, coincide
-from studies.pictures.common.traces import picked
+from studies.pictures.common.traces import coarse, picked
+from studies.protocol.study import question_of
 from studies.results.formatting import ALIKE, quantity, scale_for
 from studies.results.places import Index, chosen
 from studies.results.results import Results
 
 MOST_ROWS = 4
-PER_PERIOD = 6  # instants: fewer draw another vibration than there is
 MOST_CURVES = 5
 MOST_ALIKE = 3.0  # longest over shortest history that can share an axis of seconds
 
 
 def pictures(results: Results) -> list[Figure]:
-    """The sensors, then the carriages' own motion, over time; none where no history was kept."""
+    """The sensors, then the carriages' own motion, over time, where histories were kept, then what rings on, where that
+    is told."""
+    rest = residual.pictures(results, question_of(results.study, AskedOfRest).residual)
+    return [*_over_time(results), *rest] if results.traced() else rest
+
+
+def _over_time(results: Results) -> list[Figure]:
     sensors = of_every_quantity(results, MOST_ROWS)
-    if not results.traced():
-        return []
     own = picked(results, sizes(results, sensors[0]), results.size)[-1:]
     shown = sorted({*own, *list(chosen(results.traced(), MOST_CURVES))[: MOST_CURVES - 1]})
     left_out = len(results.sensors) - len(sensors)
@@ -36,27 +41,14 @@ def pictures(results: Results) -> list[Figure]:
     units = {name: results.sensors[name] for name in sensors}
     hang = " Displacements point down, as the body hangs." if any(map(results.hangs, sensors)) else ""
     title = ranging(results, sensors[0], units[sensors[0]], shown)
-    coarse = _coarse(results, sensors[0], shown[0])
-    found = [histories(results, "sensors", title, f"{many}{more}{hang}{coarse}", units, shown)]
+    fine = coarse(results, results.trace(sensors[0], shown[0]).times)
+    found = [histories(results, "sensors", title, f"{many}{more}{hang}{fine}", units, shown)]
     ways = _carriage_rows(results)
     if not ways:
         return found
     name = next(iter(ways))
     title = ranging(results, name, ways[name], shown)
     return [*found, histories(results, "carriages", title, many, ways, shown)]
-
-
-def _coarse(results: Results, sensor: str, index: Index) -> str:
-    """That instants are too few to draw the first vibration of the body by; "" where they are enough."""
-    times = results.trace(sensor, index).times
-    each = (times.size - 1) / float(times[-1] - times[0])
-    first = float(np.max(first_omega(results))) / (2.0 * np.pi)
-    if each >= PER_PERIOD * first:
-        return ""
-    return (
-        f" The histories have {quantity(each, 'Hz')} of instants and the body vibrates at {quantity(first, 'Hz')} and "
-        'more: between two of them it does what is not drawn; [output] histories = "all" keeps every step.'
-    )
 
 
 def ranging(results: Results, name: str, unit: str, shown: list[Index]) -> str:

@@ -11,8 +11,10 @@ import engine
 import studies
 from engine.scene.study import Study, load
 from results_schema.errors import BadInput
+from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
 from studies.reporting import answers
+from studies.results.results import Results
 from tests.engine.build import beam, force, study
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
@@ -55,11 +57,67 @@ def test_its_error_stands_beside_it_in_its_own_unit() -> None:
     assert "up to 19.3 mm at acceleration 6 m/s²" in said
 
 
+LIMIT = {"residual": {"displacement": 17e-3}}
+
+
+def drawn(found: Any) -> dict[str, Any]:
+    """The figures of residual vibrations by name."""
+    return {one.name: one for one in studies.figures(found) if one.name in ("residual", "ringing")}
+
+
+@pytest.mark.parametrize("kind", ["passage", "trajectory"])
+def test_it_is_drawn_with_its_error_and_its_limit(kind: str) -> None:
+    """Against the swept number that changes it most, not the first of the file, at the other's value of the answer."""
+    twice = {"zeta": {"of": "body.bed.damping_ratio", "values": [0.0, 0.01]}} | SWEPT
+    found = studies.run(stops(kind, sweep=twice, question=LIMIT))
+    scale = np.asarray(
+        absolute_errors(Results.of(found), "midspan_residual") / found.estimated_error.sel(result="midspan_residual")
+    )
+    found["estimated_error"].loc[{"result": "midspan_residual"}] = 1e-3 / scale
+    figure = drawn(found)["residual"]
+    assert figure.title == (
+        "midspan still swings by up to 19.3 mm at rest, beyond the limit of 17 mm, at zeta 0, acceleration 6 m/s²"
+    )
+    (axes,) = figure.drawing.axes
+    *curves, limit = axes.lines
+    for line, band, own in zip(curves, axes.collections, found.midspan_residual.values * 1e3, strict=True):
+        np.testing.assert_allclose(line.get_xdata(), STEPS)
+        np.testing.assert_allclose(line.get_ydata(), own)
+        np.testing.assert_allclose(band.get_paths()[0].vertices[1:6, 1], own - 1.0, rtol=1e-6)
+    assert limit.get_ydata()[0] == pytest.approx(17.0)
+
+
+def test_it_is_drawn_over_the_time_after_the_stop() -> None:
+    """With stations enough: a run mostly of motion has as many for its rest as a run of rest."""
+    motion = MOVE | {"speed": 0.01, "dwell": 0.6}
+    given = study(beam(modes=1), force(2.0, motion), output={"residual": True}, solver={"steps": 40_000})
+    found = studies.run(given)
+    (axes,) = drawn(found)["ringing"].drawing.axes
+    (line,) = axes.lines
+    seconds, values = line.get_data()
+    assert seconds[0] == 0.0 and seconds[-1] == pytest.approx(0.6)
+    assert seconds.size == pytest.approx(201, abs=5) and np.ptp(np.diff(seconds)) < np.diff(seconds).max()
+    assert np.ptp(values) == pytest.approx(2e3 * float(found.midspan_residual), rel=0.01)
+
+
+def test_sensors_nearest_to_their_limits_come_first() -> None:
+    sensors = {"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}
+    found = studies.run(stops(sensor=sensors, question=LIMIT))
+    told = [text.partition(":")[0] for text in answers.answer(found) if "at rest" in text]
+    assert told == ["midspan", "quarter"]
+
+
+def test_the_history_of_the_largest_is_kept() -> None:
+    given = stops(question=LIMIT)
+    results = Results.of(studies.run(given))
+    assert (1,) in kind_of(given).named(results)
+
+
 def test_no_variant_beyond_a_limit_is_said_so() -> None:
     twice = SWEPT | {"zeta": {"of": "body.bed.damping_ratio", "values": [0.01, 0.02]}}
     found = studies.run(stops(sweep=twice, question={"residual": {"displacement": 1.0}}))
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
-    assert said.endswith("it exceeds 1 m nowhere.")
+    assert said.endswith("it exceeds 1 m nowhere from 2 m/s² to 30 m/s² of acceleration.")
 
 
 def test_what_is_not_asked_is_not_told() -> None:

@@ -7,8 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
+from studies.findings.theory import first_omega
+from studies.results.formatting import quantity
 from studies.results.places import Index
 from studies.results.results import Results
+
+PER_PERIOD = 6  # instants: fewer draw another vibration than there is
+STILL = 1e-9  # of its place: what a carriage at rest is off by rounding
 
 
 class Way(NamedTuple):
@@ -51,6 +56,17 @@ def over_position(results: Results, sensor: str, index: Index) -> Way:
     return Way(position[kept], values[kept])
 
 
+def since_rest(results: Results, sensor: str, index: Index) -> tuple[Array, Array]:
+    """Seconds (T,) since the last carriage has come to rest or left, and the readings (T,) of a sensor then."""
+    trace = results.trace(sensor, index)
+    recorded = np.isfinite(trace.times)
+    ways = [results.trace(f"{name}_position", index).values[recorded] for name in results.study.carriage]
+    moving = [~np.isclose(way, way[-1], rtol=STILL, atol=STILL, equal_nan=True) for way in ways]
+    first = int(np.flatnonzero(np.any(moving, axis=0)).max(initial=-1)) + 1
+    times, values = trace.times[recorded][first:], trace.values[recorded][first:]
+    return times - times[0], values
+
+
 def there_and_back(way: Way) -> tuple[Way, Way]:
     """A cycle that begins at the start, as the way out and the way back, each from its first to its last place."""
     turn = int(np.argmax(np.abs(way.position - way.position[0])))
@@ -64,3 +80,15 @@ def odd_part(out: Way, back: Way) -> Way:
     order = np.argsort(back.position)
     returned = np.interp(out.position, back.position[order], back.values[order])
     return Way(out.position, 0.5 * (out.values - returned))
+
+
+def coarse(results: Results, times: Array) -> str:
+    """That instants (T,) are too few to draw the first vibration of the body by; "" where they are enough."""
+    each = (times.size - 1) / float(times[-1] - times[0])
+    first = float(np.max(first_omega(results))) / (2.0 * np.pi)
+    if each >= PER_PERIOD * first:
+        return ""
+    return (
+        f" The histories have {quantity(each, 'Hz')} of instants and the body vibrates at {quantity(first, 'Hz')} and "
+        'more: between two of them it does what is not drawn; [output] histories = "all" keeps every step.'
+    )
