@@ -29,6 +29,7 @@ from engine.study_file.spec import Noun, Several, Spec, one_of
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.status import Status, label
+from results_schema.store import files
 from results_schema.variables import Variable, expand, sensor_unit
 
 SCHEMA_VERSION = 1
@@ -111,6 +112,30 @@ class Study(Scene):
     def source(self) -> Source:
         """Text and SHA-256 of the study file; for keywords the same study written as TOML."""
         return self._source
+
+    def toml(self) -> str:
+        """The text of a study file that `load` reads back into an equal study: the file's own, with its comments, or
+        the keywords as tables.
+
+        >>> load(Study(kind="passage", gravity="1 km/s^2").toml()).gravity
+        1000.0
+        """
+        return self._source.text
+
+    def save(self, path: str | Path) -> Path:
+        """Write that as a file, which the commands read; its path. Raises BadInput where there is something at that
+        place, and OutputFailed."""
+        path = Path(path)
+        files.check_new_place(path)
+        files.write_text(path, self.toml())
+        return path
+
+    def __eq__(self, other: object) -> bool:
+        """Whether two studies say the same, whatever their texts."""
+        return isinstance(other, Study) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.title))
 
     @property
     def data(self) -> dict[str, Any]:

@@ -185,6 +185,13 @@ def check_output_place(path: Path | str) -> None:
         raise output_failed(path, error) from error
 
 
+def check_new_place(path: Path) -> None:
+    """The same for a file that replaces none. Raises BadInput and OutputFailed."""
+    check_output_place(path)
+    if path.exists():
+        raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
+
+
 def check_replaceable(path: Path | str) -> None:
     """Refuse to put an archive in the place of anything that none has ever been. Raises BadInput."""
     path = Path(path)

@@ -56,9 +56,7 @@ def init(kind: str, file: Path | None) -> None:
     from studies.commands import catalogue, console
 
     text, path = catalogue.start_text(kind), file or Path(f"{kind}.toml")
-    files.check_output_place(path)
-    if path.exists():
-        raise BadInput("there is a file already", where=str(path), remedy="choose another name or remove it")
+    files.check_new_place(path)
     files.write_text(path, text)
     console.say(f"wrote {path}; next: wanderlast check {path}")
 

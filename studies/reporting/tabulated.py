@@ -51,9 +51,7 @@ def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> lis
     if path.suffix not in WRITERS:
         expected = f"a name that ends in {' or '.join(WRITERS)}"
         raise BadInput("unknown sort of table", where=str(path), expected=expected, received=path.suffix or "no ending")
-    files.check_output_place(path)
-    if path.exists():
-        raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
+    files.check_new_place(path)
     parts = _parts(results)
     table, left_out = table_of(next(parts), chosen)
     tables = chain([table], (table_of(part, chosen)[0] for part in parts))

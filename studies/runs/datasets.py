@@ -6,7 +6,6 @@ from pathlib import Path
 
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
-from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.store import files
 from results_schema.store.archive import Archive, write_archive
@@ -39,9 +38,7 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> 
     study: as of `archive_of`. Raises BadInput where there is something at that place, and OutputFailed.
     """
     path = Path(path)
-    files.check_output_place(path)
-    if path.exists():
-        raise BadInput("there is a file already", where=str(path), remedy="choose another path, or remove it first")
+    files.check_new_place(path)
     archive = archive_of(dataset, path, study)
     write_archive(path, archive.root, archive.groups)
     return path

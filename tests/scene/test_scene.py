@@ -11,6 +11,8 @@ from engine.scene.study import STANDARD_GRAVITY, Study, load
 from results_schema.errors import BadInput
 from tests.scene.sample import MINIMAL, SAMPLE
 
+LIBRARY = Path(__file__).parents[2] / "studies" / "library"
+
 
 def message(old: str, new: str, base: str = SAMPLE) -> str:
     assert old in base
@@ -45,8 +47,21 @@ def test_keywords_equal_a_file(tmp_path: Path) -> None:
     study, keywords = load(file), Study(**tomllib.loads(SAMPLE))
     assert study.source.name == str(file)
     assert study.source.text == SAMPLE
-    assert keywords.model_dump() == study.model_dump()
-    assert load(keywords.source.text).model_dump() == study.model_dump()
+    assert keywords == study
+    assert study != study.with_values({"gravity": 9.8})
+
+
+@pytest.mark.parametrize("path", sorted(LIBRARY.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_study_of_python_becomes_a_file(path: Path, tmp_path: Path) -> None:
+    """Every built-in one, from its file and from keywords; the file's text stays as it is."""
+    study = load(path)
+    assert study.save(tmp_path / "copy.toml").read_bytes() == path.read_bytes()
+    keywords = Study(**tomllib.loads(study.toml()))
+    again = keywords.save(tmp_path / "keywords.toml")
+    assert study == keywords == load(again) == load(tmp_path / "copy.toml")
+    assert load(again).with_values({"title": "another"}).toml() != keywords.toml()
+    with pytest.raises(BadInput, match=r"copy.toml: there is a file already"):
+        study.save(tmp_path / "copy.toml")
 
 
 def test_copies_keep_everything() -> None:
