@@ -24,8 +24,8 @@ from engine.robots.modes import (
     with_finer_modes,
     with_open_modes,
 )
-from engine.robots.results import differences, outcome, results_of, times_apart, without_values
-from results_schema.arrays import Array
+from engine.robots.results import are_held, differences, outcome, results_of, times_apart, without_values
+from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.statuses import gravest
@@ -44,6 +44,8 @@ FIRST_STEPS, REFINED, MOST_STEPS = 12, 6, 2_000_000
 LEFT_BY_MODES, LEFT_BY_STEPS, ALIKE = 1.0, 0.5, 0.5
 #: The same of steps that a study fixes, which may be too long: with 0.5 one error of 1,000 steps was told 0.64 times.
 LEFT_BY_FIXED_STEPS = 1.0
+#: Of what drives exert, whose changes are those of histories: of largest values 0.06 to 0.8 of these were left.
+LEFT_OF_DRIVES = 1.0
 MOST_ALIKE = 0.75  # ratio of two changes in a row by which the rest is told
 WORTH = 0.1  # of the tolerance: what no march is taken to be rid of
 LEAST_BETA = 1.0 / 12.0  # of Fox-Goodwin: below, the phase is worse again
@@ -168,15 +170,18 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
     tolerance = ladder.study.solver.tolerance
     level = ladder.level(rung)
     now = before = marched(level, zero)
-    unknown = np.full(len(results_of(level.model)), np.nan)
-    least = LEFT_BY_MODES, LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
+    held = are_held(results_of(level.model))
+    unknown = np.full(held.size, np.nan)
+    by_choice = LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
+    least = LEFT_BY_MODES, np.where(held, by_choice, LEFT_OF_DRIVES)
     when, change, told = (
         [unknown, unknown],
         [unknown, unknown],
         [unknown if ladder.most.modes else np.zeros(unknown.size), unknown],
     )
-    while not (told[0] + told[1] + now.missed).max() <= tolerance:
-        by_modes, by_steps = (float(np.nan_to_num(part, nan=np.inf).max()) for part in (told[0], told[1] + now.missed))
+    while not (told[0] + told[1] + now.missed)[held].max() <= tolerance:
+        parts = told[0], told[1] + now.missed
+        by_modes, by_steps = (float(np.nan_to_num(part[held], nan=np.inf).max()) for part in parts)
         finer = ladder.finer(rung, (by_modes if now.status.values_kept else 0.0, by_steps))
         if finer is None:
             break
@@ -184,16 +189,15 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
             raise Halted
         axis, before, coarser, level = int(finer.steps > rung.steps), now, rung, ladder.level(finer)
         now = marched(level, zero)
-        apart = differences(level.model, before, now)
-        apart = np.maximum(apart, ALIKE * apart.max())
+        apart = alike(differences(level.model, before, now), held)
         told[axis] = left(apart, change[axis], least[axis])
         if axis == 0:
             told[0] = np.maximum(told[0], ladder.missed_by(level.model))
         rung, change[axis], when[axis] = finer, apart, times_apart(level.model, before, now)
     error = told[0] + told[1] + now.missed
     judged = Status.UNRESOLVED
-    if np.isfinite(error).all():
-        judged = Status.OK if error.max() <= tolerance else Status.TOLERANCE_MISSED
+    if np.isfinite(error[held]).all():
+        judged = Status.OK if error[held].max() <= tolerance else Status.TOLERANCE_MISSED
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
     reported, times = now if whole.values_kept else without_values(now), np.where(told[0] > told[1], *when)
     error = error + by_fixed_modes(ladder, coarser, before, zero, halted)
@@ -210,13 +214,18 @@ def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted
         raise Halted
     finer = replace(ladder, study=study, coarsest=build(with_open_modes(study, ladder.times * MODES[0])))
     level = finer.level(rung)
-    apart = differences(level.model, found, marched(level, zero))
-    changed: Array = np.maximum(apart, ALIKE * apart.max())
+    changed = alike(differences(level.model, found, marched(level, zero)), are_held(results_of(level.model)))
     return changed + finer.missed_by(level.model)
 
 
-def left(change: Array, before: Array, least: float) -> Array:
-    """(results,) what is left of results after a change by twice as many modes or steps, and one before (NaN: none)."""
+def alike(apart: Array, held: Mask) -> Array:
+    """(results,) changes of a march, raised to a part of the largest, that of what is held and of what is not."""
+    return np.where(held, *(np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held)))
+
+
+def left(change: Array, before: Array, least: float | Array) -> Array:
+    """(results,) what is left of results after a change by twice as many modes or steps, and one before (NaN: none);
+    least: of the change."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.nan_to_num(change / before).clip(0.0, MOST_ALIKE)
     return np.where(np.isinf(change), np.nan, change * np.maximum(least, ratio / (1.0 - ratio)))

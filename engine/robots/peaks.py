@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.kernels.robots.peaks import largest
 from results_schema.arrays import Array, Counts, Mask
 
 if TYPE_CHECKING:
@@ -55,21 +56,8 @@ def peaks(values: Array, stretch: Counts, among: Mask | None = None) -> Peaks:
     >>> round(float(np.sin(t).max()), 4), round(float(found.value), 4), round(float(found.missed), 4)
     (0.9897, 0.9996, 0.0099)
     """
-    own = np.ones(values.shape, dtype=np.bool_) if among is None else among
-    most = np.max(np.where(own, values, -np.inf), axis=0)
-    low, top, high = values[:-2], values[1:-1], values[2:]
-    inside = own[:-2] & own[1:-1] & own[2:] & _along(stretch[2:] == stretch[:-2], values)
-    bent = 2.0 * top - low - high
-    at_top = inside & (top >= low) & (top >= high) & (bent > 0.0)
-    beside = np.divide((low - high) ** 2, 8.0 * bent, out=np.zeros(top.shape), where=at_top)
-    value = np.maximum(most, np.max(np.where(at_top, top + beside, -np.inf), axis=0, initial=-np.inf))
-    edges = (own[1:] != own[:-1]) & _along(stretch[1:] == stretch[:-1], values)
-    beyond = np.max(np.where(edges, np.maximum(values[1:], values[:-1]), -np.inf), axis=0, initial=-np.inf)
-    known = own.any(axis=0)
-    missed = np.subtract(np.maximum(value, beyond), most, out=np.zeros(most.shape), where=known)
-    return Peaks(np.where(known, value, np.nan), missed)
-
-
-def _along(which: Mask, values: Array) -> Mask:
-    """(T,) as wide as values."""
-    return which.reshape(-1, *[1] * (values.ndim - 1))
+    shape, own = values.shape[1:], np.ones(values.shape, dtype=np.bool_) if among is None else among
+    value, missed = np.empty(shape), np.empty(shape)
+    columns = [np.ascontiguousarray(each.reshape(len(stretch), -1)) for each in (values, own)]
+    largest(*columns, stretch, value.reshape(-1), missed.reshape(-1))
+    return Peaks(value, missed)

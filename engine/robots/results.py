@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -33,7 +33,7 @@ from engine.kernels.robots.layout import (
 from engine.robots.peaks import Steps, peaks
 from engine.robots.shortening import beyond_linear
 from engine.robots.stress import is_told, stress_at_steps
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from engine.robots.model import RobotModel
 
 DOING = {"moving": MOVES, "working": WORKS, "holding": HOLDS}
+OF_DRIVES = {"drive_force_largest": "drive force", "drive_torque_largest": "drive torque"}
 OF_TOOLS = [f"{what}_{doing}" for what in ("error", "beyond_rest") for doing in DOING]
 KEPT = 800  # stations of a history
 
@@ -57,6 +58,7 @@ class Outcome:
     planned: Array
     error: Array
     sunk: Array
+    drives: Array
     coordinates: Array
     status: Status
 
@@ -71,15 +73,16 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     longest = np.fmax.reduce([tools[f"error_{doing}"] for doing in DOING])
     pressed = peaks(record.passed[:, :, PASSED_GRIPS + VERTICAL : PASSED : OF_GRIP], steps.stretch).value.max(axis=1)
     numbers = {"cycle_time": model.done.max(), "error_at_start": at_start, "rail_force_largest": pressed}
-    numbers |= _drives(model, steps, record)
+    drives, of_drives = _drives(model, steps, record)
     numbers["beyond_linear"] = beyond_linear(model, record, longest)
     return Outcome(
-        numbers | tools | rails,
-        np.concatenate([of_tools, of_rails]),
+        numbers | tools | rails | drives,
+        np.concatenate([of_tools, of_rails, of_drives]),
         record.coordinates[:, 0, 3],
         record.robots[:, :, SEEN_PLANNED : SEEN_PLANNED + 3],
         _off(record) - zero_at,
         record.grips[:, :, :, SUNK],
+        record.drive,
         record.coordinates[:, : model.modes, 0],
         status,
     )
@@ -128,13 +131,31 @@ def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, A
     return numbers, np.concatenate([over(missed, down), over(stress.missed, stress.value)[told]])
 
 
-def _drives(model: RobotModel, steps: Steps, record: Record) -> dict[str, Array]:
-    """(R, J) the largest force or torque of drives, NaN where a joint is of the other sort or is none."""
-    largest = peaks(np.abs(record.passed[:, :, PASSED:]), steps.stretch).value
+def _drives(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
+    """(R, J) the largest force or torque of drives, NaN where a joint is of the other sort or is none, and what is
+    missed of them, as `by_drives` has it."""
+    largest, missed = peaks(np.abs(record.passed[:, :, PASSED:]), steps.stretch)
+    numbers, parts = (
+        {name: np.where(own, each, np.nan) for name, own in _joints(model).items()} for each in (largest, missed)
+    )
+    return numbers, by_drives(model, parts, numbers)
+
+
+def _joints(model: RobotModel) -> dict[str, Mask]:
+    """(R, J) whose drives exert forces, and whose torques."""
     slides = model.system.chain[:, :, SLIDES] > 0.0
-    there = np.arange(largest.shape[1]) < model.system.counts[:, JOINTS, None]
-    sorts = {"drive_force_largest": slides & there, "drive_torque_largest": ~slides & there}
-    return {name: np.where(own, largest, np.nan) for name, own in sorts.items()}
+    there = np.arange(slides.shape[1]) < model.system.counts[:, JOINTS, None]
+    return dict(zip(OF_DRIVES, (slides & there, ~slides & there), strict=True))
+
+
+def by_drives(model: RobotModel, parts: Mapping[str, Array], largest: Mapping[str, Array]) -> Array:
+    """(drives,) the largest part (R, J) of what the drives of a robot exert over the largest of that sort, of the
+    robots that have joints of that sort."""
+    found = []
+    for name, own in _joints(model).items():
+        has = own.any(axis=1)
+        found.append(over(*(np.fmax.reduce(each[name][has], axis=1) for each in (parts, largest))))
+    return np.concatenate(found)
 
 
 def over(part: Array, whole: Array) -> Array:
@@ -144,7 +165,7 @@ def over(part: Array, whole: Array) -> Array:
 
 def without_values(found: Outcome) -> Outcome:
     """The same of a variant that has no values, histories too."""
-    fields = ("missed", "planned", "error", "sunk", "coordinates")
+    fields = ("missed", "planned", "error", "sunk", "drives", "coordinates")
     nothing = {name: np.full_like(getattr(found, name), np.nan) for name in fields}
     return replace(found, numbers={name: np.full_like(n, np.nan) for name, n in found.numbers.items()}, **nothing)
 
@@ -152,13 +173,20 @@ def without_values(found: Outcome) -> Outcome:
 def results_of(model: RobotModel) -> list[str]:
     """What an error is told of, in the order of `differences`."""
     found = [*(f"error of {name}" for name in model.robots), *(f"deflection of {name}" for name in model.rails)]
-    return found + [f"stress of {name}" for name, rail in model.rails.items() if is_told(rail.bending)]
+    found += [f"stress of {name}" for name, rail in model.rails.items() if is_told(rail.bending)]
+    some = {name: np.flatnonzero(own.any(axis=1)) for name, own in _joints(model).items()}
+    return found + [f"{OF_DRIVES[name]} of {model.robots[r]}" for name, own in some.items() for r in own]
+
+
+def are_held(results: Sequence[str]) -> Mask:
+    """(results,) what is held to the tolerance: all but drives."""
+    return np.array([not name.startswith("drive") for name in results])
 
 
 def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     """(results,) how far two marches are apart at any station and in the largest values that are reported, over the
-    largest length of each robot's error or the largest deflection, and of stresses the largest, which alone are
-    reported; NaN where ``other`` has none, infinite where ``one`` has none."""
+    largest length of each robot's error, the largest deflection or the largest of its drives, and of stresses the
+    largest, which alone are reported; NaN where ``other`` has none, infinite where ``one`` has none."""
     count = len(results_of(model))
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(count, np.inf if other.status.values_kept else np.nan)
@@ -173,11 +201,14 @@ def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
     largest_one, largest_other = (each.numbers["stress_largest"][told] for each in (one, other))
     apart = np.concatenate([apart, gaps, np.abs(largest_one - largest_other)])
     size = np.concatenate([size, other.numbers["deflection_largest"], largest_other])
-    return over(apart, size)
+    at_stations = np.abs(one.drives - other.drives).max(axis=0)
+    drives = {n: np.maximum(at_stations, abs(one.numbers[n] - other.numbers[n])) for n in OF_DRIVES}
+    return np.concatenate([over(apart, size), by_drives(model, drives, other.numbers)])
 
 
 def times_apart(model: RobotModel, one: Outcome, other: Outcome) -> Array:
-    """(results,) s: when two marches are apart the most; NaN for stresses, of which the largest alone are compared."""
+    """(results,) s: when two marches are apart the most; NaN for stresses, of which the largest alone are compared, and
+    for drives."""
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(len(results_of(model)), np.nan)
     tools, sunk = np.linalg.norm(one.error - other.error, axis=2), np.abs(one.sunk - other.sunk)

@@ -45,8 +45,8 @@ def told_missed(results: Results) -> Iterator[str]:
 
 
 def _missed(results: Results, among: np.ndarray) -> Iterator[_Missed]:
-    times = results.dataset["estimated_error_time"]
-    for name in map(str, results.dataset["result"].values):
+    times, asked = results.dataset["estimated_error_time"], results.dataset["tolerance"]
+    for name in map(str, results.dataset["result"].values[np.isfinite(asked.values)]):
         error = np.where(among, results.estimated_error(name), np.nan)
         at = extreme(error)
         if at is not None and error[at] > results.study.solver.tolerance:

@@ -143,7 +143,7 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     """Everything, labelled."""
     from engine.robots.model import build
     from engine.robots.modes import with_open_modes
-    from engine.robots.results import results_of
+    from engine.robots.results import are_held, results_of
     from engine.scene.sweep import expand
 
     model, declared = build(with_open_modes(study.without_sweep())), study.results(kind)
@@ -154,7 +154,7 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     if alone is not None:
         labels["still"] = model.robots
     results = results_of(model)
-    tolerance = np.full(len(results), study.solver.tolerance)
+    tolerance = np.where(are_held(results), study.solver.tolerance, np.nan)
     dataset = labelled(list(own.values()), Told(expand(study), declared, results, tolerance, labels))
     if alone is not None:
         dataset["error_without"] = declared["error_without"].holding(alone["error_without"].values)
