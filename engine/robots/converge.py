@@ -220,7 +220,8 @@ def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted
 
 def alike(apart: Array, held: Mask) -> Array:
     """(results,) changes of a march, raised to a part of the largest, that of what is held and of what is not."""
-    return np.where(held, *(np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held)))
+    raised = [np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held)]
+    return np.asarray(np.where(held, *raised))
 
 
 def left(change: Array, before: Array, least: float | Array) -> Array:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from engine.scene.dotted_keys import FIXED, value_in, with_value
 from engine.scene.settings import SweepAxis
-from engine.scene.study import FIXED, Scene, Study, value_in, with_value
+from engine.scene.study import Scene, Study
 from engine.study_file.refusals import bad_input
 from engine.study_file.spec import nearest
 from results_schema.errors import BadInput, shortened

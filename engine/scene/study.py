@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +15,7 @@ from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
 from engine.bodies.modal.section_doubts import Doubt, damping_doubt
 from engine.scene.carriages import AnyCarriage
+from engine.scene.dotted_keys import numbers_in, value_in, with_value
 from engine.scene.frames import Frame
 from engine.scene.loads import Load, Spring
 from engine.scene.references import check_names, check_references
@@ -24,8 +25,8 @@ from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
-from engine.study_file.refusals import Keys, field_at, refuse
-from engine.study_file.spec import Noun, Several, Spec, one_of
+from engine.study_file.refusals import field_at, refuse
+from engine.study_file.spec import Noun, Several, one_of
 from engine.study_file.units import Acceleration, Unit, fault
 from results_schema.errors import BadInput, shortened
 from results_schema.status import Status, label
@@ -37,8 +38,6 @@ CELLS = "cells"  # the kind of results of studies that reduce their variants
 STANDARD_GRAVITY = 9.80665
 KIND = re.compile(r"[a-z][a-z0-9-]{0,63}")
 EXPECTABLE = tuple(label(status) for status in Status if status != Status.OK)
-# numbers that do not belong to the model
-FIXED = ("schema_version", "expected", "sweep", "output", "question", "solver.audit", "envelope")
 
 
 def _known_version(version: int) -> int:
@@ -196,7 +195,7 @@ class Study(Scene):
 
     def numbers(self) -> dict[str, float]:
         """Every number of the model by its dotted key, SI, defaults included."""
-        return dict(_numbers("", self))
+        return dict(numbers_in(self))
 
     def doubts(self) -> Iterator[Doubt]:
         """Conditions that its numbers may break, but are hardly meant to."""
@@ -310,26 +309,6 @@ def _check_version(document: Document) -> None:
         raise BadInput("this key is missing", where=where, expected=expected)
 
 
-def value_in(scene: Scene, path: str) -> Any:
-    """The value at a dotted key of a scene. KeyError where there is none."""
-    found: Any = scene
-    for key in path.split("."):
-        try:
-            if isinstance(found, Spec):
-                known = (*type(found).model_fields, *type(found).derived)
-                found = {name: getattr(found, name) for name in known}[key]
-            else:
-                found = found[int(key) if isinstance(found, tuple) else key]
-        except (KeyError, IndexError, ValueError, TypeError):
-            raise KeyError(path) from None
-    return found
-
-
-def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    """Plain data with another value at a dotted key; what is not on the way is shared. KeyError where it cannot be."""
-    return _replaced(data, path.split("."), value, path)  # type: ignore[no-any-return]
-
-
 def verify(study: Study) -> None:
     """Every check of the study for its own numbers. Raises BadInput."""
     for check in checks(study):
@@ -365,36 +344,6 @@ def _envelope_checks(study: Study) -> Iterator[Check]:
             if getattr(envelope, field) is not None:
                 here, needs = f"envelope.{name}.{key}", (f"envelope.{name}.{field}", f"body.{envelope.body}.length")
                 yield on_body(here, needs, "an envelope off its body")
-
-
-def _replaced(data: Any, keys: Keys, value: Any, path: str) -> Any:
-    if not keys:
-        return value
-    key, rest = keys[0], keys[1:]
-    if isinstance(data, list):
-        if not (str(key).isdigit() and int(key) < len(data)):
-            raise KeyError(path)
-        index = int(key)
-        return [*data[:index], _replaced(data[index], rest, value, path), *data[index + 1 :]]
-    if not isinstance(data, dict):
-        raise KeyError(path)
-    return {**data, key: _replaced(data.get(str(key), {}), rest, value, path)}
-
-
-def _numbers(here: str, value: Any) -> Iterator[tuple[str, float]]:
-    if here in FIXED or isinstance(value, bool):
-        return
-    if isinstance(value, int | float):
-        yield here, value
-    inside: Iterable[tuple[Any, Any]] = ()
-    if isinstance(value, Spec):
-        inside = [(name, getattr(value, name)) for name in type(value).model_fields]
-    elif isinstance(value, dict):
-        inside = value.items()
-    elif isinstance(value, tuple):
-        inside = enumerate(value)
-    for key, item in inside:
-        yield from _numbers(f"{here}.{key}" if here else str(key), item)
 
 
 def _check_swept_words(study: Study) -> None:
