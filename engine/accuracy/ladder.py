@@ -42,6 +42,9 @@ FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
 ENOUGH = 0.2  # of the tolerance, where pilots climb no further: with 0.4 some variants missed it, 0.1 gained nothing
+#: Of the tolerance, by a rung of the last scheme, for all pilots of a scene: dearer ones of other schemes are not
+#: climbed, as none would be taken. Of a gantry's pilots they took three quarters of the time.
+LEAVES = 0.5
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
 
@@ -103,13 +106,15 @@ def _models(asked: Asked, grid: SceneGrid) -> list[str]:
 
 
 class March(NamedTuple):
-    """A march of n pilots (by their places) on a rung: error (R, n) of every result, held (n,), and modes x steps."""
+    """A march of n pilots (by their places) on a rung: error (R, n) of every result, held (n,), whether it tells of
+    finer rungs too (n,), which else none is to take, and modes x steps."""
 
     column: int
     rung: int
     lanes: Counts
     error: Array
     held: Array
+    finer: NDArray[np.bool_]
     work: float
 
 
@@ -137,12 +142,12 @@ class Rungs:
         against = error
         if self.aim is not self.truth:
             against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
-        work = float(lanes.size * model.body_modes * tables.steps)
-        return March(column, rung, lanes, error, worst_held(against, results), work)
+        work, finer = float(lanes.size * model.body_modes * tables.steps), np.ones(lanes.size, dtype=np.bool_)
+        return March(column, rung, lanes, error, worst_held(against, results), finer, work)
 
-    def climb(self, lanes: Counts, halted: Halted, column: int, floor: Array) -> list[March]:
-        """From the coarsest rung that each of some pilots may take, until nothing is gained; floor (P,): what the
-        column leaves. Raises Halted."""
+    def climb(self, lanes: Counts, halted: Halted, column: int, floor: Array, most: float) -> list[March]:
+        """From the coarsest rung that each of some pilots may take, until nothing is gained, or the next one would be
+        more work than ``most``; floor (P,): what the column leaves. Raises Halted."""
         cuts, fine = np.array(self.ladder.cuts), self.fine(column)
         least, periods = self.least(column)
         rung = np.searchsorted(cuts, np.maximum(least, FIRST / self.unit(column) * periods))
@@ -150,11 +155,13 @@ class Rungs:
         while active.size:
             here = int(rung[active].min())
             own = active[rung[active] == here]
-            found.append(self.march(own, halted, column, here))
-            small = found[-1].held <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
+            now = self.march(own, halted, column, here)
+            small = now.held <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
             rung[own] += 1
-            done = own[small | (rung[own] >= np.minimum(fine[own], cuts.size))]
-            active = active[~np.isin(active, done)]
+            done = small | (rung[own] >= np.minimum(fine[own], cuts.size))
+            dear = ~done & (self.work(column)[min(here + 1, cuts.size - 1)] > most)
+            found.append(now._replace(finer=~dear))
+            active = active[~np.isin(active, own[done | dear])]
         return found
 
     def fine(self, column: int) -> Counts:
@@ -175,6 +182,11 @@ class Rungs:
     def model(self, column: int) -> SceneModel:
         """The scene with the numerics of a column."""
         return self.grid.model(self.ladder.columns[column])
+
+    def work(self, column: int) -> Array:
+        """(cuts,) modes x steps of a column's rungs over one passage or cycle."""
+        steps: Array = self.unit(column) * np.array(self.ladder.cuts, dtype=np.float64)
+        return self.model(column).body_modes * steps
 
     def unit(self, column: int) -> int:
         """Steps of the lowest rung over one passage or cycle."""
@@ -214,8 +226,9 @@ class Climb:
         self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        for marches in self.share(self.rungs, list(self._climbs())):
-            self._take(marches)
+        for swift in (True, False):
+            for marches in self.share(self.rungs, list(self._climbs(swift))):
+                self._take(marches)
         for name, enough in self.enough.items():
             self._fill(name, enough)
         return self._measured(truth, aim is truth)
@@ -262,12 +275,21 @@ class Climb:
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
 
-    def _climbs(self) -> Iterator[Job[list[March]]]:
-        """Of all columns that can hold the tolerance of some pilots at all."""
+    def _climbs(self, swift: bool) -> Iterator[Job[list[March]]]:
+        """Of all columns of the last scheme, or of the others, that can hold the tolerance of some pilots at all."""
         for column, floor in self.floor.items():
+            numerics = self.ladder.columns[column]
             worth = np.flatnonzero(floor <= HOPELESS * self.span[1])
-            if worth.size:
-                yield Job(partial(Rungs.climb, column=column, floor=floor), worth)
+            if worth.size and swift == (numerics.scheme is self.ladder.columns[-1].scheme):
+                most = np.inf if swift else self._least_work(numerics.fidelity)
+                yield Job(partial(Rungs.climb, column=column, floor=floor, most=most), worth)
+
+    def _least_work(self, name: str) -> float:
+        """Modes x steps of the cheapest rung of a model that holds well for all pilots; infinite where none does."""
+        own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
+        holds = np.all(self.held[own] <= LEAVES * self.span[0], axis=2)
+        work = np.stack([self.rungs.work(column) for column in own])
+        return float(np.min(np.where(holds, work, np.inf)))
 
     def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
         """March some pilots on each of some rungs."""
@@ -276,11 +298,12 @@ class Climb:
 
     def _take(self, marches: Iterable[March]) -> None:
         """What marches found; of a column's, finer rungs are no worse."""
-        for column, rung, lanes, error, held, work in marches:
-            first = sum(pilot.size for pilot, _ in self.found)
+        for column, rung, lanes, error, held, finer, work in marches:
+            numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
             self.marched[column, rung] = True
             self.held[column, rung:, lanes] = held[:, None]
-            self.march[column, rung:, lanes] = first + np.arange(lanes.size)[:, None]
+            self.march[column, rung:, lanes] = np.where(finer, numbers, 0)[:, None]
+            self.march[column, rung, lanes] = numbers
             self.found.append((lanes, error.T))
             self.work += work
 

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.ladder import ENOUGH, Climb, Measured, ladder_of
+from engine.accuracy.ladder import ENOUGH, LEAVES, Climb, Measured, ladder_of
 from engine.march.step_rules import least_steps
-from tests.accuracy.passages import OPEN, only_grid, passages
+from tests.accuracy.passages import OPEN, ZETA, axis, only_grid, passages
 from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, riding
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, swing
 
@@ -163,3 +163,21 @@ def test_every_pilot_has_a_rung_that_holds() -> None:
     assert np.all(measured.held.min(axis=(0, 1)) <= 1.0)
     assert np.all(measured.reference[:3] <= 0.5e-2)  # of extremes and root mean squares
     assert measured.work > 0.0 and measured.marched.any()
+
+
+def test_no_scheme_is_climbed_beyond_what_another_one_holds_with() -> None:
+    """Average acceleration over many first periods: of rungs dearer than Fox-Goodwin's that holds well for all pilots,
+    none but the first of a column is marched, and none is to be taken."""
+    slow = {"car": mass(0.2, cruise(0.0, 1.0, 0.03)), "sweep": {"damping": axis(ZETA, 0.01, 0.03, 4)}}
+    grid = only_grid(passages(**slow, solver={"tolerance": 1e-4}))
+    ladder = ladder_of(grid.asked, grid)
+    measured = Climb(grid, grid.values, ladder).go()
+    work = np.array([grid.model(column).body_modes for column in ladder.columns])[:, None] * np.array(ladder.cuts)
+    full = np.array([column.fidelity == "auto" for column in ladder.columns])
+    swift = np.array([column.scheme is ladder.columns[-1].scheme for column in ladder.columns])
+    holds = np.all(measured.held <= LEAVES, axis=2) & (full & swift)[:, None]
+    others = full & ~swift & measured.marched.any(axis=1)
+    for column in np.flatnonzero(others):
+        assert np.all(work[column, np.flatnonzero(measured.marched[column])[1:]] <= work[holds].min())
+    told = measured.march[others][:, -1] > 0
+    assert np.any(~told) and np.all(measured.held[others][:, -1][~told] > 1.0)
