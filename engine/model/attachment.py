@@ -51,9 +51,8 @@ def shape_derivatives(model: SceneModel, attachment: Attachment, along: Along, h
 
 def modal_flexibility_between(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
     """(S or 1,) what the kept modes of a body carry of the motion of an attachment per unit force of another, m/N."""
-    left, right = rows(model, one, along), rows(model, other, along)
-    soft = model.bodies[one.body].modal.modal_flexibility
-    return np.asarray(one.factor * other.factor * np.sum(left * right * soft, axis=1))
+    modal, factor = model.bodies[one.body].modal, one.factor * other.factor
+    return factor * modal.carried(rows(model, one, along), rows(model, other, along))
 
 
 def residual_flexibility(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:

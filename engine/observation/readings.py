@@ -207,7 +207,7 @@ class Sensor:
 
     def _kept(self, model: SceneModel, along: Along, loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
-        return np.asarray(np.sum(self._rows(model, along) * loaded * self._modal(model).modal_flexibility, axis=1))
+        return self._modal(model).carried(self._rows(model, along), loaded)
 
     def offset(self, model: SceneModel, along: Along) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""

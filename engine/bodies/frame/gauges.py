@@ -100,8 +100,10 @@ class FrameSpot:
             return np.zeros(len(s))
         j = here[0]
         place = self.track.places[j] + (beams.beams.length[element] - x if turned[j] else x)
-        held = (self.track if loads is None else loads).held_parts(np.full(len(s), place), s, 0)
-        return np.asarray((self.track.axes[j] @ self.direction) @ held[:3])
+        found, on = np.zeros(len(s)), self.track.at(s)[0] == j
+        held = (self.track if loads is None else loads).held_parts(np.full(np.count_nonzero(on), place), s[on], 0)
+        found[on] = (self.track.axes[j] @ self.direction) @ held[:3]
+        return found
 
     @property
     def under_weight(self) -> float:

@@ -9,13 +9,14 @@ to which the load points), shear force n_y Q_y + n_z Q_z = dM/ds. The fibre of s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from engine.bodies.frame.elements import deflection_shapes, stiffness
 from engine.bodies.frame.shapes import FORCES, ModeForces
-from engine.bodies.frame.statics import TrackStatics, is_every_pair
+from engine.bodies.frame.statics import TrackStatics, places_on
 from engine.bodies.frame.track import Line, TrackBeams, track_places
 from engine.bodies.modal.modal_body import Array, refuse_loose
 from results_schema.arrays import Counts
@@ -48,28 +49,24 @@ class TrackSections:
 
     def influence_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
         """The same at `x` per unit force at `s`, for pairs that are broadcast against each other."""
-        track, length = self.statics.track, self.statics.length
-        at_x, at_s = track_places(x, length), track_places(s, length)
-        if is_every_pair(at_x, at_s):
-            return self._lines(quantity, at_x.reshape(-1), at_s).reshape(np.broadcast_shapes(at_x.shape, at_s.shape))
-        places, loads = np.broadcast_arrays(at_x, at_s)
-        place, load = places.reshape(-1), loads.reshape(-1)
-        element, at = track.at(place)
-        moved = self.statics.moved(element, load)
-        forces = forces_from_ends(track, element, at, moved) + held_forces(track, place, load, self.statics.loads)
-        return np.asarray(np.sum(section_weights(track, quantity)[element] * forces, axis=1).reshape(places.shape))
+        place, load = (places_on(one, self.statics.length, 0) for one in (x, s))
+        return self.statics.pairs(quantity, partial(self._read, quantity), partial(self._held, quantity)).at(
+            place, load
+        )
 
-    def _lines(self, quantity: str, x: Array, s: Array) -> Array:
-        """(X, S) the same for all places with all loads."""
+    def _read(self, quantity: str, x: Array) -> Array:
+        """(X, 12) the same at `x` of displacements and rotations of its element's ends."""
         track = self.statics.track
         element, at = track.at(x)
-        weights = section_weights(track, quantity)[element]
         each = np.repeat(np.arange(len(x)), 12)
         ends = forces_from_ends(track, element[each], at[each], np.tile(np.eye(12), (len(x), 1)))
-        found = self.statics.lines(element, np.sum(weights[each] * ends, axis=1).reshape(-1, 12), s)
-        i, j = np.nonzero(element[:, None] == track.at(s)[0])
-        found[i, j] += np.sum(weights[i] * held_forces(track, x[i], s[j], self.statics.loads), axis=1)
-        return found
+        return np.asarray(np.sum(section_weights(track, quantity)[element[each]] * ends, axis=1)).reshape(-1, 12)
+
+    def _held(self, quantity: str, x: Array, s: Array) -> Array:
+        """(S,) the same at `x` of an element with held ends per unit force at `s`."""
+        track = self.statics.track
+        forces = held_forces(track, x, s, self.statics.loads)
+        return np.asarray(np.sum(section_weights(track, quantity)[track.at(x)[0]] * forces, axis=1))
 
     def own_weight(self, quantity: str, x: ArrayLike) -> Array:
         """The same at `x` under own weight per unit gravity. Raises BadInput for a body that nothing holds."""

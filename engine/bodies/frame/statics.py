@@ -2,24 +2,45 @@
 
 A load at s acts on the ends of its element through the static shapes, and the element with held ends bends besides:
 w(x; s) = c(x)^T G c(s) + w_held(x; s), c the shapes, G the flexibility between the track's points. For Euler-Bernoulli
-and Timoshenko members this is the exact beam solution between the nodes, not only at them.
+and Timoshenko members this is the exact beam solution between the nodes, not only at them. It is a cubic of x and of s
+for every pair of elements, which is found once and serves all loads wherever they go.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 
 from engine.bodies.frame.assembly import Assembly
 from engine.bodies.frame.track import Line, TrackBeams, TrackPoints, track_places
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
 from engine.bodies.modal.modal_body import Array, refuse_loose
-from results_schema.arrays import Counts
+from engine.kernels.cubics import cubics_at, cubics_of_pairs
 
 _ENDS = 32  # ends of elements whose loads are solved at a time
 _SAMPLES = 5  # places per element that show every pattern of its cubic shapes
+
+
+@dataclass(frozen=True, eq=False)
+class PairsOfPlaces:
+    """What loads along a line do along it, at pairs of places: see `cubics_of_pairs`."""
+
+    places: Array
+    apart: Array
+    beyond: Array
+
+    def at(self, x: Array, s: Array) -> Array:
+        """At places x by loads at s, broadcast against each other; no value depends on its neighbours."""
+        shape = np.broadcast_shapes(x.shape, s.shape)
+        place, load = (np.broadcast_to(one, shape).flatten() for one in (x, s))
+        found = np.empty(place.size)
+        cubics_of_pairs(self.places, self.apart, self.beyond, place, load, found)
+        return found.reshape(shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +56,8 @@ class TrackInfluence:
     loads: Line
     patterns: Array
     flexibility: Array
+    _found: dict[str, PairsOfPlaces] = field(default_factory=dict, init=False, repr=False)
+    _takes: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def length(self) -> float:
@@ -43,60 +66,69 @@ class TrackInfluence:
 
     def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast against each
-        other; (X, 1) and (S,) are fast."""
-        left, right = track_places(x, self.length, derivative), track_places(s, self.length, 0)
-        if is_every_pair(left, right):
-            place = left.reshape(-1)
-            element, _ = self.track.at(place)
-            whole = self.lines(element, self.track.to_ends(place, derivative), right)
-            i, j = np.nonzero(element[:, None] == self.track.at(right)[0])
-            whole[i, j] += self.track.within(place[i], right[j], derivative, self.loads)
-            return whole.reshape(np.broadcast_shapes(left.shape, right.shape))
-        place, load = np.broadcast_arrays(left, right)
-        return self._deflection(place.reshape(-1), load.reshape(-1), derivative).reshape(place.shape)
+        other."""
+        place, load = places_on(x, self.length, derivative), places_on(s, self.length, 0)
+        read, held = (partial(one, derivative=derivative) for one in (self.track.to_ends, self._within))
+        return self.pairs(str(derivative), read, held).at(place, load)
 
     def under_response(self, response: Array, x: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the deflection at `x` (X,) where the track's points move by `response` (6 (E + 1),)."""
-        place = track_places(x, self.length, derivative)
-        return self.track.where_ends_move(response.reshape(-1, 6), place, derivative)
-
-    def moved(self, element: Counts, s: Array) -> Array:
-        """(S, 12) displacements and rotations of an element's ends under a unit load at s, pair by pair."""
-        count = len(self.patterns)
-        other, _ = self.track.at(s)
-        acts = self.loads.to_ends(s).reshape(-1, 2, 6) @ self.patterns.T
-        found = np.zeros((len(s), 12))
-        for row in range(12):
-            for end in range(2):
-                for pattern in range(count):
-                    flexible = self.flexibility[6 * element + row, count * (other + end) + pattern]
-                    found[:, row] += flexible * acts[:, end, pattern]
+        place, ends = track_places(x, self.length, derivative), response.reshape(-1, 6)
+        if derivative not in self._takes:
+            self._takes[derivative] = cubics_of(self.track.places, partial(self.track.to_ends, derivative=derivative))
+        moved, found = np.concatenate([ends[:-1], ends[1:]], axis=1), np.empty(len(place))
+        cubics_at(self.track.places, np.sum(self._takes[derivative] * moved[:, :, None], axis=1), place, found)
         return found
 
-    def lines(self, element: Counts, takes: Array, s: Array) -> Array:
-        """(X, S) sums of `takes` (X, 12) times the motions of the ends of elements (X,) under a unit load at each s.
+    def pairs(self, name: str, read: Callable[[Array], Array], held: Callable[[Array, Array], Array]) -> PairsOfPlaces:
+        """What is read of the elements' ends, ``read`` (S,) -> (S, 12), and of elements with ``held`` ends at pairs of
+        places on one of them; kept by its name."""
+        if name not in self._found:
+            places, patterns = self.track.places, len(self.patterns)
+            rows = sliding_window_view(self.flexibility, 12, axis=0)[::6]
+            read_of = np.einsum("eik,eji->ekj", cubics_of(places, read), rows)
+            columns = sliding_window_view(read_of, 2 * patterns, axis=2)[:, :, ::patterns]
+            apart = np.einsum("ekfj,fjm->efkm", columns, cubics_of(places, self._acts))
+            before, beyond = (_held_cubics(places, held, *halves) for halves in (_HALVES, _HALVES[::-1]))
+            own = np.arange(len(apart))
+            beyond += apart[own, own]
+            apart[own, own] += before
+            self._found[name] = PairsOfPlaces(places, apart, beyond)
+        return self._found[name]
 
-        As `moved`, for all places with all loads, in a small part of the time.
-        """
-        count = len(self.patterns)
-        rows = 6 * element[:, None] + np.arange(12)
-        flexible = np.sum(takes[:, :, None] * self.flexibility[rows], axis=1)
-        other, _ = self.track.at(s)
-        ends = self.loads.to_ends(s).reshape(-1, 2, 6)
-        found = np.zeros((len(element), len(s)))
-        for end in range(2):
-            for number, pattern in enumerate(self.patterns):
-                found += flexible[:, count * (other + end) + number] * np.sum(ends[:, end] * pattern, axis=1)
-        return found
+    def _acts(self, s: Array) -> Array:
+        """(S, 2 r) patterns of the unit load at s on both ends of its element."""
+        return np.asarray(self.loads.to_ends(s).reshape(-1, 2, 6) @ self.patterns.T).reshape(len(s), -1)
 
-    def _deflection(self, x: Array, s: Array, derivative: int) -> Array:
-        """Pair by pair, summed in a fixed order so that a value never depends on its neighbours."""
-        element, _ = self.track.at(x)
-        takes, found = self.track.to_ends(x, derivative), self.track.within(x, s, derivative, self.loads)
-        moved = self.moved(element, s)
-        for row in range(12):
-            found = found + takes[:, row] * moved[:, row]
-        return found
+    def _within(self, x: Array, s: Array, derivative: int) -> Array:
+        return self.track.within(x, s, derivative, self.loads)
+
+
+def cubics_of(places: Array, function: Callable[[Array], Array]) -> Array:
+    """(E, c, 4) the cubics that functions of places (S,), as (S, c), are between joints (E + 1,)."""
+    values = function(_inside(places, _NODES).reshape(-1)).reshape(len(places) - 1, len(_NODES), -1)
+    return np.asarray(np.einsum("kn,enc->eck", _powers_from(_NODES), values))
+
+
+def _held_cubics(places: Array, held: Callable[[Array, Array], Array], x: Array, s: Array) -> Array:
+    """(E, 4, 4) what elements with held ends add, from places ``x`` and ``s`` in their halves."""
+    at, load = _inside(places, x)[:, :, None], _inside(places, s)[:, None]
+    values = held(*(part.reshape(-1) for part in np.broadcast_arrays(at, load))).reshape(-1, len(x), len(s))
+    return np.asarray(np.einsum("kn,enl,ml->ekm", _powers_from(x), values, _powers_from(s)))
+
+
+def _inside(places: Array, nodes: Array) -> Array:
+    """(E, n) places of nodes from -1 to 1 in every element."""
+    return np.asarray(places[:-1, None] + np.diff(places)[:, None] * 0.5 * (nodes + 1.0))
+
+
+def _powers_from(nodes: Array) -> Array:
+    """(4, 4) coefficients of powers from values at four nodes."""
+    return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
+
+
+_NODES = np.cos(np.pi * (np.arange(4) + 0.5) / 4.0)  # by which a cubic is known best
+_HALVES = 0.5 * (_NODES - 1.0), 0.5 * (_NODES + 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +152,9 @@ class TrackStatics(TrackInfluence):
         return np.asarray(found + self.track.under_spread_load(place, self.spread, derivative))
 
 
-def is_every_pair(x: Array, s: Array) -> bool:
-    """Whether places (X, 1), or a single one, meet many loads (S,)."""
-    return s.ndim == 1 and s.size > 1 and x.size == x.shape[0] and (x.ndim == 2 or x.size == 1)
+def places_on(places: ArrayLike, length: float, derivative: int) -> Array:
+    """`track_places` of places of any shape."""
+    return track_places(np.ravel(places), length, derivative).reshape(np.shape(np.atleast_1d(places)))
 
 
 def track_statics(
