@@ -6,17 +6,21 @@ from collections.abc import Iterator
 IN_MEMORY = 2**26  # bytes of results that are put together, or read, as a whole
 CHUNK_BYTES = 2**20  # of a compressed chunk in an archive
 BLOCK_BYTES = 2**24
+APART = 32  # numbers of a variant, such as errors of its results, at most
 
 
 def chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
-    """Chunks of about a megabyte that keep the last axes whole, so that one variant's rows lie together.
+    """Chunks of about a megabyte that keep the last axes whole, so that one variant's rows lie together; a few numbers
+    of each of very many variants lie apart, as they are asked for.
 
     >>> chunk_shape((1000, 400, 200), 8)
     (1, 400, 200)
-    >>> chunk_shape((1_000_000,), 8)
-    (131072,)
+    >>> chunk_shape((1_000_000,), 8), chunk_shape((1_000_000, 12), 8)
+    ((131072,), (131072, 1))
     """
     left = max(1, CHUNK_BYTES // itemsize)
+    if shape[0] >= left and math.prod(shape[1:]) <= APART:
+        return (left, *(1 for _ in shape[1:]))
     chunks = []
     for size in reversed(shape):
         chunks.append(min(size, left))

@@ -11,15 +11,13 @@ import numpy as np
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from results_schema.blocks import slices
-
 RECENT_BYTES = 2**27  # of the array that was read last, which is likely to be asked for again
 
-Read = Callable[[int, int], np.ndarray]
+Read = Callable[[slice, tuple[int | slice, ...]], np.ndarray]
 
 
 class OnDisk(BackendArray):
-    """Numbers (n, ...) that `read` gives from one of the n rows to before another."""
+    """Numbers (n, ...) that `read` gives: some of the n rows, at further places of the other axes."""
 
     def __init__(self, shape: tuple[int, ...], dtype: np.dtype[Any], read: Read) -> None:
         self.shape, self.dtype = shape, dtype
@@ -34,10 +32,7 @@ class OnDisk(BackendArray):
         first, end, step = rows.indices(self.shape[0])
         if _RECENT.array is self or (first == 0 and end == self.shape[0] and self.nbytes <= RECENT_BYTES):
             return np.asarray(_RECENT.whole(self)[key])
-        count = max(first, end) - first
-        found = np.empty((count, *np.empty(self.shape[1:], np.int8)[key[1:]].shape), self.dtype)
-        for block in slices((count, *self.shape[1:]), self.dtype.itemsize):
-            found[block] = self.read(first + block.start, first + block.stop)[(slice(None), *key[1:])]
+        found = self.read(slice(first, max(first, end)), key[1:])
         return np.asarray(found[::step] if isinstance(key[0], slice) else found[0])
 
     @property
@@ -57,7 +52,7 @@ class _Recent:
         """An array, not to be changed, from memory where it is there."""
         if self.array is not array:
             self.array, self._numbers = None, np.empty(0)  # first: both together would be too much
-            self._numbers = array.read(0, array.shape[0])
+            self._numbers = array.read(slice(0, array.shape[0]), ())
             self._numbers.flags.writeable = False
             self.array = array
         return self._numbers
@@ -71,7 +66,7 @@ def on_disk(shape: tuple[int, ...], dtype: np.dtype[Any], read: Read) -> indexin
 
     >>> import xarray as xr
     >>> numbers = np.arange(6.0).reshape(3, 2)
-    >>> array = xr.DataArray(on_disk((3, 2), numbers.dtype, lambda first, end: numbers[first:end]), dims=("x", "y"))
+    >>> array = xr.DataArray(on_disk((3, 2), numbers.dtype, lambda rows, at: numbers[rows, *at]), dims=("x", "y"))
     >>> array.isel(x=1).values.tolist(), float(array.sum())
     ([2.0, 3.0], 15.0)
     """

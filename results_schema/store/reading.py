@@ -188,17 +188,17 @@ class _Left:
         from results_schema.store.on_disk import on_disk
 
         place = f"{variable.group().path.rstrip('/')}/{variable.name}"
-        data = on_disk(variable.shape, variable.dtype, partial(self._rows, place))
+        data = on_disk(variable.shape, variable.dtype, partial(self._part, place))
         return xr.Variable(variable.dimensions, data), checksum(variable)
 
-    def _rows(self, place: str, first: int, end: int) -> np.ndarray:
-        """Some rows of an array. Raises ArchiveError where it is not the file that was checked any more."""
+    def _part(self, place: str, rows: slice, at: tuple[int | slice, ...]) -> np.ndarray:
+        """Some of an array. Raises ArchiveError where it is not the file that was checked any more."""
         with opened(self.path) as dataset:
             if _state(self.path) != self.state:
                 raise ArchiveError("has changed while it was read", where=str(self.path), remedy="try again")
             variable = dataset[place]
             _set_up(variable)
-            return np.asarray(variable[first:end])
+            return np.asarray(variable[(rows, *at)])
 
 
 def _state(path: Path) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from results_schema.blocks import BLOCK_BYTES
+from results_schema.blocks import BLOCK_BYTES, slices
 from results_schema.errors import OutputFailed
 from results_schema.store import files
 from results_schema.store.tables import Table, from_arrays
@@ -205,9 +205,14 @@ class RowsOnDisk:
         dtype, rest = self._kinds[name]
         return on_disk((*shape, *rest), dtype, partial(self._over_grid, name, shape))
 
-    def _over_grid(self, name: str, shape: tuple[int, ...], first: int, end: int) -> np.ndarray:
-        each = math.prod(shape[1:])
-        return self.read(name, first * each, end * each).reshape(end - first, *shape[1:], *self._kinds[name][1])
+    def _over_grid(self, name: str, shape: tuple[int, ...], rows: slice, at: tuple[int | slice, ...]) -> np.ndarray:
+        dtype, rest = self._kinds[name]
+        inner, each = (*shape[1:], *rest), math.prod(shape[1:])
+        found = np.empty((rows.stop - rows.start, *np.empty(inner, np.int8)[at].shape), dtype)
+        for block in slices((len(found), *inner), dtype.itemsize):
+            part = self.read(name, (rows.start + block.start) * each, (rows.start + block.stop) * each)
+            found[block] = part.reshape(-1, *inner)[(slice(None), *at)]
+        return found
 
 
 def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -115,8 +116,18 @@ def _write(source: Archive, folder: Path) -> Path:
     for figure, one in zip(figures, drawn, strict=True):
         files.write_text(folder / f"{one.files}.svg", f'<?xml version="1.0" encoding="utf-8"?>\n{one.svg}')
         files.write_whole(folder / f"{one.files}.png", partial(Path.write_bytes, data=png(figure)))
+    for name in _figures_of(folder / PAGE) - {one.files for one in drawn}:
+        for ending in (".svg", ".png"):
+            files.remove_file(folder / f"{name}{ending}")
     files.write_text(folder / PAGE, text)
     return folder / PAGE
+
+
+def _figures_of(page: Path) -> set[str]:
+    """The plain names of the figures of an earlier report, which are ours as its page names them."""
+    with suppress(OSError):
+        return set(re.findall(r'<figure id="(\d+-[\w-]+)">', page.read_text(encoding="utf-8", errors="replace")))
+    return set()
 
 
 def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_question: int) -> SimpleNamespace:

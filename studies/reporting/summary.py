@@ -231,7 +231,7 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array
     for name, coordinate in results.dataset.coords.items():
         swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "ifU"
         if swept and name not in _DERIVED:
-            variant[str(name)] = value = coordinate.values[place[coordinate.dims[0]]].item()
+            variant[str(name)] = value = coordinate.variable[place[coordinate.dims[0]]].values.item()
             if isinstance(value, str):
                 words[str(name)] = value
             elif name in swept_axes:

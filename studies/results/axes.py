@@ -63,7 +63,7 @@ class Axis:
     @property
     def span(self) -> str:
         """Its smallest and largest value, or its one value, with units."""
-        return spanned(self.values.tolist(), self.in_words)
+        return spanned([self.values.min().item(), self.values.max().item()], self.in_words)
 
     def value(self, index: int) -> str:
         """One value with its unit."""

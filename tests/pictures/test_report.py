@@ -142,6 +142,20 @@ def test_the_same_archive_gives_the_same_page(tmp_path: Path) -> None:
     assert pages[0] == pages[1]
 
 
+def test_figures_of_an_earlier_report_are_removed_and_nothing_else(tmp_path: Path) -> None:
+    found = []
+    for extra in (scenes.pace("passage"), ""):
+        write_report(archive(tmp_path, scenes.run("passage", extra)), tmp_path / "out")
+        found.append({path.name for path in (tmp_path / "out").iterdir()})
+        for name in ("01-own.svg", "99-own.png", "notes.txt"):
+            (tmp_path / "out" / name).touch()
+    assert {"01-own.svg", "99-own.png", "notes.txt"} <= found[1]
+    earlier = {name for name in found[0] if name[:2].isdecimal()}
+    page = (tmp_path / "out" / PAGE).read_text(encoding="utf-8")
+    kept = {name for name in earlier if f'<figure id="{name[:-4]}">' in page}
+    assert earlier - kept and not (earlier - kept) & found[1]
+
+
 def test_places_that_cannot_be_written_are_refused_before_anything_is_drawn(tmp_path: Path) -> None:
     source = archive(tmp_path, scenes.run("passage"))
     with pytest.raises(BadInput, match="no such file"):

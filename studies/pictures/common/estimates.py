@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -21,52 +23,72 @@ LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
 MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one
 
 
+class Told(NamedTuple):
+    """The errors told of a result: the smallest, the median and the largest, and in which part of the variants they are
+    beyond its tolerance (NaN: it is held to none)."""
+
+    name: str
+    smallest: float
+    median: float
+    largest: float
+    missed: float
+    tolerance: float
+
+
 def pictures(results: Results) -> list[Figure]:
     """The told errors by result; none where there are none, or there is no sweep."""
     if not is_marched(results.dataset) or "estimated_error" not in results.dataset or results.size < 2:
         return []
-    error = results.dataset["estimated_error"].transpose(*results.dims, "result").values[results.kept.values]
-    asked = zip(results.dataset["result"].values, error.T, results.dataset["tolerance"].values, strict=True)
-    rows = [(str(name), known(own), float(tolerance)) for name, own, tolerance in asked if known(own).size]
+    kept, rows = results.kept.values, list[Told]()
+    lacking = np.zeros(np.count_nonzero(kept), dtype=bool)
+    asked = dict(zip(results.dataset["result"].values.tolist(), results.dataset["tolerance"].values, strict=True))
+    for name, tolerance in asked.items():  # one after another: there may be very many variants
+        error = results.estimated_error(name)[kept]
+        lacking |= np.isnan(error)
+        rows += _told(name, known(error), float(tolerance))
     if not rows:
         return []
-    rows.sort(key=lambda row: (np.isnan(row[2]), -row[1].max() / np.nan_to_num(row[2], nan=1.0)))
-    shown, count = rows[:MOST_RESULTS], error.shape[1]
+    rows.sort(key=lambda row: (np.isnan(row.tolerance), -row.largest / np.nan_to_num(row.tolerance, nan=1.0)))
+    shown = rows[:MOST_RESULTS]
     caption = (
         "Lines go from the smallest error of the variants to the largest, dots are their median. In grey: results that "
-        f"are held to no tolerance. {len(shown)} of {counted(count, 'result')}."
+        f"are held to no tolerance. {len(shown)} of {counted(len(asked), 'result')}."
     )
-    lacking = f" Without an estimate of some: {counted(int(np.isnan(error).any(axis=1).sum()), 'variant')}."
-    caption += lacking if np.isnan(error).any() else ""
+    caption += f" Without an estimate of some: {counted(int(lacking.sum()), 'variant')}." if lacking.any() else ""
     return [
-        on_method(draw("estimates", _title(*rows[0]), caption, 0.8 + 0.21 * len(shown), partial(_draw_results, shown)))
+        on_method(draw("estimates", _title(rows[0]), caption, 0.8 + 0.21 * len(shown), partial(_draw_results, shown)))
     ]
 
 
-def _title(name: str, error: Array, tolerance: float) -> str:
+def _told(name: str, error: Array, tolerance: float) -> Iterator[Told]:
+    """Of known errors (n,) of a result; nothing where there are none."""
+    if error.size:
+        missed = float(np.count_nonzero(error > tolerance) / error.size)
+        yield Told(name, float(error.min()), float(np.median(error)), float(error.max()), missed, tolerance)
+
+
+def _title(nearest: Told) -> str:
     """How near its tolerance the nearest result comes."""
-    if np.isnan(tolerance):
+    if np.isnan(nearest.tolerance):
         return "No result is held to a tolerance"
-    if error.max() <= tolerance:
-        nearest = percent(error.max() / tolerance)
-        return f"All errors that are held are estimated within their tolerances; {name} comes nearest, at {nearest}"
-    share = percent(float(np.mean(error > tolerance)))
-    return (
-        f"{name} may miss its tolerance in {share} of the variants, {number(error.max() / tolerance, 2)} times at most"
-    )
+    times, share = nearest.largest / nearest.tolerance, percent(nearest.missed)
+    if nearest.largest <= nearest.tolerance:
+        within = "All errors that are held are estimated within their tolerances"
+        return f"{within}; {nearest.name} comes nearest, at {percent(times)}"
+    return f"{nearest.name} may miss its tolerance in {share} of the variants, {number(times, 2)} times at most"
 
 
-def _draw_results(rows: list[tuple[str, Array, float]], drawing: Drawing) -> None:
+def _draw_results(rows: list[Told], drawing: Drawing) -> None:
     axes = drawing.subplots()
-    for place, (_, error, tolerance) in enumerate(rows):
-        sizes, colour = np.maximum(error, LEAST), look.MUTED if np.isnan(tolerance) else look.BLUE
-        axes.plot([sizes.min(), sizes.max()], [place, place], color=colour, linewidth=2.0)
-        axes.plot(np.median(sizes), place, "o", color=colour)
+    for place, row in enumerate(rows):
+        colour = look.MUTED if np.isnan(row.tolerance) else look.BLUE
+        axes.plot(np.maximum([row.smallest, row.largest], LEAST), [place, place], color=colour, linewidth=2.0)
+        axes.plot(max(row.median, LEAST), place, "o", color=colour)
         (mark,) = axes.plot(
-            tolerance, place, "|", color=look.VERMILION, markersize=9.0, label="" if place else "tolerance"
+            row.tolerance, place, "|", color=look.VERMILION, markersize=9.0, label="" if place else "tolerance"
         )
         mark.set_markeredgewidth(1.6)
-    axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
+    axes.set_yticks(range(len(rows)), [row.name for row in rows])
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="estimated error")
     axes.grid(False, axis="y")
     logarithmic(axes.xaxis)

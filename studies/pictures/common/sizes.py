@@ -74,18 +74,23 @@ def _title(results: Results, sensor: str, limit: float | None, top: Index) -> st
 
 
 def _is_loose(seen: View, sensor: str) -> bool:
-    """Whether curves of a sensor's largest values are dashed anywhere; sampled points are not."""
-    return not seen.is_sampled and any((curve.y > LOOSE).any() for curve in seen.curves(_errors(seen, sensor)))
+    """Whether curves of a sensor's largest values are dashed anywhere."""
+    return any((curve.y > LOOSE).any() for curve in _errors(seen, sensor))
 
 
-def _errors(seen: View, sensor: str) -> Any:
-    return seen.results.dataset["status"].copy(data=size_errors(seen.results, sensor))
+def _errors(seen: View, sensor: str) -> list[Curve]:
+    """Curves of the errors of a sensor's largest values; none of sampled points, which are never dashed."""
+    if seen.is_sampled:
+        return []
+    return seen.curves(seen.results.dataset["status"].copy(data=size_errors(seen.results, sensor)))
 
 
 def _curves(seen: View, sensor: str, values: Any) -> list[Curve]:
     """Curves of a sensor's largest values, or of what is proportional to them."""
-    pairs = zip(seen.curves(values), seen.curves(_errors(seen, sensor)), strict=True)
-    return [curve._replace(loose=error.y > LOOSE) for curve, error in pairs]
+    curves, errors = seen.curves(values), _errors(seen, sensor)
+    if not errors:
+        return curves
+    return [curve._replace(loose=error.y > LOOSE) for curve, error in zip(curves, errors, strict=True)]
 
 
 def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, drawing: Drawing) -> None:

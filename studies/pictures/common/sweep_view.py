@@ -79,14 +79,14 @@ class View:
     def plane(self, values: Any) -> Array:
         """The same as an array (x, y) of the shown dimensions, (x,) where they are one; axes ascend on a grid."""
         axes = {axis.dim: axis for axis in (self.x, self.y) if axis is not None}
-        like = self.cut(self.results.dataset["status"])
-        full = xr.broadcast(self.cut(values), like)[0].transpose(*axes)
-        ordered = full.isel({dim: _order(axis) for dim, axis in axes.items()})
-        return np.asarray(ordered.values, dtype=np.float64)
+        both = (self.cut(array) for array in (values, self.results.dataset["status"]))
+        bare = (array.drop_vars(list(array.coords)) for array in both)  # coordinates would be copied
+        full = xr.broadcast(*bare)[0].transpose(*axes)
+        return np.asarray(full.isel({dim: _order(axis) for dim, axis in axes.items()}).values, dtype=np.float64)
 
     def along(self, axis: Axis) -> Array:
         """The values (n,) of an axis in the order of `plane`, in the unit of its title."""
-        return axis.shown[_order(axis)]
+        return np.asarray(axis.shown[_order(axis)])
 
     def curves(self, values: Any) -> list[Curve]:
         """Values as curves over x, at most 6 of the second axis."""
@@ -165,9 +165,9 @@ def _nearest(places: Sequence[int], wanted: int) -> int:
     return min(inner, key=lambda place: abs(place - wanted))
 
 
-def _order(axis: Axis) -> Counts:
+def _order(axis: Axis) -> Any:
     """Places along an axis in ascending order; a sample stays as it is."""
-    return np.arange(len(axis.values)) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
+    return slice(None) if axis.dim == VARIANT else np.argsort(axis.values, kind="stable")
 
 
 def along_axis(axes: Axes, seen: View) -> None:
