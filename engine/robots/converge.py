@@ -3,7 +3,7 @@ they report stays where it is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,6 +22,7 @@ from engine.robots.modes import (
     missed_part,
     open_bodies,
     with_finer_modes,
+    with_modes,
     with_open_modes,
 )
 from engine.robots.results import are_held, differences, outcome, results_of, times_apart, without_values
@@ -141,6 +142,11 @@ class Converged:
     rung: Rung
     status: Status
 
+    @property
+    def worst(self) -> float:
+        """The largest error of what is held."""
+        return float(self.error[are_held(results_of(self.model))].max())
+
 
 def scheme_of(study: Study) -> NewmarkScheme:
     """The scheme of the march: of Newmark's family, whose limit of the step is lifted as joints are stiff; Fox-Goodwin
@@ -220,8 +226,24 @@ def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted
 
 def alike(apart: Array, held: Mask) -> Array:
     """(results,) changes of a march, raised to a part of the largest, that of what is held and of what is not."""
-    raised = [np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held)]
+    raised = (np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held))
     return np.asarray(np.where(held, *raised))
+
+
+def by_mode_counts(
+    study: Study, counts: Sequence[int], duration: float | None, after: float, zero: str, halted: Callable[[], bool]
+) -> tuple[Array, Array]:
+    """(C, R) by how much so many modes of every rail change the errors of tools from what `converge` finds, over the
+    longest of each, and (R,) what is told of that. Raises Halted."""
+    ladder = Ladder.of(study, duration, after)
+    found, robots = climb(ladder, zero, halted), len(study.robot)
+    rows = []
+    for count in counts:
+        if halted():
+            raise Halted
+        fixed = replace(ladder, coarsest=build(with_modes(study, count))).level(Rung(0, found.rung.steps))
+        rows.append(differences(found.model, marched(fixed, zero), found.outcome)[:robots])
+    return np.stack(rows), found.error[:robots]
 
 
 def left(change: Array, before: Array, least: float | Array) -> Array:

@@ -33,6 +33,12 @@ def with_open_modes(study: Study, modes: int = MODES[0]) -> Study:
     return study.model_copy(update={"body": {**study.body, **own}}) if own else study
 
 
+def with_modes(study: Study, modes: int) -> Study:
+    """The study with so many modes of all bodies."""
+    own = {name: body.model_copy(update={"modes": modes}) for name, body in study.body.items()}
+    return study.model_copy(update={"body": own})
+
+
 def with_finer_modes(study: Study) -> Study | None:
     """The study with twice the modes of bodies that fix theirs; None where none does."""
     own = {name: body.with_more_modes(2) for name, body in study.body.items() if not body.modes_are_open}

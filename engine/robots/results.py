@@ -252,6 +252,26 @@ def ways(model: RobotModel) -> Iterator[Way]:
                 yield Way(r, m + 1, float(move[START]), float(move[START] + length))
 
 
+def works(model: RobotModel) -> Iterator[Way]:
+    """When robots work, after which moves."""
+    for r in range(len(model.robots)):
+        for m, move in enumerate(model.system.moves[r]):
+            arrived, until = float(move[START] + 2.0 * move[UP] + move[STEADY]), float(model.system.stays[r, m + 1, -1])
+            if until > arrived:
+                yield Way(r, m + 1, arrived, until)
+
+
+def handled(model: RobotModel) -> Iterator[tuple[int, float, bool]]:
+    """Robots, the times (s) of payloads that they are told to pick up or put down, and whether they pick them up."""
+    for r, robot in enumerate(model.study.robot.values()):
+        carried = robot.payload
+        for move, start in zip(robot.moves, model.system.moves[r, :, START], strict=False):
+            now = carried if move.payload is None else move.payload
+            if now != carried:
+                yield r, float(start), now > carried
+            carried = now
+
+
 def moving_at(model: RobotModel, time: float) -> list[str]:
     """Robots and the numbers of their moves (from 1) that are under way at a time (s)."""
     return [f"move {way.number} of {model.robots[way.robot]}" for way in ways(model) if way.start <= time <= way.end]

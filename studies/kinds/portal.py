@@ -71,7 +71,7 @@ class Portal(PiecedKind):
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         from studies.robots.parts import gather
 
-        return gather(pieces, study, self.name)
+        return gather(pieces, study, question_of(study, Question), self.name)
 
     def findings(self, results: Results) -> list[str]:
         return findings.answer(results)

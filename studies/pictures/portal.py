@@ -20,19 +20,25 @@ from studies.pictures.common.figures import (
     Figure,
     colour_bar,
     draw,
+    legend_beside,
     legend_of_all,
+    limit_line,
+    logarithmic,
+    zero_line,
 )
 from studies.pictures.common.sweep_view import View, along_axis
 from studies.pictures.moving_shapes import played
-from studies.results.formatting import listed, quantity, scale_for
+from studies.results.formatting import listed, percent, quantity, scale_for
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 from studies.robots.findings import accuracy, of_front
 from studies.robots.limits import Limit, limits, longest_axis, words_of
+from studies.robots.missed import model_of
 
 MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES, MOST_MARKED = 6, 4, 3, 40, 12
 SIZE = 0.4  # of the distance between rails as drawn: how large the largest deflection is drawn at most
 ROWS_APART = 0.07  # of the longest rail, between two as drawn
+COMPONENTS = ("x", "y", "z")
 ALIKE = 0.01  # of the longest: times that are one
 
 
@@ -40,7 +46,7 @@ def pictures(results: Results) -> list[Figure]:
     """The front of a sweep and errors along it, one variant over time, its rails where errors are longest and in its
     worst move."""
     found = [_front_of(results)] if results.size > 1 and of_front(results).size else []
-    found += _along_sweep(results)
+    found += [*_along_sweep(results), *_by_modes(results)]
     traced = results.traced()
     if not traced:
         return found
@@ -132,27 +138,65 @@ def _strip(results: Results, index: Index) -> Figure:
     name = list(results.study.robot)[worst]
     title = f"The tool of {name} is off by up to {quantity(float(largest[worst]), 'm')} while it moves"
     at = results.at(index)
-    caption = f"{f'At {at}. ' if at else ''}Above the planned places of the tools, below how far they are off."
+    caption = (
+        f"{f'At {at}. ' if at else ''}Planned places of the tools, and how far they are off these; up: a payload is "
+        "picked up, down: put down; thick: at work."
+    )
     return draw("over time", title, caption, 5.4, partial(_draw_strip, results, index))
 
 
 def _draw_strip(results: Results, index: Index, drawing: Drawing) -> None:
-    dataset = results.dataset
+    from engine.robots.results import handled, works
+
+    dataset, model = results.dataset, model_of(results, index)
     times = results.row(dataset["elapsed"], index)
     planned, error = (results.row(dataset[name], index) for name in ("tool_centre_point", "tool_centre_point_error"))
-    size = np.linalg.norm(error, axis=2)
-    scale = scale_for(float(np.nanmax(size)), "m")
-    rows = drawing.subplots(4, 1, sharex=True)
-    for r, name in enumerate(list(results.study.robot)[:MOST_ROBOTS]):
-        colour = DISTINCT[r % len(DISTINCT)]
-        for axis, label in enumerate(("x", "y", "z")):
-            rows[axis].plot(times, planned[:, r, axis], color=colour, linewidth=1.0, label=name)
-            rows[axis].set_ylabel(f"planned {label}\n(m)")
-        rows[3].plot(times, size[:, r] * scale.factor, color=colour, linewidth=0.9)
-    rows[3].set_ylabel(f"error\n({scale.unit})")
-    rows[3].set_xlabel("time (s)")
+    scale = scale_for(float(np.nanmax(np.abs(error))), "m")
+    every = drawing.subplots(len(COMPONENTS), 2, sharex=True)
+    for r, name in enumerate(model.robots[:MOST_ROBOTS]):
+        colour, own = DISTINCT[r % len(DISTINCT)], [way for way in works(model) if way.robot == r]
+        at_work = np.any([(times >= way.start) & (times <= way.end) for way in own], axis=0) if own else times < 0.0
+        for (place, off), values, wrong in zip(every, planned[:, r].T, error[:, r].T * scale.factor, strict=True):
+            place.plot(times, values, color=colour, linewidth=1.0, label=name)
+            off.plot(times, wrong, color=colour, linewidth=0.7)
+            off.plot(times, np.where(at_work, wrong, np.nan), color=colour, linewidth=2.0)
+        for robot, time, picks_up in handled(model):
+            if robot == r and time <= times[-1]:
+                height = np.interp(time, times, planned[:, r, -1])
+                every[-1, 0].plot(time, height, "^" if picks_up else "v", color=colour, markersize=5)
+    for (place, off), name in zip(every, COMPONENTS, strict=True):
+        place.set_ylabel(f"planned {name} (m)")
+        off.set_ylabel(f"error of {name} ({scale.unit})")
+        zero_line(off)
+    for axes in every[-1]:
+        axes.set_xlabel("time (s)")
     drawing.align_ylabels()
-    legend_of_all(drawing, rows[0])
+    legend_of_all(drawing, every[0, 0])
+
+
+def _by_modes(results: Results) -> list[Figure]:
+    """What numbers of modes change; [] where none was asked for."""
+    if "error_by_modes" not in results.dataset:
+        return []
+    off, doubt = (float(results.dataset[f"error_by_modes{end}"].max()) for end in ("", "_doubt"))
+    title = f"Too few modes of every rail change errors of tools by up to {percent(off)}"
+    caption = (
+        f"Beside as many as the tolerance asks for, with which errors are told to be off by {percent(doubt)} at most."
+    )
+    return [draw("modes", title, caption, 3.0, partial(_draw_modes, results))]
+
+
+def _draw_modes(results: Results, drawing: Drawing) -> None:
+    axes, off = drawing.subplots(), results.dataset["error_by_modes"]
+    for r, name in enumerate(list(results.study.robot)[:MOST_ROBOTS]):
+        values, colour = 100.0 * off.sel(robot=name).values, DISTINCT[r % len(DISTINCT)]
+        axes.plot(off["mode_count"].values, values, "o-", markersize=4, color=colour, label=name)
+    logarithmic(axes.yaxis)
+    limit_line(axes, 100.0 * results.study.solver.tolerance, "tolerance", "right")
+    axes.set_xticks(off["mode_count"].values)
+    axes.set_xlabel("modes of every rail")
+    axes.set_ylabel("change of the error,\nover its largest (%)")
+    legend_beside(axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,14 +298,9 @@ def _beside(foot: tuple[float, float]) -> float:
 
 def _worst_move(results: Results, index: Index) -> Figure | None:
     """The move in which a tool of its robot is off the most, in motion; None where nothing moves."""
-    from engine.robots.model import build
-    from engine.robots.modes import with_open_modes
     from engine.robots.results import ways
-    from engine.scene.sweep import expand
 
-    flat = int(np.ravel_multi_index(index, results.shape)) if index else 0
-    model = build(with_open_modes(expand(results.study).study_of(results.study, flat)))
-    view = _View.of(results, index)
+    model, view = model_of(results, index), _View.of(results, index)
     planned, error = (
         results.row(results.dataset[name], index) for name in ("tool_centre_point", "tool_centre_point_error")
     )

@@ -28,7 +28,7 @@ class Told(NamedTuple):
     declared: dict[str, Variable]
     results: Sequence[str]
     tolerance: Array
-    labels: Mapping[str, Sequence[str]]
+    labels: Mapping[str, Sequence[str] | Sequence[int]]
 
 
 def labelled(pieces: Sequence[xr.Dataset], told: Told) -> xr.Dataset:

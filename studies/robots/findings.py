@@ -13,7 +13,7 @@ from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, spanned
 from studies.results.places import extreme
 from studies.robots.limits import DOING, told_limits
-from studies.robots.missed import told_missed
+from studies.robots.missed import model_of, told_missed
 
 if TYPE_CHECKING:
     from studies.results.results import Results
@@ -33,6 +33,7 @@ def answer(results: Results) -> list[str]:
         *_statics(results),
         *_deflections(results),
         *_causes(results),
+        *_by_modes(results),
         *_beyond_linear(results),
         *([] if missed and others == {Status.TOLERANCE_MISSED} else told_statuses(results)),
     ]
@@ -100,19 +101,17 @@ def _statics(results: Results) -> Iterator[str]:
 
 def _causes(results: Results) -> Iterator[str]:
     """What moves where the error is longest, and what is left of it when one robot stands still."""
-    from engine.robots.model import build
-    from engine.robots.modes import with_open_modes
     from engine.robots.results import moving_at
 
     dataset = results.dataset
-    if results.size == 1:
-        model = build(with_open_modes(results.study.without_sweep()))
-        for name in results.study.robot:
-            time = float(dataset["error_largest_time"].sel(robot=name))
-            if np.isfinite(time):
-                moves = moving_at(model, time)
-                doing = f"during {listed(moves)}" if moves else "when nothing moves"
-                yield f"The error of {name} is longest at {quantity(time, 's')}, {doing}."
+    longest = np.fmax.reduce([dataset[f"error_{doing}"].transpose(*results.dims, "robot") for doing in DOING])
+    for r, name in enumerate(results.study.robot):
+        index = extreme(longest[..., r])
+        if index is not None:
+            time = float(dataset["error_largest_time"].sel(robot=name).transpose(*results.dims).values[index])
+            moves = moving_at(model_of(results, index), time)
+            doing = f"during {listed(moves)}" if moves else "when nothing moves"
+            yield f"The error of {name} is longest at {quantity(time, 's')}, {doing}{in_words(results, index)}."
     if "error_without" in dataset:
         for still in results.study.robot:
             left = dataset["error_without"].sel(still=still)
@@ -134,6 +133,22 @@ def _deflections(results: Results) -> Iterator[str]:
                 strained = quantity(float(stress.values[most]), "Pa")
                 said += f"; its largest bending stress is {strained}{in_words(results, most)}"
             yield f"{said}."
+
+
+def _by_modes(results: Results) -> Iterator[str]:
+    """What numbers of modes change, and how many are enough."""
+    if "error_by_modes" not in results.dataset:
+        return
+    worst, tolerance = results.dataset["error_by_modes"].max("robot"), results.study.solver.tolerance
+    counts, off = worst["mode_count"].values, worst.values
+    few = np.flatnonzero(off > tolerance)
+    first = int(few[-1]) + 1 if few.size else 0
+    holds = f"{counts[first]} are" if first < counts.size else "none of these is"
+    yield (
+        f"With {listed([f'{count:,}' for count in counts])} modes of every rail errors of tools are off by up to "
+        f"{listed([percent(float(part)) for part in off])}, which is known to "
+        f"{percent(float(results.dataset['error_by_modes_doubt'].max()))}: {holds} enough for {percent(tolerance)}."
+    )
 
 
 def _beyond_linear(results: Results) -> Iterator[str]:

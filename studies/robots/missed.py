@@ -37,7 +37,7 @@ def told_missed(results: Results) -> Iterator[str]:
         return
     asked, variants = percent(results.study.solver.tolerance), counted(results.size, "variant")
     parts = listed([_in_words(results, one) for one in found])
-    struck = dict.fromkeys(text for one in found for text in _picked_up(_model(results, one.at), one.time))
+    struck = dict.fromkeys(text for one in found for text in _picked_up(model_of(results, one.at), one.time))
     fixed = [] if results.study.solver.steps == "auto" else ['What helps: more solver.steps, or "auto".']
     helps = " ".join([*fixed, *struck]) or _refined(results, found[0].at)
     said = f"In {int(missed.sum()):,} of {variants} the tolerance of {asked} is missed by {parts}"
@@ -69,8 +69,8 @@ def _in_words(results: Results, one: _Missed) -> str:
     return f"{noun} (estimated to within {percent(one.error)}, {off},{in_words(results, one.at)}{when})"
 
 
-def _model(results: Results, at: Index) -> RobotModel:
-    """That of a variant."""
+def model_of(results: Results, at: Index) -> RobotModel:
+    """The model of a variant."""
     from engine.robots.model import build
     from engine.robots.modes import with_open_modes
     from engine.scene.sweep import expand

@@ -29,6 +29,7 @@ LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
 BUILD_SECONDS = 0.1  # of a variant's model
 COMPONENTS = ("x", "y", "z")
 ONE_AT_A_TIME = "one-at-a-time"  # the piece of robots that stand still in turn
+BY_MODES = "by-modes"  # that of numbers of modes
 
 
 def pieces(study: Study, question: Question) -> list[Piece]:
@@ -52,6 +53,9 @@ def pieces(study: Study, question: Question) -> list[Piece]:
     if question.one_at_a_time and len(study.robot) > 1:
         compute = partial(_without, base, question)
         found.append(Piece(ONE_AT_A_TIME, "robots that stand still in turn", compute, 0.5 * each * len(study.robot)))
+    if question.mode_counts:
+        compute, seconds = partial(_by_modes, base, question), each * (1.0 + len(question.mode_counts) / 3.0)
+        found.append(Piece(BY_MODES, "numbers of modes", compute, seconds))
     return found
 
 
@@ -139,7 +143,16 @@ def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
     return unlabelled({"error_without": np.stack([rows[name] for name in study.robot])})
 
 
-def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Dataset:
+def _by_modes(study: Study, question: Question, work: Work) -> xr.Dataset:
+    """What numbers of modes change."""
+    from engine.robots.converge import by_mode_counts
+
+    counts, how = question.mode_counts, (question.duration, question.after, question.zero)
+    error, doubt = by_mode_counts(study, counts, *how, work.halted)
+    return unlabelled({"error_by_modes": error, "error_by_modes_doubt": doubt})
+
+
+def gather(parts: Mapping[str, xr.Dataset], study: Study, question: Question, kind: str) -> xr.Dataset:
     """Everything, labelled."""
     from engine.robots.model import build
     from engine.robots.modes import with_open_modes
@@ -147,17 +160,22 @@ def gather(parts: Mapping[str, xr.Dataset], study: Study, kind: str) -> xr.Datas
     from engine.scene.sweep import expand
 
     model, declared = build(with_open_modes(study.without_sweep())), study.results(kind)
-    labels: dict[str, Sequence[str]] = {"robot": model.robots, "rail": list(model.rails), "component": COMPONENTS}
+    labels: dict[str, Sequence[str] | Sequence[int]] = {
+        "robot": model.robots,
+        "rail": list(model.rails),
+        "component": COMPONENTS,
+    }
     labels["joint"] = [f"link {j}" if j else "rail" for j in range(model.system.coordinate.shape[1])]
     own = dict(parts)
-    alone = own.pop(ONE_AT_A_TIME, None)
-    if alone is not None:
+    more = {name: part for piece in (ONE_AT_A_TIME, BY_MODES) if piece in own for name, part in own.pop(piece).items()}
+    if "error_without" in more:
         labels["still"] = model.robots
+    if "error_by_modes" in more:
+        labels["mode_count"] = question.mode_counts
     results = results_of(model)
     tolerance = np.where(are_held(results), study.solver.tolerance, np.nan)
     dataset = labelled(list(own.values()), Told(expand(study), declared, results, tolerance, labels))
-    if alone is not None:
-        dataset["error_without"] = declared["error_without"].holding(alone["error_without"].values)
+    dataset = dataset.assign({str(name): declared[str(name)].holding(part.values) for name, part in more.items()})
     return _with_places(dataset, model.rails, declared) if "rail_deflection" in dataset else dataset
 
 

@@ -91,6 +91,7 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     took = time.perf_counter() - begun
     each = took / len(found) if found else UNFINISHED * took / len(some)
     marches = cases.size + (len(study.robot) if question.one_at_a_time and len(study.robot) > 1 else 0)
+    marches += 1 + len(question.mode_counts) // 3 if question.mode_counts else 0
     again = AUDIT * threads * np.ceil(audited / threads)
     marched = [one.model.study.body[name].modes for one in found.values() for name in open_bodies(study)]
     most = min(max(map(int, marched), default=MODES[0]), MAX_MODES)  # no study file may fix more
@@ -110,7 +111,7 @@ def _taken(cases: Cases, found: dict[int, Converged]) -> TextTable:
             f"{variant:,}",
             str(one.model.modes),
             f"{one.steps:,}",
-            scientific(float(one.error.max())),
+            scientific(one.worst),
             label(one.status),
         )
         for variant, one in found.items()

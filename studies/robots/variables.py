@@ -53,6 +53,10 @@ RESULTS = outputs("""
     * | | | optional alone nan |
     error_without | still robot | m | | largest length of the error of a tool while one robot stands still
         where it starts; of the scene without sweep
+    error_by_modes | mode_count robot | | | what a number of modes of every rail changes the errors of tools by
+        the largest difference, over the longest error of the tool; of the scene without sweep
+    error_by_modes_doubt | robot | | | estimated error of the march that numbers of modes are compared with
+        over the longest error of the tool
     rail_place | rail rail_end | m | | place along a rail
     * | | | |
     robot | | | axis str | robot

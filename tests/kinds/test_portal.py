@@ -9,7 +9,7 @@ import pytest
 
 import studies
 from engine.robots.converge import Ladder, Rung, converge, marched
-from engine.robots.results import OF_DRIVES, are_held, by_drives, differences, results_of
+from engine.robots.results import OF_DRIVES, are_held, by_drives, differences, handled, results_of, works
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
@@ -32,7 +32,8 @@ SCALES = ("acceleration_scale", "speed_scale")
 
 
 def swept(**more: Any) -> Study:
-    return scene(solver={"tolerance": 1e-2}, sweep=SWEPT, question={"after": 0.5, "one_at_a_time": True}, **more)
+    question = {"after": 0.5, "one_at_a_time": True, "mode_counts": [2, 4, 12]}
+    return scene(solver={"tolerance": 1e-2}, sweep=SWEPT, question=question, **more)
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,42 @@ def test_answers_and_figures_name_what_the_data_say(found: Any) -> None:
         and "Statics alone would" in answer
     )
     figures = pictures(results)
-    assert [figure.name for figure in figures] == ["front", "errors", "over-time", "rails", "worst-move"]
+    assert [figure.name for figure in figures] == ["front", "errors", "modes", "over-time", "rails", "worst-move"]
+
+
+def test_numbers_of_modes_change_errors_by_what_marches_with_them_differ(found: Any) -> None:
+    study = swept().without_sweep()
+    own = converge(study, None, 0.5, "start")
+    for count in found["mode_count"].values:
+        other = converge(
+            study.with_values({f"body.{name}.modes": int(count) for name in study.body}), None, 0.5, "start"
+        )
+        off = np.linalg.norm(other.outcome.error - own.outcome.error, axis=2).max(axis=0)
+        wanted = off / np.linalg.norm(own.outcome.error, axis=2).max(axis=0)
+        np.testing.assert_allclose(found["error_by_modes"].sel(mode_count=count), wanted, rtol=0.1, atol=1e-3)
+    np.testing.assert_allclose(found["error_by_modes_doubt"], own.error[:2], rtol=1e-6)
+    worst = found["error_by_modes"].max("robot").values
+    assert worst[0] > 1e-2 > worst[2]
+    told = [text for text in kind_of(swept()).findings(Results.of(found)) if "modes of every rail" in text]
+    assert len(told) == 1 and told[0].startswith(
+        "With 2, 4 and 12 modes of every rail errors of tools are off by up to "
+    )
+    assert told[0].endswith(f"{4 if worst[1] <= 1e-2 else 12} are enough for 1 %.")
+
+
+def test_what_moves_at_the_longest_error_is_told_of_every_robot_in_a_sweep(found: Any) -> None:
+    answer = kind_of(swept()).findings(Results.of(found))
+    told = [text for text in answer if "is longest at" in text]
+    assert len(told) == 2 and all("at acceleration" in text and "during move " in text for text in told)
+
+
+def test_work_and_payloads_are_shown_when_robots_are_told_of_them() -> None:
+    study = scene()
+    model = Ladder.of(study, None, 0.5).coarsest
+    starts = model.system.moves[0, :, 0]
+    assert list(handled(model)) == [(0, starts[1], True), (0, starts[2], False)]  # 80 kg, then 10 kg
+    holds = [move.hold for robot in study.robot.values() for move in robot.moves if move.process and move.hold]
+    assert [way.end - way.start for way in works(model)] == pytest.approx(holds) == [0.3]
 
 
 def test_every_number_is_told_with_the_variant_that_it_belongs_to(found: Any) -> None:
