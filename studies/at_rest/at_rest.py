@@ -19,9 +19,11 @@ from engine.scene.carriages import MAX_CONTACTS
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Counts
+from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import Fidelity, Status
+from studies.at_rest.errors import PART, error_of, finer
 from studies.at_rest.labelling import Gathering, asked_coordinates
 from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
 from studies.protocol.parts import Piece, Work, unlabelled
@@ -56,6 +58,10 @@ class AtRestKind(PiecedKind):
 
     def check_model(self, model: SceneModel) -> None:
         """Refuse a scene that has no answer. Raises BadInput."""
+
+    def measured(self, count: int) -> Counts:
+        """At which of so many positions errors are measured."""
+        return np.arange(count)
 
     def fidelity(self, model: SceneModel) -> Fidelity:
         """Which model computes it."""
@@ -157,10 +163,23 @@ def _evaluated(
     opened = found.pop("opened", np.zeros((values.size, places.all.size), dtype=np.bool_)) & ~gone
     for array in found.values():
         array[:, gone] = np.nan
+    found |= _errors(kind, model, values, places.all, found)
     found["status"] = np.where(opened.any(axis=1), Status.SEPARATED, Status.OK)
     found["fidelity"] = np.full(values.size, int(kind.fidelity(model)))
     found["modes"] = np.full(values.size, model.body_modes)
     return found
+
+
+def _errors(kind: AtRestKind, model: SceneModel, values: VariantValues, positions: Array, found: Named) -> Named:
+    """Errors of the results of some variants of a scene; NaN where it has no finer one."""
+    here = kind.measured(positions.size)
+    own = {name: array[:, here] for name, array in found.items()}
+    try:
+        closer = finer(model)
+    except BadInput:
+        return {f"{PART}{name}": np.full((values.size, *array.shape[2:]), np.nan) for name, array in own.items()}
+    other = kind.variants(closer, values, frozen(closer, positions[here]))
+    return {f"{PART}{name}": error_of(name, array, other[name]) for name, array in own.items()}
 
 
 def _with_modes(kind: AtRestKind, study: Study, places: Positions, modes: int, work: Work) -> xr.Dataset:

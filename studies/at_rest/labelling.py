@@ -12,6 +12,7 @@ from engine.model.distinct_models import base_scene
 from results_schema.late import xr
 from results_schema.variable import outputs
 from results_schema.variables import axes
+from studies.at_rest.errors import PART
 from studies.at_rest.positions import Asked, Positions, positions_of
 from studies.protocol.parts import usual
 from studies.protocol.study import question_of
@@ -89,10 +90,26 @@ class Gathering:
         }
         own = {name: whole.pop(name).reshape(shape) for name in ("status", "fidelity", "modes")}
         found = dict(usual(self.cases.dims, **own, steps=np.zeros(shape)))
+        errors = {name: whole.pop(name) for name in list(whole) if name.startswith(PART)}
         for name, array in whole.items():
             dims = (*self.cases.dims, "position", *self._dims(name))
             found[name] = self.declared[name].holding(array.reshape(*shape, *array.shape[1:]), dims)
-        return found
+        return found | self._errors(errors)
+
+    def _errors(self, parts: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        """Estimated errors of all reported numbers, which are held to no tolerance."""
+        names, columns = list[str](), []
+        for name, array in ((name.removeprefix(PART), array) for name, array in parts.items()):
+            names += [f"{name} {label}" for label in self.inner[name][1]] if name in self.inner else [name]
+            columns.append(array.reshape(*self.cases.shape, -1))
+        none = np.full(len(names), np.nan)
+        return {
+            "result": axes()["result"].holding(np.array(names), ("result",)),
+            "estimated_error": self.declared["estimated_error"].holding(
+                np.concatenate(columns, axis=-1), (*self.cases.dims, "result")
+            ),
+            "tolerance": self.declared["tolerance"].holding(none, ("result",)),
+        }
 
     def _shapes(self) -> dict[str, Any]:
         """Shapes along the bodies, and what belongs to them."""

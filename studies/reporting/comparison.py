@@ -14,6 +14,7 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.late import xr
 from results_schema.status import Status, label
+from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results
@@ -143,6 +144,9 @@ def _of(results: Results, found: Range) -> xr.DataArray:
 
 def _allowed(first: Results, second: Results, found: Range, apart: Array) -> Array:
     """Both estimated errors of a result together, in its unit; NaN where no estimate exists."""
+    along = [errors_along(results, found.name) for results in (first, second) if "position" in _of(results, found).dims]
+    if len(along) == 2 and along[0] is not None and along[1] is not None:
+        return along[0] + along[1]
     if apart.shape != first.shape:
         return np.full(apart.shape, np.nan)
     errors = [absolute_errors(results, found.name, found.sensor) for results in (first, second)]

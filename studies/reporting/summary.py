@@ -12,6 +12,7 @@ from engine.scene.trains import axle_name
 from results_schema.arrays import Array
 from results_schema.late import xr
 from results_schema.status import Status, label
+from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
@@ -125,7 +126,7 @@ def ranges(study_results: Results) -> Iterator[Range]:
         return
     if not is_marched(results):
         declared = {} if is_measured(results) else study_results.study.results(study_results.study.kind)
-        beside = {name for name, variable in declared.items() if variable.lead != "grid"}
+        beside = {name for name, variable in declared.items() if variable.lead != "grid"} | {"estimated_error"}
         for name, array in results.data_vars.items():
             if array.dtype.kind == "f" and name not in beside:
                 yield from _range(study_results, str(name), "", array)
@@ -210,11 +211,14 @@ def in_tables(study_results: Results) -> list[Range]:
 
 
 def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
+    array = array.transpose(*(dim for dim in study_results.dims if dim in array.dims), ...)
     values, results = array.values, study_results.dataset
     if not np.isfinite(values).any():
         return
     units = str(array.attrs.get("units") or (results["sensor_unit"].sel(sensor=sensor).item() if sensor else "1"))
     errors = absolute_errors(study_results, name, sensor) if array.dims == study_results.dims else None
+    if "position" in array.dims:
+        errors = errors_along(study_results, name)
     smallest, largest = (_extreme(study_results, array, pick(values), errors) for pick in (np.nanargmin, np.nanargmax))
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
     stem = name.removesuffix("_max").removesuffix("_min")

@@ -17,6 +17,7 @@ from results_schema.late import xr
 from results_schema.status import Fidelity, Status
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
+from studies.at_rest.errors import told_errors
 from studies.findings.amplification import derived_from
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
@@ -215,7 +216,8 @@ class Verdict:
 def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
     """What was asked, estimated and observed, and what is far from exact as nothing holds it; "" where no estimates
     are."""
-    return " ".join(text for text in (_held_accuracy(group, results), _not_held(results)) if text)
+    said = (_held_accuracy(group, results), told_errors(results), _not_held(results))
+    return " ".join(text for text in said if text)
 
 
 def _not_held(results: Results) -> str:

@@ -5,12 +5,16 @@ import pytest
 
 import engine
 import studies
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from studies.at_rest.findings import frequency_errors, reading_errors
 from studies.commands import catalogue
 from studies.reporting import answers
+from studies.reporting.summary import ranges
+from studies.results.formatting import scientific
 from studies.results.results import Results
+from studies.runs.audit import told_accuracy
 from tests.engine.build import steel
 from tests.studies import at_rest as small
 from tests.studies.at_rest import KINDS, MASS, TABLE
@@ -68,6 +72,80 @@ def test_positions_where_a_variant_is_off_its_body_have_no_values(kind: str) -> 
     name = "frequency" if kind == "eigenfrequencies" else "middle"
     known = np.isfinite(found[name].values.reshape(2, 2, -1)).all(axis=2)
     assert known.tolist() == [[True, False], [True, True]]
+
+
+def relative(kind: str, given: Study, truth: Study) -> tuple[np.ndarray, np.ndarray]:
+    """Told and true errors (result,) of two studies of one scene."""
+    found, right = studies.run(given), studies.run(truth)
+    told, true = found.estimated_error, []
+    for name in told.result.values:
+        if kind == "eigenfrequencies":
+            mode = int(name.removeprefix("frequency "))
+            one, other = (ds.frequency.sel(mode=mode) for ds in (found, right))
+            true.append(float(abs(one / other - 1.0).max()))
+        elif not name.startswith("contact_force"):
+            true.append(float(abs(found[name] - right[name]).max() / abs(right[name]).max()))
+        else:
+            true.append(0.0)
+    assert np.isnan(found.tolerance).all()
+    return told.values, np.array(true)
+
+
+def check_told(told: np.ndarray, true: np.ndarray) -> None:
+    assert np.isfinite(told).all() and (told >= 1e-8).all() and (told >= true).all()
+    seen = true > 1e-7
+    assert (told[seen] <= 1.6 * true[seen]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("modes", "correction"), [(2, True), (8, True), (8, False), (40, True)])
+def test_told_errors_are_the_true_ones(kind: str, modes: int, correction: bool) -> None:
+    """Of the modes that are left out; statics with their correction are exact whatever is kept."""
+    given = small.study(kind, f"positions = 7{f'{chr(10)}modes = {min(modes, 8)}' if kind != 'influence' else ''}")
+    given = given.with_values({"body.bed.modes": modes, "solver.static_correction": correction})
+    truth = given.with_values({"body.bed.modes": 64, "solver.static_correction": True})
+    told, true = relative(kind, given, truth)
+    check_told(told, true)
+    assert (told.max() <= 1e-8) == (kind == "influence" and correction)
+    assert told.max() > 1e-3 or correction
+
+
+@pytest.mark.parametrize(("elements", "largest"), [(2, 0.2), (4, 0.05)])
+def test_errors_of_elements_are_told(elements: int, largest: float) -> None:
+    """Of frames that are cut too coarsely; frequencies alone have such."""
+    for kind in KINDS:
+        base = small.study(kind, "positions = 5").with_values({"body.bed": small.PORTAL | {"modes": 20}})
+        cut = {f"body.bed.member.{name}.elements": elements for name in small.PORTAL["member"]}
+        truth = {f"body.bed.member.{name}.elements": 32 for name in small.PORTAL["member"]} | {"body.bed.modes": 60}
+        told, true = relative(kind, base.with_values(cut), base.with_values(truth))
+        check_told(told, true)
+        assert (told.max() <= 1e-8) if kind == "influence" else 0.01 < told.max() < largest
+
+
+def test_errors_of_a_sweep_are_those_of_its_variants() -> None:
+    """Told in words, in tables in the unit of each frequency, and with each result of its own name."""
+    found = small.run("eigenfrequencies", "positions = 5\nmodes = 4", MASS)
+    assert found.estimated_error.dims == ("mass", "result")
+    assert found.result.values.tolist() == [f"frequency {mode}" for mode in (1, 2, 3, 4)]
+    alone = studies.run(
+        small.study("eigenfrequencies", "positions = 5\nmodes = 4").with_values({"carriage.car.mass": 50})
+    )
+    np.testing.assert_allclose(found.estimated_error.sel(mass=50.0), alone.estimated_error, rtol=1e-6)
+    results = Results.of(found)
+    worst = found.estimated_error.values.max()
+    assert told_accuracy(None, results).startswith(f"estimated errors at most {scientific(worst)} (frequency ")
+    (row,) = (one for one in ranges(results) if one.name == "frequency")
+    part = float(found.estimated_error.sel(result="frequency 4").max())
+    assert row.largest.error == pytest.approx(part * row.largest.value, rel=0.5)
+
+
+def test_a_scene_without_a_finer_one_has_no_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(model: object) -> None:
+        raise BadInput("no finer one")
+
+    monkeypatch.setattr("studies.at_rest.at_rest.finer", refuse)
+    found = studies.run(small.study("influence", "positions = 3"))
+    assert np.isnan(found.estimated_error).all() and "accuracy" not in told_accuracy(None, Results.of(found))
 
 
 def test_a_contact_that_would_lift_is_flagged() -> None:

@@ -206,6 +206,11 @@ class Body(SpecOfKind):
         """The same body with so many times its modes, as far as it has them."""
         return self.with_modes(times * (AUTO_MODES if self.modes == "auto" else int(self.modes)))
 
+    def finer(self) -> Self:
+        """The same body closer to what it stands for, as far as it can be: with twice the modes, more than a study may
+        ask for."""
+        return self.model_copy(update={"modes": 2 * (AUTO_MODES if self.modes == "auto" else int(self.modes))})
+
     @property
     def hashes(self) -> tuple[tuple[str, str], ...]:
         """Path and SHA-256 of every file that the body is made of."""

@@ -84,6 +84,9 @@ class Reduced(Body):
             update={"modes": min(times * int(self.modes), read_body(self.file).arrays["omega"].size)}
         )
 
+    def finer(self) -> Reduced:
+        return self.with_more_modes(2)
+
     def build(self) -> ModalBody:
         from engine.bodies.reduced.body import load_body
 

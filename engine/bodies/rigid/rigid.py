@@ -50,6 +50,9 @@ class Rigid(Body):
         """Itself: it has no modes that bend."""
         return self
 
+    def finer(self) -> Rigid:
+        return self
+
     @property
     def whole(self) -> Rigid:
         return self
