@@ -10,31 +10,40 @@ declare(
             speed over omega_1 L / pi, L the length of the track
         mass_ratio | | | optional | mass ratio
             carriage mass over body mass
-        position | | m | axis | position of the first carriage on its track
+        position | | m | axis | position
+            of the first carriage, along its track
         phase | | | axis | phase of the last cycle
             0 to 1, 0 where the motion's formula starts
-        station | | | axis int64 | number of the recorded instant
+        station | | | axis int64 | recorded instant
+            its number
         elapsed | position/phase/station | s | optional history | time since the start
-        history | | | axis int64 | flat number of the variant in the sweep's grid, last axis fastest
-        variant | | | axis int64 | number of the variant of a sampled or zipped sweep
+        history | | | axis int64 | variant
+            its flat number in the sweep's grid, last axis fastest
+        variant | | | axis int64 | variant
+            its number in a sampled or zipped sweep
         direction | | | axis str | direction of travel
             forward is from start to end
         sensor | | | axis str | sensor
         sensor_unit | sensor | | optional alone str | unit of the sensor
         result | | | axis str | reported number
-        result_unit | result | | optional alone str | unit of the reported number
+        result_unit | result | | optional alone str | unit of the result
         swept | | | axis str | swept number
         swept_unit | swept | | optional alone str | unit of the swept number
         status_name | | | axis str | status
-        percent | | percent | axis | part of the variants that have no larger value
-        peak | | | axis int64 | number of the peak in the cycle
-        mode | | | axis int64 | number of the mode, from 1
-        sample | | | axis int64 | flat number of the variant that was run again
+        percent | | percent | axis | part of the variants
+            of those that have no larger value
+        peak | | | axis int64 | peak
+            its number in the cycle
+        mode | | | axis int64 | mode
+            its number, from 1
+        sample | | | axis int64 | variant
+            flat number of one that was run again
         scheme | | | axis str | time integration scheme
-        step_count | | | axis int64 | steps over one passage or cycle
+        step_count | | | axis int64 | steps
+            over one passage or cycle
         mode_count | | | axis int64 | number of modes
         quantity | | | axis str | measured quantity
-        relative_step | | | axis | omega_1 times the time step
+        relative_step | | | axis | omega_1 times time step
     """),
 )
 
@@ -103,8 +112,8 @@ MARCH = outputs("""
         over the instants over which extremes of sensors are taken
     {envelope}_envelope_min | {envelope}_place | {envelope} | | smallest value at each place of {envelope}
         over the instants over which extremes of sensors are taken
-    {envelope}_place | | m | axis | place of {envelope} along its body
-        coordinate of the envelope
+    {envelope}_place | | m | axis | place of {envelope}
+        coordinate of the envelope, along its body
 """)
 declare("march", *MARCH)
 

@@ -100,7 +100,8 @@ def coordinates(cases: Cases) -> dict[str, Any]:
     """The sweep's axes with units; zipped or sampled parameters stand along ``variant``."""
     found: dict[str, Any] = {}
     for axis in cases.axes:
-        attributes = {"units": axis.units or "1", "long_name": f"{axis.name} ({', '.join(axis.of)})"}
+        words = {"long_name": axis.name.replace("_", " "), "comment": f"of {', '.join(axis.of)}"}
+        attributes = {"units": axis.units or "1", **words}
         found[axis.name] = (axis.dim, axis.values, attributes)
     if "variant" in cases.dims:
         count = cases.shape[cases.dims.index("variant")]

@@ -26,10 +26,13 @@ BODY_PLACES = 101  # along every body, of its shapes
 COORDINATES = outputs("""
     * | | | axis |
     on_body | | | str | body
-    body_place | | | | place along the body over the length of its track
-    checked_position | | m | | position at which numbers of modes are compared
-    unreduced_position | | m | | position at which the unreduced model is computed
-    correction | | | int8 | whether the static correction is on
+    body_place | | | | place along the body
+        over the length of its track
+    checked_position | | m | | checked position
+        at which numbers of modes are compared
+    unreduced_position | | m | | compared position
+        at which the unreduced model is computed
+    correction | | | int8 | static correction
         1 with, 0 without
 """)
 

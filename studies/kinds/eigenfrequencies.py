@@ -41,9 +41,9 @@ class Question(Asked):
 
 
 RESULTS = outputs("""
-    frequency | position mode | Hz | nan | natural frequency of the coupled system
-        bodies and carriages together, undamped, the carriages at rest; motions that nothing resists are left out; NaN
-        where there is none, or a contact is off the body
+    frequency | position mode | Hz | nan | natural frequency
+        of the coupled system: bodies and carriages together, undamped, the carriages at rest; motions that nothing
+        resists are left out; NaN where there is none, or a contact is off the body
     base_frequency | position mode | Hz | alone nan |
         natural frequency of the coupled system, of the scene without sweep
     mode_shape | on_body position mode body_place | kg-0.5 | alone nan |

@@ -74,7 +74,7 @@ class Influence(AtRestKind):
         for name, sensor in study.sensor.items():
             if QUANTITIES[sensor.quantity].rate:
                 what = "this quantity has no static reading"
-                expected = "displacement, a section force, stress, contact_force or support_reaction"
+                expected = "displacement, a section force, stress, contact_force or what supports carry"
                 raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)
         super().check(study)
 

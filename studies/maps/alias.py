@@ -30,8 +30,10 @@ OUTPUTS = outputs("""
     alias_scheme | | | axis str | time integration scheme
     alias_mode_count | | | axis int64 | number of modes
     alias_speed_ratio | | | axis | speed over omega_1 L / pi
-    alias_mass_ratio | | | axis | carriage mass over body mass
-    step_multiple | | | axis | steps over the steps of the alias rule
+    alias_mass_ratio | | | axis | mass ratio
+        carriage mass over body mass
+    step_multiple | | | axis | steps ratio
+        over the steps of the alias rule
     growth | alias_scheme alias_mode_count alias_speed_ratio alias_mass_ratio step_multiple | | nan | growth per passage
         spectral radius of its transition matrix on modal displacements and velocities over omega
     alias_steps | alias_mode_count alias_speed_ratio | | | steps per passage of the alias rule

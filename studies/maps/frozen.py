@@ -25,8 +25,10 @@ SAME = 1.01  # growth up to which a passage is called neutral: what is left of t
 OUTPUTS = outputs("""
     * | | | optional alone |
     held_mode_count | | | axis int64 | number of modes
-    held_mass_ratio | | | axis | carriage mass over body mass
-    centrifugal_number | | | axis | speed ratio times the square root of the mass ratio
+    held_mass_ratio | | | axis | mass ratio
+        carriage mass over body mass
+    centrifugal_number | | | axis | centrifugal number
+        speed ratio times the square root of the mass ratio
     frozen_growth | held_mode_count held_mass_ratio centrifugal_number | | nan |
         growth during the time of one passage, frozen
         mass held at midspan, with the terms of its speed; a property of the frozen station, not of a passage

@@ -17,7 +17,8 @@ SHOWN = (1, 3, 5, 10, 20)
 
 OUTPUTS = outputs("""
     * | | | optional alone |
-    lagged_mass_ratio | | | axis | carriage mass over body mass
+    lagged_mass_ratio | | | axis | mass ratio
+        carriage mass over body mass
     critical_mass_ratio | mode_count relative_step | | nan | mass ratio from which on lagged inertia grows
         frozen at midspan, by bisection on the march itself; NaN where there is none up to 3
     critical_mass_ratio_theory | mode_count | | | mass ratio where m phi.phi = 1

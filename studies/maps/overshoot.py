@@ -20,7 +20,8 @@ LONG, LONGER = 20.0, 100.0  # omega h of the sentences
 
 OUTPUTS = outputs("""
     * | | | optional alone |
-    overshoot_step | | | axis | omega h: natural frequency times the time step
+    overshoot_step | | | axis | omega h
+        natural frequency times the time step
     displacement_overshoot | scheme overshoot_step | | nan | overshoot in displacement
         largest over the first, of an undamped oscillator released at rest, over its first 20 steps; NaN beyond the
         scheme's limit

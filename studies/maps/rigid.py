@@ -22,8 +22,10 @@ CALM = 0.1  # of the weight: ringing below is none to speak of
 
 OUTPUTS = outputs("""
     * | | | optional alone |
-    tie | | | axis str | how the mass is tied, and the scheme
-    passage_fraction | | | axis | place of the mass over the length
+    tie | | | axis str | tie
+        how the mass is tied, and the scheme
+    passage_fraction | | | axis | place over the length
+        of the mass
     contact_force | tie passage_fraction | | nan | contact force
         over the weight; NaN beyond a million
     contact_ringing | tie | | nan | ringing of the contact force

@@ -20,7 +20,8 @@ SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to whe
 
 OUTPUTS = outputs("""
     * | | | optional alone |
-    frequency_step | | | axis | omega h: natural frequency times the time step
+    frequency_step | | | axis | omega h
+        natural frequency times the time step
     critical_step | scheme | | nan | omega h at which a scheme's amplification leaves 1
         omega h, by bisection on the march itself; NaN where there is none up to 1000
     critical_step_theory | scheme | | nan | the same by the closed form

@@ -22,7 +22,8 @@ REFINED = 48  # speeds between the last that holds and the first that does not
 
 OUTPUTS = outputs("""
     * | | | optional alone |
-    separation_mass_ratio | | | axis | carriage mass over body mass
+    separation_mass_ratio | | | axis | mass ratio
+        carriage mass over body mass
     separation_speed_ratio | | | axis | speed over omega_1 L / pi
     smallest_contact_force | separation_mass_ratio separation_speed_ratio | | nan |
         smallest contact force over the weight

@@ -28,8 +28,10 @@ TOLD = (0.1, 0.5, 1.0)
 OUTPUTS = outputs("""
     * | | | optional alone |
     shuttle_damping_ratio | | | axis | damping ratio of all modes
-    shuttle_mass_ratio | | | axis | carriage mass over body mass
-    shuttle_frequency_ratio | | | axis | frequency of the shuttle over omega_1
+    shuttle_mass_ratio | | | axis | mass ratio
+        carriage mass over body mass
+    shuttle_frequency_ratio | | | axis | frequency ratio
+        of the shuttle over omega_1
     multiplier | shuttle_damping_ratio shuttle_mass_ratio shuttle_frequency_ratio | | nan | largest Floquet multiplier
         of one period, in magnitude
     tongue_low | shuttle_mass_ratio | | nan | lower end of the main tongue

@@ -73,9 +73,10 @@ RESULTS = outputs("""
 COORDINATES = outputs("""
     * | | | axis |
     scene | | | str | scene
-    correction | | | int8 | whether the static correction is added
+    correction | | | int8 | static correction
         1 with, 0 without
-    solver | | | str | solver of SciPy and its relative tolerance
-    asked_tolerance | | | | tolerance asked of the automatic choice
+    solver | | | str | solver
+        of SciPy, and its relative tolerance
+    asked_tolerance | | | | tolerance asked
         `solver.tolerance`
 """)

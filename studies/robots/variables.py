@@ -61,8 +61,10 @@ RESULTS = outputs("""
     * | | | |
     robot | | | axis str | robot
     still | | | axis str | robot that stands still
-    joint | | | axis str | joint, from the rail outward
+    joint | | | axis str | joint
+        from the rail outward
     rail | | | axis str | body that robots ride
-    rail_end | | | axis | number of the place along a rail
+    rail_end | | | axis | place along a rail
+        its number
     component | | | axis str | component of the vector
 """)

@@ -48,6 +48,14 @@ def test_auto_steps_stay_inside_the_stability_limit(scheme: str, limit: float) -
     assert np.isfinite(ds.midspan_max.values).all()
 
 
+def test_swept_numbers_are_labelled_by_their_names() -> None:
+    """In plots of xarray on one line; which keys they set stands beside it."""
+    found = run(swept("carriage.car.motion.speed", SPEEDS, force(1.0, cruise(0.0, 1.0, 1.0))))
+    assert found.axis.attrs == {"units": "m s-1", "long_name": "axis", "comment": "of carriage.car.motion.speed"}
+    (line,) = found.midspan_max.plot()
+    assert line.axes.get_xlabel() == "axis [m s-1]"
+
+
 @pytest.mark.fault(12)
 def test_a_step_beyond_the_limit_is_refused() -> None:
     """Fault 12: limit, what was found, and a suggestion that is then accepted."""

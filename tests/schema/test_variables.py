@@ -10,6 +10,7 @@ from results_schema.status import GRAVEST, Fidelity, Status, flag_meanings, flag
 from results_schema.statuses import gravest, lost
 from results_schema.validate import findings_of, validate
 from results_schema.variables import RESERVED, Variable, axes, declarations, declare, expand, registered, sensor_unit
+from studies.protocol.study import KINDS
 from tests.readme import reference_table
 from tests.schema.samples import CARRIAGES, SENSORS, groups, march, with_histories
 
@@ -112,6 +113,15 @@ def test_every_declaration_has_a_text_and_a_row_in_the_table():
         assert variable.long_name
         assert row.startswith(f"| `{variable.name}` |")
         assert row.count("|") == 7
+
+
+def test_labels_of_axes_fit_one_line():
+    """xarray breaks what it writes beside an axis after 30 letters."""
+    assert all(KINDS.values())  # imports every kind, which declares its results
+    axes_of = {v.name: v for vs in registered().values() for v in vs if v.dims == (v.name,)}
+    assert len(axes_of) > 40
+    long = [name for name, v in axes_of.items() if len(f"{v.long_name} [{v.units or 1}]") > 30]
+    assert long == []
 
 
 def test_sensor_units():
