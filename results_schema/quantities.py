@@ -31,7 +31,8 @@ class Quantity:
     factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
     of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
-    carries. told: its error makes no status, as forces that enter excite every mode. meant: other words for it.
+    carries; turns: its moment about a direction. told: its error makes no status, as forces that enter excite every
+    mode. meant: other words for it.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Quantity:
     of_mass: bool = False
     of_contact: bool = False
     of_support: bool = False
+    turns: bool = False
     told: bool = False
     meant: tuple[str, ...] = ()
 
@@ -72,6 +74,7 @@ _ROWS = (
     Quantity("strain", "1", 2, factor=lambda section: -section.fibre_distance, of_section=True, needs_fibre=True),
     Quantity("contact_force", "N", of_contact=True, told=True),
     Quantity("support_reaction", "N", of_support=True, meant=("reaction", "support-force", "bearing-force")),
+    Quantity("support_moment", "N m", of_support=True, turns=True, meant=("clamping-moment", "fixing-moment")),
 )
 
 

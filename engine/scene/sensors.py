@@ -51,11 +51,21 @@ def _check_limit(limit: float | None, reads: Quantity) -> None:
         raise fault(f"a frequency_limit of {reads.name} is not told", expected=f"quantity: one of {known}")
 
 
+def _check_moment(sensor: Sensor) -> None:
+    if sensor.reads.turns and (sensor.node is None or sensor.direction is None):
+        remedy = 'of a uniform beam quantity = "bending_moment" at its clamped end'
+        what, expected = (
+            "a support's moment is one about a direction at a node",
+            'node = "its name", direction = "x"',
+        )
+        raise fault(what, expected=expected, remedy=remedy)
+
+
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
     m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
     of a carriage's own sprung mass (`carriage`), the contact force of a carriage (of a body that rides, that at one
-    `contact`), or what a support at a place of a beam or at a node carries.
+    `contact`), or what a support at a place of a beam or at a node carries (its moment at a node alone).
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -87,6 +97,7 @@ class Sensor(Spec):
             raise fault("a sensor on a member needs its place", expected="at = metres from the member's first node")
         if self.reads.of_support and (self.rides, self.member, self.point) != (None, None, None):
             raise fault("a support is a place of a beam, or a node", expected="at = metres, or node = its name")
+        _check_moment(self)
         if self.direction is not None and self.node is None and self.member is None:
             raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
@@ -123,7 +134,7 @@ class Sensor(Spec):
         way = self.direction
         if isinstance(way, str):
             way = (float(way == "x"), float(way == "y"), float(way == "z"))
-        return Spot(self.node, self.member, self.at or 0.0, self.point, way, self.reads.of_support)
+        return Spot(self.node, self.member, self.at or 0.0, self.point, way, self.reads.of_support, self.reads.turns)
 
 
 class Envelope(Spec):

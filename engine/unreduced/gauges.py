@@ -59,7 +59,7 @@ def _reaction(read: FullRead, spot: Spot) -> FullGauge:
     node = spot.node or min(frame.node, key=lambda name: abs(frame.place(name)[0] - spot.at))  # of a uniform beam
     support = FrameSupport(frame, assembly, replace(spot, node=node))
     held = support.held
-    on_u, on_v = (support.at_springs(key) for key in ("stiffness", "damping"))
+    on_u, on_v = support.at_springs("stiffness"), support.at_springs("damping")
     parts = np.array([on_u - assembly.all_stiffness @ held, on_v, -(assembly.all_mass @ held)])[:, assembly.free]
     entries = np.flatnonzero(parts.any(axis=0))
     if len(entries) > WIDTH:

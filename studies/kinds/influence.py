@@ -54,7 +54,8 @@ RESULTS = outputs("""
     contact_force_difference | unreduced_position contact | | optional alone |
         difference of contact forces from the unreduced model
         over the largest force at these positions
-    contact | | | axis str | carriage, or carriage and contact
+    contact | | | axis str | contact
+        the carriage, or the carriage and its contact
 """)
 declare("influence", *RESULTS, *COORDINATES)
 

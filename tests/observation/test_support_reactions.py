@@ -28,7 +28,7 @@ from tests.observation.test_off_track import GRAVITY, HEIGHT, PLACES, PORTAL, SP
 from tests.observation.test_off_track import study as portal_study
 from tests.unreduced.test_unreduced import apart
 
-REACTION = "support_reaction"
+REACTION, MOMENT = "support_reaction", "support_moment"
 MIDDLE_SPRING = [{"at": 0.0, "stiffness": 2e2}, {"at": 0.4, "stiffness": 5e2}, {"at": 1.0, "stiffness": 1e2}]
 DAMPED = [{"at": 0.1, "stiffness": 300.0, "damping": 2.0}, {"at": 0.8, "stiffness": 100.0, "damping": 5.0}]
 ONE = [{"at": 0.6, "stiffness": 200.0}]  # about which the beam turns freely
@@ -86,7 +86,8 @@ def test_statics_of_uniform_beams_are_those_of_the_textbook(weighs: bool) -> Non
 
 
 def by_hand(place: float, gravity: float) -> list[float]:
-    """Forces of the portal on its feet: across and down of the clamped one, down and aslant of the pinned one."""
+    """Forces of the portal on its feet: across and down of the clamped one, down and aslant of the pinned one, and the
+    moment of the clamped one about y, which points into the plane of x and z."""
     frame = PlaneFrame(2.1e9, 1.68e6, 78.5)
     frame.member((0.0, 0.0), (0.0, HEIGHT), [])
     frame.member((SPAN, HEIGHT), (0.0, HEIGHT), [place])
@@ -97,7 +98,7 @@ def by_hand(place: float, gravity: float) -> list[float]:
     stiffness, weight = frame.matrices()
     load = (gravity * weight - stiffness @ moved).reshape(-1, 3)
     clamped, pinned = load[frame.node(0.0, 0.0)], load[frame.node(SPAN, 0.0)]
-    return [clamped[0], -clamped[1], -pinned[1], SIDE[0] * pinned[0] + SIDE[2] * pinned[1]]
+    return [clamped[0], -clamped[1], -pinned[1], SIDE[0] * pinned[0] + SIDE[2] * pinned[1], -clamped[2]]
 
 
 FEET: dict[str, Any] = {
@@ -105,6 +106,7 @@ FEET: dict[str, Any] = {
     "down": {"node": "a", "quantity": REACTION},
     "pinned": {"node": "d", "quantity": REACTION},
     "aslant": {"node": "d", "direction": SIDE, "quantity": REACTION},
+    "clamping": {"node": "a", "direction": "y", "quantity": MOMENT},
 }
 
 
@@ -145,6 +147,38 @@ def test_frames_and_beams_on_the_same_springs_carry_the_same() -> None:
     dataset = studies.run(study({"length": 1.0}, force(3.0, motion), **table))
     found = np.stack([dataset[name].values for name in feet], axis=1)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+
+
+def test_moments_of_springs_and_of_clamped_beams() -> None:
+    """A cantilever that stands on a stiff and on a soft rotational spring carries the same at its foot: what the load
+    has over its arm; that of a uniform beam is its bending moment there."""
+    rail: dict[str, Any] = {
+        "kind": "frame",
+        "plane": "xz",
+        "node": {"n0": [0.0, 0.0], "n1": [1.0, 0.0]},
+        "section": {"all": dict.fromkeys(("area", "second_moment", "youngs_modulus", "density"), 1.0)},
+        "member": {"m0": {"nodes": ["n0", "n1"], "section": "all"}},
+        "track": {"members": ["m0"]},
+        "own_weight": True,
+    }
+    sprung = {"foot": {"node": "n0", "stiffness": [1e3, 0, 1e3], "rotational": [0, 30.0, 0]}}
+    places = np.array([0.0, 0.25, 1.0]) * SPAN
+    for held in ({"supports": {"n0": "clamped"}}, {"spring": sprung}):
+        read = {"foot": {"body": "bed", "node": "n0", "direction": "y", "quantity": MOMENT}}
+        question = {"positions": [float(place) / SPAN for place in places]}
+        table = {
+            "kind": "influence",
+            "question": question,
+            "gravity": GRAVITY,
+            "sensor": read,
+            "body": {"bed": rail | held},
+        }
+        dataset = studies.run(study({"length": 1.0}, force(3.0, cruise(0.0, 1.0, 1.0)), **table))
+        arm = 3.0 * places / SPAN + 0.5 * GRAVITY
+        np.testing.assert_allclose(dataset.foot.values, arm, rtol=0.0, atol=1e-9)
+    bed = beam(supports="clamped-free", own_weight=True)
+    found = at_rest(bed, {"foot": fixed(0.0, "bending_moment")}, places)
+    np.testing.assert_allclose(found[:, 0], -arm, rtol=0.0, atol=1e-9)
 
 
 def test_supports_carry_the_load_less_what_speeds_up() -> None:
@@ -231,6 +265,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         {"body": "bed", "node": "a", "quantity": REACTION},
         r"sensor\.read\.node: supports of a uniform beam have no nodes",
     ),
+    "a moment of a beam": (
+        {"body": "bed", "at": 0.1, "quantity": MOMENT},
+        'one about a direction at a node.*"bending_moment" at its clamped end',
+    ),
     "another word": (fixed(0.1, "reaction"), 'did you mean "support_reaction"'),
 }
 
@@ -254,6 +292,8 @@ def test_refusals_of_frames_and_of_other_bodies(tmp_path: Path, monkeypatch: pyt
         (PORTAL, {"at": 0.0, "quantity": REACTION}, r"sensor\.read\.at: no support stands here; expected one of a, d"),
         (PORTAL, {"point": "knee", "quantity": REACTION}, "a support is a place of a beam, or a node"),
         (roller, FEET["pinned"] | {"direction": "x"}, r"sensor\.read\.direction: nothing holds node d"),
+        (PORTAL, FEET["clamping"] | {"node": "d"}, "nothing holds node d against turns about this direction"),
+        (PORTAL, {"node": "a", "quantity": MOMENT}, "one about a direction at a node"),
         (reduced, FEET["down"], r"sensor\.read\.quantity: this body does not tell what its supports carry"),
         (files, FEET["down"] | {"node": 1}, "does not tell what its supports carry"),
     ):

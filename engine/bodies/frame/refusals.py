@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails
 
-from engine.bodies.frame.geometry import SAME_PLACE, TrackLine, member_ends, parallel, unit, up_of
+from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, parallel, unit, up_of
 from engine.bodies.modal.description import Spot, check_spot_name
 from engine.study_file.spec import nearest
 from engine.study_file.units import fault
@@ -236,11 +236,14 @@ def _check_support(frame: Frame, spot: Spot) -> None:
         remedy = "node = its name, of a support or of a spring to ground"
         raise BadInput("no support stands here", where=spot.key, expected=expected, remedy=remedy)
     way = unit(frame.gravity if spot.direction is None else spot.direction)
-    springs = [spring.stiffness for spring in to_ground.values() if spring.node == spot.node]
+    springs = [spring for spring in to_ground.values() if spring.node == spot.node]
+    rates, words = [spring.stiffness for spring in springs], DIRECTIONS[:3]
+    if spot.turns:
+        rates, words = [spring.rotational for spring in springs], DIRECTIONS[3:]
     held = frame.holds(str(spot.node))
-    holds = [word in held or any(rates[axis] > 0.0 for rates in springs) for axis, word in enumerate("xyz")]
+    holds = [word in held or any(rate[axis] > 0.0 for rate in rates) for axis, word in enumerate(words)]
     if not any(way[axis] and holds[axis] for axis in range(3)):
-        what = f"nothing holds node {spot.node} in this direction"
+        what = f"nothing holds node {spot.node} {'against turns about' if spot.turns else 'in'} this direction"
         raise BadInput(what, where="direction", expected="a direction that is held")
 
 

@@ -1,15 +1,17 @@
 """What a support of a frame carries: a node that is held, or stands on springs to ground.
 
-A unit motion of the support along what is read bends the frame to a shape psi, and by Betti's theorem the support
-carries psi(s) of a unit force at s: everything that it carries follows from psi and the model's mass. Of a spring
-k, psi is the answer to the load k at its node. Where a frame is free to move, psi stands for inertia relief.
+A unit motion of the support along what is read, or a unit turn about it, bends the frame to a shape psi, and by Betti's
+theorem the support carries psi(s) of a unit force at s: everything that it carries follows from psi and the model's
+mass. Of a spring k, psi is the answer to the load k at its node. Where a frame is free to move, psi stands for inertia
+relief.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -23,9 +25,13 @@ if TYPE_CHECKING:
     from engine.bodies.modal.description import Spot
 
 
+ROTATIONAL = {"stiffness": "rotational", "damping": "rotational_damping"}
+
+
 @dataclass(frozen=True, eq=False)
 class FrameSupport:
-    """The support at a node of a frame, read in a direction, positive where it is pressed along that."""
+    """The support at a node of a frame, read in a direction, positive where it is pressed along that, or turned about
+    it."""
 
     frame: Frame
     assembly: Assembly
@@ -38,14 +44,19 @@ class FrameSupport:
 
     @property
     def _first(self) -> int:
-        """Number of the node's first degree of freedom."""
-        return 6 * list(self.frame.node).index(str(self.spot.node))
+        """Number of the node's first degree of freedom of those that are read."""
+        return 6 * list(self.frame.node).index(str(self.spot.node)) + 3 * self.spot.turns
+
+    @property
+    def _words(self) -> Sequence[str]:
+        """Names of the three."""
+        return DIRECTIONS[3:] if self.spot.turns else DIRECTIONS[:3]
 
     @property
     def _ways(self) -> list[int]:
         """The axes in which it moves."""
         held = (*self.frame.still, *self.frame.holds(str(self.spot.node)))
-        return [axis for axis in range(3) if DIRECTIONS[axis] not in held]
+        return [axis for axis in range(3) if self._words[axis] not in held]
 
     def _to_ground(self) -> list[str]:
         """Springs between the node and the ground."""
@@ -59,11 +70,13 @@ class FrameSupport:
         found[[self._first + axis for axis in rigid]] = self._parts[rigid]
         return found
 
-    def at_springs(self, key: str) -> Array:
-        """(6 P,) what its springs carry of every motion by their stiffness, N/m, or damping, N s/m."""
+    def at_springs(self, key: Literal["stiffness", "damping"]) -> Array:
+        """(6 P,) what its springs carry of every motion by their stiffness, N/m or N m/rad, or damping, N s/m or
+        N m s/rad."""
         found = np.zeros_like(self.held)
+        own = ROTATIONAL[key] if self.spot.turns else key
         for axis in self._ways:
-            rates = [getattr(self.frame.spring[name], key)[axis] for name in self._to_ground()]
+            rates = [getattr(self.frame.spring[name], own)[axis] for name in self._to_ground()]
             found[self._first + axis] = sum(rates) * self._parts[axis]
         return found
 
@@ -71,7 +84,7 @@ class FrameSupport:
     def dampers(self) -> dict[float | str, float]:
         """The part that it carries of the dampers beside its springs."""
         names = self._to_ground()
-        return {f"spring.{name}.{DIRECTIONS[axis]}": float(self._parts[axis]) for name in names for axis in self._ways}
+        return {f"spring.{name}.{self._words[axis]}": float(self._parts[axis]) for name in names for axis in self._ways}
 
 
 def frame_support(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) -> Gauge:

@@ -41,7 +41,7 @@ Modes = Annotated[Auto | Annotated[int, Tag(NUMBER), Field(ge=1, le=MAX_MODES)],
 class Spot:
     """A place that a sensor reads off the track: a node (its name or number), a member with metres from its first node,
     or a point; and the direction that it reads, along gravity unless given. support: what the support at a node, or at
-    metres along the track, carries is read there, not the motion."""
+    metres along the track, carries is read there, not the motion; turns: its moment about the direction."""
 
     node: str | int | None = None
     member: str | None = None
@@ -49,6 +49,7 @@ class Spot:
     point: str | None = None
     direction: tuple[float, float, float] | None = None
     support: bool = False
+    turns: bool = False
 
     @property
     def key(self) -> str:
