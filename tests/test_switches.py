@@ -10,7 +10,7 @@ from tests.test_imports import MODULES
 # Where it is asked all the same, and of what.
 ASKED = {
     "engine.study_file": "what users wrote, in whatever form, and the notes of its types",
-    "engine.scene.study": "which of nested values are tables",
+    "engine.scene.dotted_keys": "which of nested values are tables",
     "engine.bodies.modal.description": "forms of the damping ratio, and what stands beside the table of a body",
     "engine.bodies.reduced": "which bodies can be saved, and errors of libraries",
     "engine.bodies.files": "what versions of foreign packages have",

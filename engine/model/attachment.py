@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.kernels.modal_sums import sums_over_modes
 from engine.model.ties import Attachment
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
     from engine.model.ties import AlongTie
@@ -52,7 +54,15 @@ def shape_derivatives(model: SceneModel, attachment: Attachment, along: Along, h
 def modal_flexibility_between(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
     """(S or 1,) what the kept modes of a body carry of the motion of an attachment per unit force of another, m/N."""
     modal, factor = model.bodies[one.body].modal, one.factor * other.factor
-    return factor * modal.carried(rows(model, one, along), rows(model, other, along))
+    return factor * carried_by_modes(modal, rows(model, one, along), rows(model, other, along))
+
+
+def carried_by_modes(modal: ModalBody, left: Array, right: Array) -> Array:
+    """(S,) what the modes of a body carry of a static reading: of every mode, left (S or 1, N) is read per unit, and a
+    unit force moves it by right (S or 1, N)."""
+    found = np.empty(max(len(left), len(right)))
+    sums_over_modes(*map(np.ascontiguousarray, (left, right)), modal.modal_flexibility, found)
+    return found
 
 
 def residual_flexibility(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:

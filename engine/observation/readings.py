@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from engine.model.attachment import holds, place
+from engine.model.attachment import carried_by_modes, holds, place
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import Along, StationPath
 from engine.model.ties import Attachment
@@ -207,7 +207,7 @@ class Sensor:
 
     def _kept(self, model: SceneModel, along: Along, loaded: Array) -> Array:
         """The part of it that the kept modes carry; ``loaded`` (S, N) are the mode shapes where the force acts."""
-        return self._modal(model).carried(self._rows(model, along), loaded)
+        return carried_by_modes(self._modal(model), self._rows(model, along), loaded)
 
     def offset(self, model: SceneModel, along: Along) -> Array:
         """(stations,): what the body's own weight adds per unit gravity, in step units."""

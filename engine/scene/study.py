@@ -131,7 +131,7 @@ class Study(Scene):
 
     def __eq__(self, other: object) -> bool:
         """Whether two studies say the same, whatever their texts."""
-        return isinstance(other, Study) and self.__dict__ == other.__dict__
+        return other.__class__ is self.__class__ and self.__dict__ == other.__dict__
 
     def __hash__(self) -> int:
         return hash((self.kind, self.title))

@@ -10,7 +10,6 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine.kernels.shapes import sums_over_modes
 from results_schema.errors import BadInput
 
 Array = NDArray[np.float64]
@@ -260,13 +259,6 @@ class ModalBody:
     def modal_flexibility(self) -> Array:
         """(N,) 1/omega^2, the static answer to a modal force, kg-normalised; 0 for rigid-body modes."""
         return np.divide(1.0, self.omega**2, out=np.zeros_like(self.omega), where=self.omega > 0.0)
-
-    def carried(self, left: Array, right: Array) -> Array:
-        """(S,) what its modes carry of a static reading: of every mode, left (S or 1, N) is read per unit, and a unit
-        force moves it by right (S or 1, N)."""
-        found = np.empty(max(len(left), len(right)))
-        sums_over_modes(*map(np.ascontiguousarray, (left, right)), self.modal_flexibility, found)
-        return found
 
     def shape_at(self, place: float, derivative: int = 0) -> Array:
         """(1, N) `shape` at one place, evaluated once: sensors and dampers ask for theirs again and again."""
