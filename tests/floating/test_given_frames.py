@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import studies
 from engine.floating.march import march
@@ -11,7 +12,7 @@ from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.status import Fidelity
 from tests.floating.bodies.test_frames_of_beams import PORTAL
-from tests.floating.scenes import ARM, FOX_GOODWIN, given_arm
+from tests.floating.scenes import ARM, FOX_GOODWIN, given_arm, history, steps
 
 ALPHA = Weights(0.3025, 0.6, -0.1 / 1.1, 0.0)  # of generalized-alpha
 
@@ -86,3 +87,34 @@ def test_the_model_is_measured() -> None:
     assert fine["tip_max"].equals(full["tip_max"])
     hinged = study.with_values({"frame.arm.joints.0": {"kind": "revolute", "axis": [0.2, 1.0, 0.3]}})
     assert (studies.run(hinged)["fidelity_used"] == Fidelity.FRAME).all()
+
+
+def test_a_spring_to_a_place_is_marched_in_full() -> None:
+    """An arm whose base is shaken, its tip on a long spring with a damper, beside its modes' own equations."""
+    shake = {"kind": "prismatic", "axis": [0, 0, 1], "motion": {"kind": "swing", "amplitude": 0.05, "frequency": 0.7}}
+    far, stiffness, damping = 1e4, 40.0, 6.0
+    ends = [{"on": "arm"}, {"position": [10.0, 0.0, far]}]
+    spring = {"stay": {"ends": ends, "stiffness": stiffness, "damping": damping, "length": far}}
+    tip = {"tip": {"body": "arm", "at": 10.0}}
+    joints = {"arm": {"joints": [shake]}}
+    question = {"duration": 2.0}
+    scene = Study(
+        kind="moving-frames", body={"arm": ARM}, frame=joints, spring=spring, sensor=tip, gravity=0.0, question=question
+    )
+    assert (studies.run(scene)["fidelity_used"] == Fidelity.FRAME).all()
+
+    beam = scene.body["arm"]
+    modal, x = beam.build(), np.linspace(0.0, 10.0, 2001)
+    shapes = modal.shapes.derivatives(x, (0,))[0]
+    drag, own, rate = 1.2 * np.trapezoid(shapes, x, axis=0), shapes[-1], 2.0 * np.pi * 0.7
+
+    def law(t: float, state: np.ndarray) -> np.ndarray:
+        q, u = np.split(state, 2)
+        place, speed = 0.05 * np.sin(rate * t), 0.05 * rate * np.cos(rate * t)
+        pull = stiffness * (place + own @ q) + damping * (speed + own @ u)
+        return np.concatenate([u, rate**2 * place * drag - modal.omega**2 * q - own * pull])
+
+    model, marched = steps(scene, 2.0, 8000, 80)
+    begun = np.zeros(12)
+    wanted = own @ solve_ivp(law, (0, 2), begun, "DOP853", marched.times[0], rtol=1e-10, atol=1e-13).y[:6]
+    assert history(model, marched, "sensors")[:, 0] == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
