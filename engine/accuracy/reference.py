@@ -136,7 +136,7 @@ def converge(
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, Marches(grid, values, levels), share)
-    pushes_along = any(carriage.pushes_along for carriage in asked.study.carriage.values())
+    pushes_along = any("along" in carriage.pushes for carriage in asked.study.carriage.values())
     stays = STAYS if levels.numerics[0].static_correction else STAYS_UNCORRECTED
     now, spent = march(np.arange(values.size), 0)
     found = Converged(

@@ -37,7 +37,7 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
         for load in range(count):
             q += found[:, load, None] * lanes.weight[:, load, None]
         q += found[:, count, None] * lanes.gravity[:, None]
-    if model.pushes:
+    if model.has_constant:
         q[:, -1] = 1.0
     _meet(model, lanes, along, (q, v))
     return State(q, v, np.zeros(shape), np.zeros(shape))

@@ -299,7 +299,7 @@ def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
         static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
         own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
         static = np.maximum(static, STILL * usual * weight)
-        pushed = tables.model.is_pushed(sensor.body)
+        pushed = "along" in tables.model.pushed(sensor.body)
         columns.append(own if sensor.offset_order else np.maximum(static, own) if pushed else static)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
     found[:, [sensor.silent(tables.model) for sensor in tables.sensors[:count]]] = np.inf

@@ -77,7 +77,8 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     for number, carriage in enumerate(model.carriages):
         if carriage.inertia != "force" or number in joined:
             body = model.bodies[carriage.body].modal
-            wave = float(body.wave_number.max()) * carriage.rider.top_speed
+            sides = [body.sides[push.direction].wave_number for push in model.pushes if push.carriage == number]
+            wave = float(np.max([body.wave_number, *sides])) * carriage.rider.top_speed
             found = np.maximum(found, _alias_root(model.scheme, wave, float(body.omega.max()) * time_scale))
     return model.scheme.stride * found
 

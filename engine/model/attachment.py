@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
-    from engine.model.ties import AlongTie
+
+
+ROUNDED = 1e-12  # of what kept modes miss at one push: what is left beside others is rounding
 
 
 def holds(attachment: Attachment, along: Along) -> bool:
@@ -91,33 +93,40 @@ def tie_shapes(model: SceneModel, ties: Sequence[int], along: Along) -> Array:
             if holds(attachment, along):
                 shapes = attachment.factor * rows(model, attachment, along)
                 found[:, model.bodies[attachment.body].modes, place] += shapes
-        if r >= model.first_push:
-            for number, push in enumerate(model.corrected):
-                if number == r - model.first_push:
-                    found[:, model.first_residual + number, place] = residual_mode(model, push, along)
-        elif r >= model.first_spring and (mode := model.springs[r - model.first_spring].mode) is not None:
-            found[:, mode, place] = -1.0
+        if model.first_spring <= r < model.first_push:
+            mode = model.springs[r - model.first_spring].mode
+            if mode is not None:
+                found[:, mode, place] = -1.0
+    pushes = np.array([r for r in ties if r >= model.first_push], dtype=np.int64)
+    if model.corrected and pushes.size:
+        own = residual_modes(model, pushes, residual(model, along, pushes))
+        found[:, model.residuals, np.isin(ties, pushes)] = own
     return found
 
 
-def residual_mode(model: SceneModel, push: AlongTie, along: Along, missed: Array | None = None) -> Array:
-    """(S,) what the residual mode of a push moves its mass by, kg^(-1/2); missed: the flexibility that the kept modes
-    miss there, where it is known.
+def residual_modes(model: SceneModel, pushes: Counts, missed: Array) -> Array:
+    """(S, C, P) what the residual modes of all pushes move the masses of some by, kg^(-1/2), by the numbers of their
+    ties; missed (S, P, P): the flexibility between these that the kept modes miss.
 
-    A force along the track at s moves that place by R F besides the kept modes, R their residual flexibility, and its
-    mass by as much: F = -m (s'' + D2 u + (R F)''). So there is one more mode for every push, of shape omega R^(1/2) at
-    its mass and nowhere else. Its own inertia, 1/(R omega^2), is one that modes above omega have too, and keeps light
-    masses from swinging faster than these.
+    Forces F on a track move their places by R F besides the kept modes, R their residual flexibility, and their masses
+    by as much: F = -m (s'' + D2 u + (R F)''). So there is one more mode for every push, of shape omega L at the masses
+    and nowhere else, L L^T = R, each at its own and those that follow. Their own inertia, 1/(R omega^2), is one that
+    modes above omega have too, and keeps light masses from swinging faster than these.
     """
-    [attachment] = push.attachments
-    if missed is None:
-        missed = residual_flexibility(model, attachment, attachment, along)
-    return np.asarray(model.residual_omega(push) * np.sqrt(np.maximum(missed, 0.0)))
+    root = np.zeros_like(missed)
+    found = np.zeros((len(missed), len(model.corrected), len(pushes)))
+    for j, r in enumerate(pushes):
+        left = missed[:, j:, j] - np.sum(root[:, j:, :j] * root[:, j, None, :j], axis=2)
+        felt = left[:, 0] > ROUNDED * missed[:, j, j]
+        root[felt, j:, j] = left[felt] / np.sqrt(left[felt, :1])
+        number = int(r) - model.first_push
+        found[:, number, j:] = model.residual_omega(model.pushes[number]) * root[:, j:, j]
+    return found
 
 
 def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
     """(S, ties, ties) flexibility that the kept modes miss between the contacts of bodies that ride and some ties, by
-    their numbers, and of pushes along tracks at themselves, m/N; (0, 0, 0) where there are none, or no static
+    their numbers, and between pushes along and across tracks, m/N; (0, 0, 0) where there are none, or no static
     correction."""
     springs = dict(enumerate(model.springs, start=model.first_spring))
     felt = [place for place, r in enumerate(ties) if r in springs and springs[r].held and not springs[r].rigid]
@@ -126,8 +135,8 @@ def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
         return np.zeros((0, 0, 0))
     found, known = np.zeros((along[0].s.size, ties.size, ties.size)), dict[tuple[Attachment, Attachment], Array]()
     for r in (*felt, *pushes):
-        for s in [r] if r in pushes else range(ties.size):
-            if s in felt and s < r:
+        for s in pushes if r in pushes else range(ties.size):
+            if s in (pushes if r in pushes else felt) and s < r:
                 found[:, r, s] = found[:, s, r]
                 continue
             for one, other in shared(model, ties[r], ties[s], along):

@@ -16,7 +16,7 @@ from engine.bodies.build import build_body
 from engine.model.numerics import Numerics
 from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
-from engine.model.ties import AlongTie, CarriageTie, DamperTie, Load, SpringTie
+from engine.model.ties import CarriageTie, DamperTie, Load, PushTie, SpringTie
 from engine.scene.variants import SpringKeys, keys_of_carriage
 from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
@@ -24,7 +24,7 @@ from results_schema.status import Fidelity
 
 if TYPE_CHECKING:
     from engine.bodies.modal.description import Body
-    from engine.bodies.modal.modal_body import ModalBody
+    from engine.bodies.modal.modal_body import Direction, ModalBody
     from engine.kernels.schemes import Scheme
     from engine.model.support_reactions import SupportReactions
     from engine.model.ties import Attachment, Inertia
@@ -53,8 +53,8 @@ class BodyPart:
 @dataclass(frozen=True, eq=False)
 class SceneModel:
     """Bodies, carriages, dampers and springs of one scene; modes of all bodies stand in one row, sprung masses after
-    them, then what pushes along tracks adds. numerics: what it is computed with. contacts: the ways of the contacts of
-    bodies that ride. swept: keys of numbers that differ from variant to variant."""
+    them, then what pushes along or across tracks adds. numerics: what it is computed with. contacts: the ways of the
+    contacts of bodies that ride. swept: keys of numbers that differ from variant to variant."""
 
     study: Study
     numerics: Numerics
@@ -64,11 +64,11 @@ class SceneModel:
     springs: tuple[SpringTie, ...] = ()
     contacts: tuple[Rider, ...] = ()
     swept: tuple[str, ...] = ()
-    pushes: tuple[AlongTie, ...] = ()
+    pushes: tuple[PushTie, ...] = ()
 
     @property
     def ties(self) -> int:
-        """Number of ties: carriages first, then dampers, springs, and pushes along tracks."""
+        """Number of ties: carriages first, then dampers, springs, and pushes along or across tracks."""
         return self.first_push + len(self.pushes)
 
     @property
@@ -80,23 +80,29 @@ class SceneModel:
     def omega(self) -> Array:
         """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual modes, and 0 for
         the coordinate that stays 1, which is there where something pushes along its track."""
-        sprung, constant = np.zeros(len(self.sprung)), np.zeros(int(bool(self.pushes)))
+        sprung, constant = np.zeros(len(self.sprung)), np.zeros(int(self.has_constant))
         bodies, residual = (part.modal.omega for part in self.bodies), [self.residual_omega(r) for r in self.corrected]
         return np.concatenate([*bodies, sprung, residual, constant])
 
     @property
-    def corrected(self) -> tuple[AlongTie, ...]:
-        """The pushes along tracks that have a residual mode (`attachment.residual_mode`)."""
+    def has_constant(self) -> bool:
+        """Whether the last coordinate is one that stays 1."""
+        return any(push.prescribed for push in self.pushes)
+
+    @property
+    def corrected(self) -> tuple[PushTie, ...]:
+        """The pushes that have a residual mode (`attachment.residual_modes`)."""
         return self.pushes if self.numerics.static_correction else ()
 
-    def residual_omega(self, push: AlongTie) -> float:
+    def residual_omega(self, push: PushTie) -> float:
         """The frequency of its residual mode, rad/s: that of the highest mode kept, which asks for no smaller steps."""
         return float(self.bodies[push.body].modal.omega[-1])
 
     @property
-    def first_residual(self) -> int:
-        """Number of the first residual mode among all modes."""
-        return self.body_modes + len(self.sprung)
+    def residuals(self) -> slice:
+        """The residual modes among all modes."""
+        first = self.body_modes + len(self.sprung)
+        return slice(first, first + len(self.corrected))
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:
@@ -131,9 +137,8 @@ class SceneModel:
         found = (modal.omega == 0.0) | _larger(modal.shape(x))
         if modal.points is not None:
             found |= _larger(modal.points.shapes)
-        pushes = any(carriage.pushes_along and carriage.on == part.name for carriage in self.study.carriage.values())
-        if pushes and modal.along is not None:
-            found |= _larger(modal.along.derivatives(x, (0,))[0])
+        for direction in self.pushed(self.bodies.index(part)):
+            found |= _larger(modal.sides[direction].derivatives(x, (0,))[0])
         return np.asarray(found)
 
     @property
@@ -159,18 +164,18 @@ class SceneModel:
 
     @property
     def first_push(self) -> int:
-        """Number of the first push along a track among all ties, after the springs."""
+        """Number of the first push along or across a track among all ties, after the springs."""
         return self.first_spring + len(self.springs)
 
     @cached_property
     def attachments(self) -> tuple[tuple[Attachment, ...], ...]:
         """Where every tie acts on the bodies."""
-        ties: list[CarriageTie | DamperTie | SpringTie | AlongTie] = [*self.carriages, *self.dampers]
+        ties: list[CarriageTie | DamperTie | SpringTie | PushTie] = [*self.carriages, *self.dampers]
         return tuple(tie.attachments for tie in (*ties, *self.springs, *self.pushes))
 
-    def is_pushed(self, body: int) -> bool:
-        """Whether the inertia of a carriage acts along the track of a body."""
-        return any(push.body == body for push in self.pushes)
+    def pushed(self, body: int) -> set[Direction]:
+        """Directions beside that of loads in which the inertia of carriages acts on the track of a body."""
+        return {push.direction for push in self.pushes if push.body == body}
 
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
@@ -257,7 +262,7 @@ def build_model(
         springs,
         contacts,
         tuple(swept),
-        tuple(_pushes(study, numerics, carriages)),
+        tuple(_pushes(study, numerics, carriages, parts)),
     )
     _check_rigid_modes(model)
     return model
@@ -335,18 +340,24 @@ def _springs(
     return tuple(found)
 
 
-def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie]) -> Iterator[AlongTie]:
-    """The carriages whose inertia acts along their tracks, wherever any inertia does."""
+def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie], parts: list[BodyPart]) -> Iterator[PushTie]:
+    """The inertia of carriages along and across their tracks, wherever any inertia acts."""
+    if numerics.fidelity in ("force", "static"):
+        return
     for number, tie in enumerate(carriages):
-        if study.carriage[tie.name].pushes_along and numerics.fidelity not in ("force", "static"):
-            if tie.rider.is_jolted(alone=len(carriages) == 1):
+        for direction in study.carriage[tie.name].pushes:
+            if direction not in parts[tie.body].modal.sides:
+                what, where = f"this body does not move {direction} its own track", f"inertia_{direction}"
+                raise study.source.fault(f"carriage.{tie.name}.{where}", what, expected=f"{where} = false")
+            push = PushTie(number, tie.body, direction, numerics.fidelity != "mass-without-convective")
+            if push.prescribed and tie.rider.is_jolted(alone=len(carriages) == 1):
                 raise study.source.fault(
                     f"carriage.{tie.name}.motion",
                     "this carriage changes its speed at an instant, and so would push along its track without bound",
                     expected="a motion without jumps of speed",
                     remedy="turn > 0 of an out-and-back, or inertia_along = false",
                 )
-            yield AlongTie(number, tie.body, numerics.fidelity != "mass-without-convective")
+            yield push
 
 
 def _standing(

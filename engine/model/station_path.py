@@ -47,7 +47,7 @@ class StationPath:
         """(S, N) mode shapes of its body along the way."""
         return np.asarray(self.shapes(body, derivative)[derivative])
 
-    def shapes(self, body: ModalBody, highest: int, direction: Direction = "across") -> Array:
+    def shapes(self, body: ModalBody, highest: int, direction: Direction = "load") -> Array:
         """(``highest`` + 1 or more, S, N) the same in a direction with their derivatives, evaluated together once."""
         found = self._shapes.get((id(body), direction))
         if found is None or len(found) <= highest:

@@ -27,7 +27,7 @@ class Attachment:
     body: int
     rider: int | None = None
     at: float | str = 0.0
-    direction: Direction = "across"
+    direction: Direction = "load"
 
     @property
     def unit(self) -> Attachment:
@@ -117,9 +117,9 @@ class DamperTie:
 
 
 @dataclass(frozen=True, eq=False)
-class AlongTie:
-    """The inertia of a carriage (its number) along the track of a body: F = -m (s'' + D2 u), u the track's motion along
-    itself.
+class PushTie:
+    """The inertia of a carriage (its number) along the track of a body, or across that and its loads:
+    F = -m (s'' + D2 u), u the track's motion in that direction, and s'' along it alone.
 
     What the motion prescribes, s'', is m per step squared for every lane alike: the rate at which a coordinate that
     stays 1 enters the tie's kinematics. convected: whether D2 has its convective terms.
@@ -127,9 +127,15 @@ class AlongTie:
 
     carriage: int
     body: int
+    direction: Direction
     convected: bool
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether the motion of its carriage is in its direction."""
+        return self.direction == "along"
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
         """Where its force acts."""
-        return (Attachment(1.0, self.body, self.carriage, direction="along"),)
+        return (Attachment(1.0, self.body, self.carriage, direction=self.direction),)

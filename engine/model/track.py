@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
-from engine.model.attachment import holds, residual, residual_mode, shape_derivatives
+from engine.model.attachment import holds, residual, residual_modes, shape_derivatives, tie_shapes
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import StationPath
 from results_schema.arrays import Array, Counts
@@ -74,12 +74,10 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 first = model.bodies[attachment.body].modes.start
                 add_attachment(rows, place, first, attachment.factor, shapes, motion.factors)
         if r >= model.first_push:
-            number = int(r) - model.first_push
-            way = along[model.pushes[number].carriage]
-            rows[:, -1, place, CURVE] = np.where(way.on, way.dds, 0.0)
-            if number < len(model.corrected):
-                own = residual_mode(model, model.corrected[number], along, missed[:, place, place])
-                rows[:, model.first_residual + number, place, FORCE] = own
+            push = model.pushes[r - model.first_push]
+            way = along[push.carriage]
+            if push.prescribed:
+                rows[:, -1, place, CURVE] = np.where(way.on, way.dds, 0.0)
         elif r >= model.first_spring:
             spring = model.springs[r - model.first_spring]
             if spring.mode is not None:
@@ -90,6 +88,10 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
         elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
             drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
+    pushes = np.flatnonzero(ties >= model.first_push)
+    if model.corrected and pushes.size:
+        own = residual_modes(model, ties[pushes], missed[:, pushes[:, None], pushes])
+        rows[:, model.residuals, pushes, FORCE] = own
     return TieRows(ties, rows, drive, level, missed)
 
 
@@ -198,25 +200,29 @@ def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array
 
     ties: of `ties_with_inertia`;  mass (blocks, ties, LANES): kg;  time_scale (blocks, LANES): s per scene time.
     """
-    shape, slope = np.zeros((ties.size, model.omega.size)), np.zeros((ties.size, model.omega.size))
+    slope = np.zeros((ties.size, model.omega.size))
     sag_slope, arrives, speed = np.zeros(ties.size), np.zeros(ties.size), np.zeros_like(mass)
-    at = np.array([segment.start])
+    along = _here(model, segment)
+    shape = np.ascontiguousarray(tie_shapes(model, ties.tolist(), along)[0].T)
     for number, r in enumerate(ties):
         push = model.pushes[r - model.first_push] if r >= model.first_push else None
         owner = int(r) if push is None else push.carriage
-        carriage = model.carriages[owner]
-        part, rider = model.bodies[carriage.body], carriage.rider
-        place = np.clip(rider.path(at, segment.start, segment.end).S, 0.0, rider.length)
+        [attachment], carriage = model.attachments[r], model.carriages[owner]
+        slope[number, model.bodies[carriage.body].modes] = shape_rows(model, attachment, along, 1)[0]
         strike = next((strike for strike in segment.strikes if strike.rider == owner), None)
         convected = carriage.inertia == "mass" if push is None else push.convected
-        moves = part.modal.shapes_in("across" if push is None else "along").derivatives(place, range(2))
-        shape[number, part.modes], slope[number, part.modes] = moves[:, 0]
         if push is None:
-            sag_slope[number] = model.sag(carriage.body, place, 1)[0]
-        elif push in model.corrected:
-            here = (StationPath(place, np.zeros(1), np.zeros(1), True),) * len(model.riders)
-            shape[number, model.first_residual + model.corrected.index(push)] = residual_mode(model, push, here)[0]
+            sag_slope[number] = model.sag(carriage.body, along[owner].s, 1)[0]
         if strike is not None:
-            arrives[number] = float(strike.arrives or push is not None)
+            arrives[number] = float(strike.arrives)
             speed[:, number] = convected * strike.speed / time_scale
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)
+
+
+def _here(model: SceneModel, segment: Segment) -> Along:
+    """All riders as they are at the beginning of a segment."""
+    found, at, still = [], np.array([segment.start]), np.zeros(1)
+    for rider, active in zip(model.riders, segment.active, strict=True):
+        place = rider.path(at, segment.start, segment.end).S if active else still
+        found.append(StationPath(np.clip(place, 0.0, rider.length), still, still, active))
+    return tuple(found)

@@ -186,11 +186,11 @@ class Sensor:
         sections, loaded, modal = self._sections(model), place(attachment, along), self._modal(model)
         if isinstance(loaded, str):
             return self._under_point(model, along, loaded)
-        if attachment.direction == "along":
-            assert modal.along is not None
+        if attachment.direction != "load":
+            side = modal.sides[attachment.direction]
             if sections is not None:
-                return modal.along.section_at(self.quantity, self.places(along), loaded)
-            line = modal.along.influence_at(self.places(along), loaded, self.reads.derivative)
+                return side.section_at(self.quantity, self.places(along), loaded)
+            line = side.influence_at("load", self.places(along), loaded, self.reads.derivative)
         elif sections is not None:
             return sections.influence_at(self.quantity, self.places(along), loaded)
         else:
@@ -270,8 +270,8 @@ class SpotSensor(Sensor):
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:
         gauge = self._gauge(model)
-        pushed = gauge.influence(places, "along") if model.is_pushed(self.body) else np.zeros(1)
-        return float(np.abs([*gauge.along(places), *gauge.points.values(), *pushed]).max())
+        pushed = [gauge.influence(places, direction) for direction in model.pushed(self.body)]
+        return float(np.abs([*gauge.along(places), *gauge.points.values(), *np.ravel(pushed)]).max())
 
     def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         return self._gauge(model).influence(place(attachment, along), attachment.direction)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from engine.bodies.modal.modal_body import Direction
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, SpecOfKind, Three, form_of_amount, kinds
@@ -70,9 +71,9 @@ class Carriage(SpecOfKind):
         return None
 
     @property
-    def pushes_along(self) -> bool:
-        """Whether its inertia acts along its track too."""
-        return False
+    def pushes(self) -> tuple[Direction, ...]:
+        """Directions beside that of its loads in which its inertia acts too."""
+        return ()
 
     @property
     def riding_body(self) -> str | None:
@@ -143,28 +144,38 @@ class ForceCarriage(Carriage):
     force: Force
 
 
-class MassCarriage(Carriage):
-    """A rigid mass in kg that stays in contact; its weight acts. inertia_along: the mass also pushes along its track,
-    by -m (s'' + u''), u the motion of the track along itself. In frames that move: inertia (kg m2) about its centre of
-    mass, along x, y, z of its track, with which it turns; height: m of that centre below the track (or above: < 0)."""
+class PushingCarriage(Carriage):
+    """Base of those whose inertia may act in other directions than their loads, in which it always does.
+
+    inertia_along: the mass also pushes along its track, by -m (s'' + u''), u the motion of the track along itself.
+    inertia_across: it also pushes across track and loads, by -m v'', v the motion of the track so.
+    """
+
+    inertia_along: bool = False
+    inertia_across: bool = False
+
+    @property
+    def pushes(self) -> tuple[Direction, ...]:
+        asked: dict[Direction, bool] = {"along": self.inertia_along, "across": self.inertia_across}
+        return tuple(direction for direction, acts in asked.items() if acts)
+
+
+class MassCarriage(PushingCarriage):
+    """A rigid mass in kg that stays in contact; its weight acts. In frames that move: inertia (kg m2) about its centre
+    of mass along x, y, z of its track, with which it turns; height: m of that centre below the track (above: < 0)."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass",)
     touching: ClassVar[tuple[str, ...]] = ("mass",)
 
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)
-    inertia_along: bool = False
     inertia: Three[Inertia] | None = None
     height: Length = 0.0
 
-    @property
-    def pushes_along(self) -> bool:
-        return self.inertia_along
 
-
-class OscillatorCarriage(Carriage):
+class OscillatorCarriage(PushingCarriage):
     """A sprung mass (kg) on a spring (N/m) and a damper (N s/m) over a wheel (kg) that stays in contact; the weights of
-    both masses act. inertia_along: as that of a mass, of both."""
+    both masses act, and along and across the track the inertia of both."""
 
     masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
     touching: ClassVar[tuple[str, ...]] = ("wheel_mass",)
@@ -174,11 +185,6 @@ class OscillatorCarriage(Carriage):
     wheel_mass: Mass = Field(default=0.0, ge=0)
     stiffness: Stiffness = Field(gt=0)
     damping: Damping = Field(default=0.0, ge=0)
-    inertia_along: bool = False
-
-    @property
-    def pushes_along(self) -> bool:
-        return self.inertia_along
 
     @property
     def suspension(self) -> Suspension:

@@ -17,6 +17,7 @@ from results_schema.quantities import QUANTITIES
 from results_schema.variables import RESERVED
 
 if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import Direction
     from engine.scene.study import Study
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
@@ -66,9 +67,9 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
         _must_exist(study, f"carriage.{name}.contacts.{word}.on", contact.on or carriage.on, "body")
     if carriage.riding_body is not None:
         _check_rider(study, name, carriage.riding_body)
-    if carriage.pushes_along:
+    for direction in carriage.pushes:
         with _within(study, f"carriage.{name}"):
-            _check_along(study, carriage)
+            _check_inertia(study, carriage, direction)
 
 
 def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
@@ -110,13 +111,13 @@ def _within(study: Study, here: str) -> Iterator[None]:
         raise error.moved(study.source.where(f"{here}.{error.where}")) from None
 
 
-def _check_along(study: Study, carriage: Carriage) -> None:
-    """The inertia of a carriage can act along its track."""
+def _check_inertia(study: Study, carriage: Carriage, direction: Direction) -> None:
+    """The inertia of a carriage can act along or across its track."""
     if any(other.riding_body == carriage.on for other in study.carriage.values()):
-        what = "the body below rides too: its own motion holds it along"
-        where = "inertia_along"
-        raise BadInput(what, where=where, expected="a body that does not ride", remedy="inertia_along = false")
-    study.body[carriage.on].check_along()
+        what = f"the body below rides too: its own motion holds it {direction}"
+        where = f"inertia_{direction}"
+        raise BadInput(what, where=where, expected="a body that does not ride", remedy=f"{where} = false")
+    study.body[carriage.on].check_inertia(direction)
 
 
 def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:

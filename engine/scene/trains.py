@@ -149,6 +149,7 @@ class MassTrain(Train):
     kind: Literal["mass"]
     mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
     inertia_along: bool = False
+    inertia_across: bool = False
 
 
 class OscillatorTrain(Train):
@@ -162,6 +163,7 @@ class OscillatorTrain(Train):
     stiffness: OneOrEach[Annotated[Stiffness, Field(gt=0)]]
     damping: OneOrEach[Annotated[Damping, Field(ge=0)]] = 0.0
     inertia_along: bool = False
+    inertia_across: bool = False
 
 
 TRAINS: Mapping[str, type[Train]] = {"force": ForceTrain, "mass": MassTrain, "oscillator": OscillatorTrain}

@@ -150,8 +150,8 @@ def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:
         return found
     for i, r in enumerate(ties):
         for j, s in enumerate(ties[: i + 1]):
-            if r == s and r >= model.first_push:
-                continue  # its residual mode is among the coordinates
+            if r >= model.first_push and s >= model.first_push:
+                continue  # their residual modes are among the coordinates
             for one, other in shared(model, int(r), int(s), along):
                 found[:, i, j] += residual_flexibility(model, one, other, along)
             found[:, j, i] = found[:, i, j]

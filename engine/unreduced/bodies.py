@@ -18,14 +18,16 @@ from engine.bodies.frame.body import frame_modes, kept_modes
 from engine.bodies.frame.frame import Frame
 from engine.bodies.frame.gauges import point_loads
 from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.pushes import side_lines
 from engine.bodies.frame.track import track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
 from engine.bodies.modal.flexibility import Flexibility, factorised
+from engine.bodies.modal.modal_body import Direction
 from engine.bodies.rigid.rigid import Rigid
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.unreduced.gauges import FullGauge, FullRead, full_gauge
-from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows
+from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, side_track
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.late import sparse
@@ -60,6 +62,9 @@ class RigidTrack:
         raise BadInput("a rigid body has no section forces", where="quantity", received=quantity)
 
 
+Track = FrameTrack | AlongTrack | RigidTrack
+
+
 class Damping(NamedTuple):
     """C = viscous + loads diag(rates) loads^T: (n, n) sparse; (n, k) and (k,) of modes."""
 
@@ -73,8 +78,8 @@ class FullBody:
     """A body with all its n degrees of freedom.
 
     rigid (n, r): rigid-body motions of unit mass; pull (n,): own weight per unit gravity; flexibility: the elastic
-    answer to loads, None where nothing bends; points: rows (n,) by name; along: its track along itself, where
-    it moves so; gauges: by the names of sensors;
+    answer to loads, None where nothing bends; points: rows (n,) by name; sides: its track in other
+    directions than its loads', where it moves so; gauges: by the names of sensors;
     gravity_share: of gravity along the track's direction.
     """
 
@@ -88,7 +93,7 @@ class FullBody:
     flexibility: Flexibility | None
     track: FrameTrack | RigidTrack
     points: dict[str, Array]
-    along: AlongTrack | None = None
+    sides: Mapping[Direction, AlongTrack | FrameTrack] = field(default_factory=dict)
     gauges: Mapping[str, FullGauge] = field(default_factory=dict)
     gravity_share: float = 1.0
 
@@ -196,7 +201,7 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
         flexibility=flexibility,
         track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
         points={word: loads[:, number] for word, number in numbers.items()},
-        along=AlongTrack.of(track, ends, assembly),
+        sides={direction: side_track(line, ends, assembly) for direction, line in side_lines(frame, track).items()},
         gauges={sensor: full_gauge(read, spot) for sensor, spot in study.spots(name)},
         gravity_share=float(track.direction @ gravity),
     )

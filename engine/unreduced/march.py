@@ -133,6 +133,7 @@ def _relations(model: Unreduced, along: Along, step: float) -> _Relations:
     ds, dds = along.ds[:, rider, None], along.dds[:, rider, None]
     curve = ds**2 * bend + dds * slope
     link = np.array([tie.link for tie in model.ties])
+    direction = np.array([tie.direction for tie in model.ties])
     mass, rigid = link == "mass", link == "rigid"
     m = np.array([tie.mass for tie in model.ties]) + rigid
     k = np.array([tie.stiffness if tie.link == "spring" else 0.0 for tie in model.ties])
@@ -155,7 +156,7 @@ def _relations(model: Unreduced, along: Along, step: float) -> _Relations:
         other_u=k,
         own=own,
         wanted=np.where(mass & on, m * model.study.gravity, 0.0)
-        - np.where((link == "push") & on, m * along.dds[:, rider], 0.0)
+        - np.where((direction == "along") & on, m * along.dds[:, rider], 0.0)
         + np.where(link == "force", np.array([tie.force for tie in model.ties]), 0.0) * on,
     )
 

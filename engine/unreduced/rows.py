@@ -64,14 +64,12 @@ def nowhere(model: Unreduced) -> Along:
 
 
 def tie_rows(model: Unreduced, along: Along, derivative: int = 0) -> Rows:
-    """(S, T, 12) d^j/ds^j of the deflection under every tie (of a push the track's motion along itself), zero where it
-    is off the body."""
+    """(S, T, 12) d^j/ds^j of the deflection under every tie (of a push the track's motion in its direction), zero where
+    it is off the body."""
     shape = len(along.s), len(model.ties), WIDTH
     found = Rows(np.zeros(shape, dtype=np.int64), np.zeros(shape))
     for j, tie in enumerate(model.ties):
-        body = model.bodies[tie.body]
-        track = body.along if tie.link == "push" and body.along is not None else body.track
-        rows = track.rows(along.s[:, tie.rider], derivative)
+        rows = model.line(tie).rows(along.s[:, tie.rider], derivative)
         found.freedoms[:, j] = rows.freedoms + model.firsts[tie.body]
         found.values[:, j] = rows.values * along.on[:, tie.rider, None]
     return found
@@ -85,7 +83,7 @@ def softness(model: Unreduced, along: Along) -> Array:
     for i, j in _together(model):
         one, other = model.ties[i], model.ties[j]
         on = along.on[:, one.rider] & along.on[:, other.rider]
-        within = model.bodies[one.body].track.within(along.s[:, one.rider], along.s[:, other.rider])
+        within = model.line(one).within(along.s[:, one.rider], along.s[:, other.rider])
         found[:, i, j] = np.where(on, within, 0.0)
     for i, one in enumerate(model.ties):
         for j, other in enumerate(model.ties):
@@ -111,7 +109,7 @@ def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
         one, other = model.ties[i], model.ties[j]
         if one.carriage != other.carriage:
             continue
-        track = model.bodies[one.body].track
+        track = model.line(one)
         (place, step), (load, _) = track.inside(along.s[:, one.rider]), track.inside(along.s[:, other.rider])
         before, here, after = (track.within(place + k * step, load + k * step) for k in (-1, 0, 1))
         on = along.on[:, one.rider] & along.on[:, other.rider]
@@ -121,10 +119,10 @@ def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
 
 
 def _together(model: Unreduced) -> Iterator[tuple[int, int]]:
-    """Pairs of a tie whose force is not given and a tie on the same body, both across its track."""
+    """Pairs of a tie whose force is not given and one on the same body in the same direction."""
     for i, one in enumerate(model.ties):
         for j, other in enumerate(model.ties):
-            if one.link not in ("force", "push") and other.link != "push" and one.body == other.body:
+            if one.link != "force" and one.body == other.body and one.direction == other.direction:
                 yield i, j
 
 

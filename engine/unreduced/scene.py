@@ -15,14 +15,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from engine.bodies.modal.modal_body import Direction
 from engine.model.rider import Rider
 from engine.scene.carriages import Contact, Suspension
 from engine.scene.study import Study
-from engine.unreduced.bodies import FullBody, full_body
+from engine.unreduced.bodies import FullBody, Track, full_body
 from results_schema.arrays import Array
 from results_schema.late import linalg, sparse
 
-Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass along its track
+Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass beside that along its loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,8 @@ class Tie:
     """One force between a carriage and the body on which it rides; positive presses.
 
     name: of the contact. rider: number of its way. body: the name of the ridden one. mass kg, force N, stiffness N/m,
-    damping N s/m: of its kind. other (n,): what it does to the rest of the scene, the rider's side of its gap; at: its
-    place on the track of the body that rides, None where it has none.
+    damping N s/m: of its kind; direction: in which it acts. other (n,): what it does to the rest of the scene, the
+    rider's side of its gap; at: its place on the track of the body that rides, None where it has none.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Tie:
     damping: float = 0.0
     rides: str = ""
     at: float | None = None
+    direction: Direction = "load"
 
     @property
     def compliance(self) -> float:
@@ -123,6 +125,11 @@ class Unreduced:
     @property
     def _sprung_masses(self) -> Array:
         return np.array([suspension.mass for suspension in suspensions_of(self.study).values()])
+
+    def line(self, tie: Tie) -> Track:
+        """The track of a tie in its direction."""
+        body = self.bodies[tie.body]
+        return body.track if tie.direction == "load" else body.sides[tie.direction]
 
     def part(self, body: str) -> slice:
         """A body's degrees of freedom."""
@@ -257,8 +264,9 @@ def _own_ties(model: Unreduced) -> Iterator[Tie]:
             mass[model.sprung[name]] = -1.0
             k, c = suspension.stiffness, suspension.damping
             yield Tie(name, name, "spring", number, carriage.on, mass, stiffness=k, damping=c)
-        if carriage.pushes_along:
-            yield Tie(name, name, "push", number, carriage.on, none, mass=carriage.moving_mass)
+        heavy = carriage.moving_mass
+        for direction in carriage.pushes:
+            yield Tie(name, name, "push", number, carriage.on, none, mass=heavy, direction=direction)
 
 
 def _contact_ties(model: Unreduced) -> Iterator[Tie]:

@@ -6,12 +6,13 @@ numbers, and bends the element between its ends besides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from engine.bodies.frame.assembly import Assembly, cross_matrix
+from engine.bodies.frame.pushes import PushedLine, SideLine
 from engine.bodies.frame.sections import forces_from_ends, held_forces, section_weights, spread_forces
 from engine.bodies.frame.shapes import FORCES
 from engine.bodies.frame.track import TrackBeams, TrackPoints
@@ -53,30 +54,6 @@ def rows_of(row: Array) -> Rows:
     entries = np.flatnonzero(row)
     found.freedoms[0, : len(entries)], found.values[0, : len(entries)] = entries, row[entries]
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class AlongTrack:
-    """The motion of a frame's track along itself: that of its axis, less what the axis' slope takes from a line beside
-    it by a lever (m)."""
-
-    axis: FrameTrack
-    beside: FrameTrack
-    lever: float
-
-    @classmethod
-    def of(cls, track: TrackBeams, ends: TrackPoints, assembly: Assembly) -> AlongTrack:
-        """The same of a track in an assembly's numbers of degrees of freedom."""
-        lever, none = float(np.linalg.norm(track.offset)), np.zeros(3)
-        sideways = track.offset / lever if lever else track.direction
-        lines = (replace(track, direction=way, offset=none) for way in (track.axes[0, 0], sideways))
-        axis, beside = (FrameTrack.of(line, ends, assembly, np.zeros_like(track.axes[:, 0])) for line in lines)
-        return cls(axis, beside, lever)
-
-    def rows(self, s: Array, derivative: int = 0) -> Rows:
-        """d^j/ds^j of it, j up to 2."""
-        axis, beside = self.axis.rows(s, derivative), self.beside.rows(s, derivative + 1)
-        return Rows(axis.freedoms, axis.values - self.lever * beside.values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,3 +133,33 @@ class FrameTrack:
         values[:, :, 3:] -= np.einsum("sei,seij->sej", values[:, :, :3], cross_matrix(self.arms[which]))
         numbers = self.numbers[which].reshape(-1, WIDTH)
         return Rows(np.maximum(numbers, 0), np.where(numbers >= 0, values.reshape(-1, WIDTH), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class AlongTrack:
+    """The motion of a frame's track along itself: that of its axis, less what the axis' slope takes from a line beside
+    it."""
+
+    line: PushedLine
+    axis: FrameTrack
+    beside: FrameTrack
+
+    def rows(self, s: Array, derivative: int = 0) -> Rows:
+        """d^j/ds^j of it, j up to 2."""
+        axis, beside = self.axis.rows(s, derivative), self.beside.rows(s, derivative + 1)
+        return Rows(axis.freedoms, axis.values - self.line.lever * beside.values)
+
+    def within(self, x: Array, s: Array) -> Array:
+        """(S,) what the element between its ends adds to it at x per unit force along at s, pair by pair."""
+        return self.line.within(x, s)
+
+    def inside(self, s: Array) -> tuple[Array, Array]:
+        """As of `FrameTrack`."""
+        return self.axis.inside(s)
+
+
+def side_track(line: SideLine, ends: TrackPoints, assembly: Assembly) -> FrameTrack | AlongTrack:
+    """A track in another direction than its loads', in an assembly's numbers of degrees of freedom."""
+    lines = (line,) if isinstance(line, TrackBeams) else (line.axis, line.beside)
+    tracks = [FrameTrack.of(part, ends, assembly, np.zeros_like(part.axes[:, 0])) for part in lines]
+    return tracks[0] if isinstance(line, TrackBeams) else AlongTrack(line, *tracks)

@@ -102,9 +102,10 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
         raise study.source.fault(f"carriage.{name}.kind", "a force has no inertia that could fail", expected='"mass"')
     if carriage.masses != ("mass",):
         raise study.source.fault(f"carriage.{name}.kind", "the maps know rigid masses only", expected='"mass"')
-    if carriage.pushes_along:
+    for direction in carriage.pushes:
         what = "the maps know inertia across the track only"
-        raise study.source.fault(f"carriage.{name}.inertia_along", what, expected="inertia_along = false")
+        where = f"inertia_{direction}"
+        raise study.source.fault(f"carriage.{name}.{where}", what, expected=f"{where} = false")
     if not carriage.motion.passes:
         raise study.source.fault(f"carriage.{name}.motion.kind", "the maps start from a passage", expected='"cruise"')
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
@@ -12,15 +13,15 @@ import numpy as np
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
 from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, loads_everywhere
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.pushes import PushedLine, PushStatics, TrackAlong
+from engine.bodies.frame.pushes import FrameSide, PushStatics, SideLine, side_lines, side_shapes
 from engine.bodies.frame.sections import TrackSections
-from engine.bodies.frame.shapes import along_shapes, mode_forces, track_shapes
-from engine.bodies.frame.statics import TrackInfluence, TrackStatics, responses, track_statics
+from engine.bodies.frame.shapes import mode_forces, track_shapes
+from engine.bodies.frame.statics import TrackStatics, responses, track_statics
 from engine.bodies.frame.track import TrackBeams, TrackPoints, track_of
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Spots
 from engine.bodies.modal.flexibility import SAME_FREQUENCY, Flexibility, factorised, solving, without_rounding
-from engine.bodies.modal.modal_body import Array, ModalBody, Shapes, frozen
+from engine.bodies.modal.modal_body import Array, Direction, ModalBody, Shapes, frozen
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
@@ -49,11 +50,13 @@ def _frame_body(content: Content, spots: Spots) -> ModalBody:
 
 @dataclass(frozen=True, eq=False)
 class _Whole:
-    """What does not depend on how many modes a frame keeps: its matrices, its track and its statics."""
+    """What does not depend on how many modes a frame keeps: its matrices, its track, also as its motions in other
+    directions than its loads' are read, and its statics."""
 
     assembly: Assembly
     flexibility: Flexibility
     track: TrackBeams
+    sides: Mapping[Direction, SideLine]
     ends: TrackPoints
     statics: TrackStatics
 
@@ -67,17 +70,17 @@ def _whole(content: Content) -> _Whole:
     gravity = unit(frame.gravity)
     spread = track.spread_weight(gravity) * (frame.mass_matrix == "consistent")
     statics = track_statics(track, ends, assembly, flexibility, gravity, spread)
-    return _Whole(assembly, flexibility, track, ends, statics)
+    return _Whole(assembly, flexibility, track, side_lines(frame, track), ends, statics)
 
 
-@lru_cache(maxsize=8)
-def _push_statics(content: Content) -> PushStatics:
-    """What forces along its track do."""
+@lru_cache(maxsize=16)
+def _push_statics(content: Content, direction: Direction) -> PushStatics:
+    """What forces on its track in another direction than its loads' do."""
     whole = _whole(content)
-    push = PushedLine.of(whole.track)
-    patterns, moved = responses(push, whole.ends, whole.assembly, whole.flexibility)
-    across = replace(whole.statics, loads=push, patterns=patterns, flexibility=moved)
-    return PushStatics(TrackInfluence(push, push, patterns, moved), across)
+    line = whole.sides[direction]
+    patterns, moved = responses(line, whole.ends, whole.assembly, whole.flexibility)
+    deflection = replace(whole.statics, loads=line, patterns=patterns, flexibility=moved)
+    return PushStatics(deflection, whole.sides)
 
 
 def _reduced(frame: Frame, spots: Spots) -> ModalBody:
@@ -88,7 +91,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
     forces = mode_forces(track, moved, omega, masses)
     sections = TrackSections(statics, forces)
-    pushes = partial(_push_statics, content)
+    pushes = {direction: partial(_push_statics, content, direction) for direction in whole.sides}
     read = Read(frame, assembly, whole.flexibility, statics, pushes, whole.ends, omega, shapes)
     numbers, everywhere = loads_everywhere(frame, assembly)
     loads = numbers, everywhere[assembly.free]
@@ -107,7 +110,12 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         gravity_share=float(track.direction @ gravity),
         sections=sections,
         points=points,
-        along=TrackAlong(along_shapes(track, moved, forces), forces, points, pushes),
+        sides={
+            direction: FrameSide(
+                direction, line.wave_number(omega), side_shapes(line, moved, forces), forces, points, pushes[direction]
+            )
+            for direction, line in whole.sides.items()
+        },
         gauges={name: frame_gauge(read, spot, (numbers, everywhere)) for name, spot in spots},
     )
 

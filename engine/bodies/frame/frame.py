@@ -16,8 +16,8 @@ from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
 from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
-from engine.bodies.modal.description import Body, Spot, Spots, check_level
-from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.description import Body, Spot, Spots, check_square
+from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
 from engine.study_file.spec import LIST, WORD, Several, Spec, Three, by_form, distinct, one_of
@@ -226,8 +226,10 @@ class Frame(Body):
     def check_spot(self, spot: Spot) -> None:
         check_spot(self, spot)
 
-    def check_along(self) -> None:
-        check_level(self.line.tangent, self.line.direction, unit(self.gravity))
+    def check_inertia(self, direction: Direction) -> None:
+        if direction == "across" and self.plane is not None:
+            super().check_inertia(direction)
+        check_square(direction, self.line.tangent, self.line.direction, unit(self.gravity))
 
     def place(self, node: str) -> Triple:
         """Coordinates of a node, m; in a plane frame two may be given."""

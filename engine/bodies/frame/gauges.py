@@ -8,7 +8,7 @@ one element, that bends between its ends besides.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,7 +24,7 @@ from engine.bodies.frame.supports import frame_support
 from engine.bodies.frame.track import Line, TrackBeams, TrackPoints, elements_of, line_of
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.flexibility import Flexibility, without_rounding
-from engine.bodies.modal.modal_body import Array, Gauge, Points
+from engine.bodies.modal.modal_body import Array, Direction, Gauge, Points
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame
@@ -38,7 +38,7 @@ class Read(NamedTuple):
     assembly: Assembly
     flexibility: Flexibility
     statics: TrackStatics
-    pushes: Callable[[], PushStatics]
+    pushes: Mapping[Direction, Callable[[], PushStatics]]
     ends: TrackPoints
     omega: Array
     shapes: Array
@@ -48,9 +48,10 @@ class Read(NamedTuple):
         """(n,) own weight per unit gravity."""
         return np.asarray(self.assembly.drag @ unit(self.frame.gravity))
 
-    def moved_along(self, response: Array) -> Callable[[Array], Array]:
-        """Motion of the track along itself at places (S,) where its points move by `response` (6 (E + 1),)."""
-        return partial(_moved_along, self.pushes, response)
+    def moved(self, response: Array) -> dict[Direction, Callable[[Array], Array]]:
+        """Motions of the track in other directions than its loads' at places (S,) where its points move by `response`
+        (6 (E + 1),)."""
+        return {direction: partial(_moved, find, direction, response) for direction, find in self.pushes.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +134,7 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
     row = place.row
     moved = read.flexibility.solve(row[:, None])
     response = read.ends.of(assembly.whole(moved)).reshape(-1)
+    sides = read.moved(response).items()
     weight = float(moved[:, 0] @ read.pull) + place.under_weight
     names, loads = points
     return Gauge(
@@ -141,7 +143,7 @@ def frame_gauge(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) ->
         points={name: float(loads[assembly.free, number] @ moved[:, 0]) for name, number in names.items()},
         rigid=statics.rigid,
         weight=weight,
-        pushed=partial(_pushed, read.pushes, response, place),
+        pushed={direction: partial(_pushed, read.pushes[direction], side, place) for direction, side in sides},
     )
 
 
@@ -149,12 +151,12 @@ def _along(statics: TrackStatics, response: Array, place: FrameSpot, s: Array) -
     return statics.under_response(response, s) + place.within(s)
 
 
-def _moved_along(pushes: Callable[[], PushStatics], response: Array, s: Array) -> Array:
-    return pushes().own.under_response(response, s)
+def _moved(find: Callable[[], PushStatics], direction: Direction, response: Array, s: Array) -> Array:
+    return find().influence(direction).under_response(response, s)
 
 
-def _pushed(pushes: Callable[[], PushStatics], response: Array, place: FrameSpot, s: Array) -> Array:
-    return _moved_along(pushes, response, s) + place.within(s, pushes().own.loads)
+def _pushed(find: Callable[[], PushStatics], moved: Callable[[Array], Array], place: FrameSpot, s: Array) -> Array:
+    return moved(s) + place.within(s, find().deflection.loads)
 
 
 def point_loads(frame: Frame, assembly: Assembly) -> tuple[dict[str, int], Array]:

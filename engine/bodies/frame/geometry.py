@@ -56,6 +56,11 @@ def unit(vector: ArrayLike) -> Array:
     return np.asarray(found / np.linalg.norm(found))
 
 
+def across(tangent: Array, load: Array) -> Array:
+    """(3,) unit vector across a track and its loads: with them along x and z, this is y."""
+    return unit(np.cross(load, tangent))
+
+
 def local_axes(along: ArrayLike, up: ArrayLike) -> Array:
     """(3, 3) rows x, y, z: x along the member, z the part of `up` square to it.
 

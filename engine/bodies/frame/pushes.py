@@ -1,24 +1,30 @@
-"""Forces along the track of a frame, as masses on it push that speed up and brake, and the motion that they feel.
+"""Forces along the track of a frame and across it, as the inertia of masses pushes it, and the motion that they feel.
 
-On the axis they stretch its elements; beside it, by a lever, they turn them too. What a force does to the ends of its
-element and what the motion along takes from them are the same numbers, so that influence lines are symmetric.
+Along, on the axis, they stretch its elements; beside it, by a lever, they turn them too. Across they bend and twist
+them as loads do. What a force does to the ends of its element and what the motion takes from them are the same numbers,
+so that influence lines are symmetric.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from engine.bodies.frame.geometry import across
 from engine.bodies.frame.sections import TrackSections
-from engine.bodies.frame.shapes import AlongShapes, ModeForces
+from engine.bodies.frame.shapes import AlongShapes, ModeForces, track_shapes
 from engine.bodies.frame.statics import TrackInfluence, TrackStatics
 from engine.bodies.frame.track import Line, TrackBeams, held_turning
-from engine.bodies.modal.modal_body import Array, Points
+from engine.bodies.modal.modal_body import Array, Direction, Points, Shapes
 from results_schema.arrays import Counts
+
+if TYPE_CHECKING:
+    from engine.bodies.frame.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +62,11 @@ class PushedLine:
         turned = self.beside.where_ends_move(ends, s, derivative + 1)
         return np.asarray(self.axis.where_ends_move(ends, s, derivative) - self.lever * turned)
 
+    def wave_number(self, omega: Array) -> Array:
+        """(N,) 1/m, as of `TrackBeams`."""
+        found = self.axis.wave_number(omega)
+        return np.maximum(found, self.beside.wave_number(omega)) if self.lever else found
+
     def within(self, x: Array, s: Array, derivative: int = 0, loads: Line | None = None) -> Array:
         """(S,) d^j/dx^j of the motion along at x of an element with held ends under a unit load of a line at s."""
         loads = self if loads is None else loads
@@ -68,20 +79,50 @@ class PushedLine:
         return np.asarray(self.axis.held_parts(x, s, derivative) - self.lever * turned)
 
 
+SideLine = PushedLine | TrackBeams
+
+
+def side_lines(frame: Frame, track: TrackBeams) -> dict[Direction, SideLine]:
+    """The motions of a frame's track in other directions than its loads': along it, and of one in space across both."""
+    along = PushedLine.of(track)
+    if frame.plane is not None:
+        return {"along": along}
+    return {"along": along, "across": replace(track, direction=across(track.axes[0, 0], track.direction))}
+
+
+def side_shapes(line: SideLine, moved: Array, forces: ModeForces) -> Shapes:
+    """Shapes by a line from displacements and rotations (E + 1, 6, N) of the track's points and the modes' section
+    forces."""
+    if isinstance(line, TrackBeams):
+        return track_shapes(line, moved, forces)
+    beside = track_shapes(line.beside, moved, forces) if line.lever else None
+    return AlongShapes(track_shapes(line.axis, moved, forces), line.lever, beside)
+
+
 @dataclass(frozen=True, eq=False)
 class PushStatics:
-    """Under unit forces along a track: its motion along itself, and its deflection."""
+    """Under unit forces on one line of a track: its deflection, and its motions by the lines of other directions."""
 
-    own: TrackInfluence
-    across: TrackStatics
+    deflection: TrackStatics
+    lines: Mapping[Direction, Line]
+
+    def influence(self, direction: Direction) -> TrackInfluence:
+        """Of the motion in a direction."""
+        own = self.deflection
+        if direction == "load":
+            return own
+        return TrackInfluence(self.lines[direction], own.loads, own.patterns, own.flexibility)
 
 
 @dataclass(frozen=True, eq=False)
-class TrackAlong:
-    """Motion of a frame's track along itself, and what unit forces along it do. find: its statics, which are made when
-    they are first asked for; forces: section forces of its modes; points: places off the track, if there are any."""
+class FrameSide:
+    """Motion of a frame's track in a direction beside that of its loads, and what unit forces in that do. find: its
+    statics, which are made when they are first asked for; forces: section forces of its modes; points: places off the
+    track, if there are any."""
 
-    shapes: AlongShapes
+    direction: Direction
+    wave_number: Array
+    shapes: Shapes
     forces: ModeForces
     points: Points | None
     find: Callable[[], PushStatics]
@@ -95,19 +136,17 @@ class TrackAlong:
         """Influence functions."""
         return self.find()
 
-    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
-        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
-        return self.statics.own.influence_at(x, s)
-
-    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
-        return self.statics.across.influence_at(x, s, derivative)
+    def influence_at(self, direction: Direction, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion in a direction at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast
+        against each other."""
+        return self.statics.influence(direction).influence_at(x, s, derivative)
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
-        """A section force, stress or strain at `x` per unit force along at `s`, likewise."""
-        return TrackSections(self.statics.across, self.forces).influence_at(quantity, x, s)
+        """A section force, stress or strain at `x` per unit force at `s`, likewise."""
+        return TrackSections(self.statics.deflection, self.forces).influence_at(quantity, x, s)
 
     def of_point(self, name: str, s: ArrayLike) -> Array:
-        """(S,) motion of a point per unit force along at `s`, m/N."""
+        """(S,) motion of a point per unit force at `s`, m/N."""
         assert self.points is not None
-        return self.statics.own.under_response(self.points.response[:, self.points.numbers[name]], s)
+        response = self.points.response[:, self.points.numbers[name]]
+        return self.statics.influence(self.direction).under_response(response, s)

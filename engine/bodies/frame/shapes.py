@@ -10,7 +10,7 @@ A concentrated force at a node bends the line of twist, extension and shear ther
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -138,16 +138,6 @@ class AlongShapes:
         if self.beside is None:
             return found
         return np.asarray(found - self.lever * self.beside.derivatives(s, [order + 1 for order in orders]))
-
-
-def along_shapes(track: TrackBeams, moved: Array, forces: ModeForces) -> AlongShapes:
-    """The same from displacements and rotations (E + 1, 6, N) of the track's points and the modes' section forces."""
-    on_axis, lever = np.zeros(3), float(np.linalg.norm(track.offset))
-    axis = track_shapes(replace(track, direction=track.axes[0, 0], offset=on_axis), moved, forces)
-    if lever == 0.0:
-        return AlongShapes(axis)
-    beside = replace(track, direction=track.offset / lever, offset=on_axis)
-    return AlongShapes(axis, lever, track_shapes(beside, moved, forces))
 
 
 def _strains(track: TrackBeams, forces: Array) -> Array:

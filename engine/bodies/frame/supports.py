@@ -103,7 +103,7 @@ def frame_support(read: Read, spot: Spot, points: tuple[dict[str, int], Array]) 
         rigid=statics.rigid,
         weight=weight,
         dampers=support.dampers,
-        pushed=read.moved_along(response),
+        pushed=read.moved(response),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +13,23 @@ from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.line import (
     SPLINE_NODES,
-    LineAlong,
+    LinePushes,
     LineRecovered,
     LineSections,
     LineShapes,
+    LineSide,
     LineStatics,
     NoSections,
     by_rotations,
     node_rows,
+    side_rows,
     spline_slopes,
     track_rows,
 )
 from engine.bodies.imported.model import HeldModel, held_model
 from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility, solving
-from engine.bodies.modal.modal_body import Array, Gauge, ModalBody, Points, Sections
+from engine.bodies.modal.modal_body import Array, Direction, Gauge, ModalBody, Points, Sections
 from results_schema.errors import BadInput
 from results_schema.late import sparse
 
@@ -40,7 +42,7 @@ _COLUMNS = 64
 _UNFELT = 1e-9  # of the largest displacement: below it a mode does not move the track
 
 
-Along = Callable[[Array], Array]
+_Pushed = dict[Direction, Callable[[Array], Array]]
 _Parts = tuple[Array, Any, Array, Array, Array]  # mode shapes, track's rows and slopes, own weight, points' loads
 
 
@@ -88,7 +90,11 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
     parts = shapes, rows, slopes, pull, loads
     sections, stresses = _sections(body, held, statics, parts)
     read = [(name, _node_load(body, held, spot.node, spot.direction)) for name, spot in spots]
-    along, pushed = _along(body, held, (statics, sections), parts, [load for _, load in read])
+    pushes = _Pushes(body, spots, statics, sections)
+    sides = {
+        direction: _side(direction, line, own @ (moves.T @ shapes), pushes)
+        for direction, (moves, own) in side_rows(body, held).items()
+    }
     found = ModalBody(
         length=body.length,
         mass=float(unit(body.direction) @ held.inertia[:3, :3] @ unit(body.direction)),
@@ -102,39 +108,51 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
         gravity_share=float(unit(body.direction) @ gravity),
         sections=sections,
         points=_points(names, held, (statics, sections, stresses), parts) if names else None,
-        gauges={
-            name: _gauge(held, statics, load, parts, names, partial(statics.under_response, one, derivative=0))
-            for (name, load), one in zip(read, pushed, strict=True)
-        },
-        along=along,
+        gauges={name: _gauge(held, statics, load, parts, names, _pushed(sides, name)) for name, load in read},
+        sides=sides,
         checks=findings(body, held, line),
     )
     return found, statics
 
 
-def _along(
-    body: Imported, held: HeldModel, track: tuple[LineStatics, LineSections], parts: _Parts, read: list[Array]
-) -> tuple[LineAlong, Array]:
-    """Motion of the track along itself, by the smooth curve through that of its nodes, with its statics; and motions
-    along (loads, 2 P) under some loads (n,)."""
-    (statics, sections), (shapes, rows, slopes, _, loads) = track, parts
-    nodes, count = node_rows(held, body.line.nodes, body.line.tangent, 0), len(body.line.nodes)
-    spread = np.zeros((2 * count, count))
-    spread[::2], spread[1::2] = np.eye(count), spline_slopes(body.line.places)
-    told = [_told(body, held).T] if body.recovered else []
-    others = [sparse.csc_array(np.asarray(part)) for part in (loads, *(load[:, None] for load in read), *told)]
-    parts_of = [nodes, rows, *others]
-    ends = np.cumsum([part.shape[1] for part in parts_of])
-    moved = _between(held.flexibility, sparse.hstack(parts_of).tocsc(), nodes) @ spread.T
-    own, across, points, *more = np.split(moved, ends[:-1])
-    found = LineAlong(
-        shapes=LineShapes(body.line.places, spread @ (nodes.T @ shapes)),
-        own=replace(statics, flexibility=spread @ own),
-        across=replace(statics, flexibility=slopes @ across),
-        sections=sections.under_loads(*more[len(read) :]),
-        points=dict(zip(_point_names(body), points, strict=True)),
-    )
-    return found, np.array([one[0] for one in more[: len(read)]]).reshape(len(read), 2 * count)
+@dataclass(frozen=True, eq=False)
+class _Pushes:
+    """What forces on a track in other directions than its loads' do. Few studies ask for that, so the model is
+    factorised for them once more, rather than kept for all."""
+
+    body: Imported
+    spots: Spots
+    statics: LineStatics
+    sections: LineSections
+
+    @cached_property
+    def found(self) -> dict[Direction, LinePushes]:
+        """By direction."""
+        body, held = self.body, held_model(self.body)
+        sides, (names, loads) = side_rows(body, held), _point_loads(body, held)
+        tracks = {"load": track_rows(body, held), **sides}
+        gauges = [_node_load(body, held, spot.node, spot.direction)[:, None] for _, spot in self.spots]
+        told = [_told(body, held).T] if body.recovered else []
+        parts = [*(rows for rows, _ in tracks.values()), *map(sparse.csc_array, (loads, *gauges, *told))]
+        ends, found = np.cumsum([part.shape[1] for part in parts])[:-1], {}
+        for direction, (rows, slopes) in sides.items():
+            moved = np.split(_between(held.flexibility, sparse.hstack(parts).tocsc(), rows) @ slopes.T, ends)
+            lines = zip(tracks.items(), moved, strict=False)
+            points, *others = moved[len(tracks) :]
+            found[direction] = LinePushes(
+                {way: replace(self.statics, flexibility=own @ part) for (way, (_, own)), part in lines},
+                self.sections.under_loads(*others[len(gauges) :]),
+                dict(zip(names, points, strict=True)),
+                {name: part[0] for (name, _), part in zip(self.spots, others, strict=False)},
+            )
+        return found
+
+
+def _side(direction: Direction, line: LineShapes, ends: Array, pushes: _Pushes) -> LineSide:
+    """Motion of the track in another direction than its loads', from values and slopes (2 P, N) of all modes."""
+    shapes = replace(line, ends=np.ascontiguousarray(ends))
+    wave_number = _wave_number(shapes, np.abs(ends[::2]).max(axis=0))
+    return LineSide(direction, wave_number, shapes, lambda: pushes.found[direction])
 
 
 def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) -> tuple[Array, Array, Array]:
@@ -230,7 +248,7 @@ def _node_load(body: Imported, held: HeldModel, node: Any, direction: Any) -> Ar
 
 
 def _gauge(
-    held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, names: dict[str, int], pushed: Along
+    held: HeldModel, statics: LineStatics, load: Array, parts: _Parts, names: dict[str, int], pushed: _Pushed
 ) -> Gauge:
     """A node that a sensor reads, from its unit force (n,); pushed: as of gauges."""
     shapes, rows, slopes, pull, loads = parts
@@ -244,6 +262,10 @@ def _gauge(
         weight=float(moved @ pull),
         pushed=pushed,
     )
+
+
+def _pushed(sides: dict[Direction, LineSide], name: str) -> _Pushed:
+    return {direction: partial(side.of_gauge, name) for direction, side in sides.items()}
 
 
 def _points(

@@ -20,8 +20,8 @@ from engine.bodies.files.track import NodeLine, line_as_told
 from engine.bodies.frame.frame import Place, Support, Vector
 from engine.bodies.frame.geometry import DIRECTIONS, unit
 from engine.bodies.frame.refusals import Key, refuse
-from engine.bodies.modal.description import Body, Spot, Spots, check_level, check_spot_name
-from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.description import Body, Spot, Spots, check_spot_name, check_square
+from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.study_file.spec import Spec, one_of
 from engine.study_file.units import Force, Length, fault
@@ -199,9 +199,9 @@ class Imported(Body):
             what = f"node {spot.node} does not move in this direction"
             raise BadInput(what, where="direction", expected="a direction that is not held", remedy="node elsewhere")
 
-    def check_along(self) -> None:
+    def check_inertia(self, direction: Direction) -> None:
         if self.recorded is None:
-            check_level(self.line.tangent, unit(self.direction), unit(self.gravity_direction))
+            check_square(direction, self.line.tangent, unit(self.direction), unit(self.gravity_direction))
 
     def _check_track_rows(self) -> None:
         """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""

@@ -9,18 +9,18 @@ solve with this interpolation gives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine.bodies.frame.geometry import unit
+from engine.bodies.frame.geometry import across, unit
 from engine.bodies.frame.shapes import end_weights
 from engine.bodies.frame.track import track_places
 from engine.bodies.imported.model import HeldModel
-from engine.bodies.modal.modal_body import Array, refuse_loose
+from engine.bodies.modal.modal_body import Array, Direction, refuse_loose
 from engine.kernels.shapes import combined_rows
 from results_schema.errors import BadInput
 from results_schema.late import interpolate, sparse
@@ -171,54 +171,88 @@ class LineRecovered:
 LineSections = LineRecovered | NoSections
 
 
-@dataclass(frozen=True, eq=False)
-class LineAlong:
-    """Motion of a track along itself, and what unit forces along it do: to itself (own), to its deflection (across), to
-    stress and strain (sections) and to the points (by name: motions along, (2 P,), per unit force there)."""
+class LinePushes(NamedTuple):
+    """What unit forces on a track in another direction than its loads' do: to its motions by direction, to stress and
+    strain; and (2 P,) motions of its nodes in that direction per unit force at points and gauges, by name."""
 
-    shapes: LineShapes
-    own: LineStatics
-    across: LineStatics
+    motions: Mapping[Direction, LineStatics]
     sections: LineSections
     points: Mapping[str, Array]
+    gauges: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class LineSide:
+    """Motion of a track in a direction beside that of its loads; find: what unit forces in that do, when it is first
+    asked for."""
+
+    direction: Direction
+    wave_number: Array
+    shapes: LineShapes
+    find: Callable[[], LinePushes]
 
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
         """d^j psi_k/ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N)."""
         return self.shapes.derivatives(s, orders)
 
-    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
-        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
-        return self.own.influence_at(x, s)
-
-    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
-        return self.across.influence_at(x, s, derivative)
+    def influence_at(self, direction: Direction, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion in a direction at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast
+        against each other."""
+        return self.find().motions[direction].influence_at(x, s, derivative)
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
-        """Stress or strain at `x` per unit force along at `s`, likewise."""
-        return self.sections.influence_at(quantity, x, s)
+        """Stress or strain at `x` per unit force at `s`, likewise."""
+        return self.find().sections.influence_at(quantity, x, s)
 
     def of_point(self, name: str, s: ArrayLike) -> Array:
-        """(S,) motion of a point per unit force along at `s`, m/N."""
-        return self.own.under_response(self.points[name], s)
+        """(S,) motion of a point per unit force at `s`, m/N."""
+        pushes = self.find()
+        return pushes.motions[self.direction].under_response(pushes.points[name], s)
+
+    def of_gauge(self, name: str, s: ArrayLike) -> Array:
+        """(S,) motion of what a sensor reads, likewise."""
+        pushes = self.find()
+        return pushes.motions[self.direction].under_response(pushes.gauges[name], s)
 
 
 def track_rows(body: Imported, held: HeldModel) -> tuple[Any, Array]:
     """Sparse (n, m): what of the model's displacements counts on the track, and dense (2 P, m): what values and slopes
     these make. Raises BadInput where no node of the track can move."""
-    line, direction = body.line, unit(body.direction)
-    turning = np.cross(line.tangent, direction)
-    values = node_rows(held, line.nodes, direction, 0)
+    direction = unit(body.direction)
+    values, slopes = spline_rows(body, held, direction)
     if not values.nnz:
         raise BadInput("no node of the track can move along the load", where="track", expected="free nodes")
-    count = len(line.nodes)
+    return rotation_rows(body, held, direction) if by_rotations(body, held) else (values, slopes)
+
+
+def side_rows(body: Imported, held: HeldModel) -> dict[Direction, tuple[Any, Array]]:
+    """The same of the track's motions in other directions than its loads', as far as its nodes move so: along it by
+    the spline, across as it deflects where rotations are told for that too."""
+    tangent, load = body.line.tangent, unit(body.direction)
+    beside = across(tangent, load)
+    turned = by_rotations(body, held) and told_rotations(body, held, beside)
+    rows_across = rotation_rows if turned else spline_rows
+    found: dict[Direction, tuple[Any, Array]]
+    found = {"along": spline_rows(body, held, tangent), "across": rows_across(body, held, beside)}
+    return {direction: rows for direction, rows in found.items() if rows[0].nnz}
+
+
+def spline_rows(body: Imported, held: HeldModel, direction: Array) -> tuple[Any, Array]:
+    """The same in a direction (3,), with slopes by a smooth curve."""
+    line, count = body.line, len(body.line.nodes)
+    spread = np.zeros((2 * count, count))
+    spread[::2], spread[1::2] = np.eye(count), spline_slopes(line.places)
+    return node_rows(held, line.nodes, direction, 0), spread
+
+
+def rotation_rows(body: Imported, held: HeldModel, direction: Array) -> tuple[Any, Array]:
+    """The same with slopes by the nodes' rotations."""
+    line, count = body.line, len(body.line.nodes)
     spread = np.zeros((2 * count, count))
     spread[::2] = np.eye(count)
-    if not by_rotations(body, held):
-        spread[1::2] = spline_slopes(line.places)
-        return values, spread
-    stretch = float(line.tangent @ direction)
-    parts, columns = [values, node_rows(held, line.nodes, turning, 3)], [spread, np.zeros_like(spread)]
+    stretch, turning = float(line.tangent @ direction), np.cross(line.tangent, direction)
+    parts = [node_rows(held, line.nodes, way, first) for way, first in ((direction, 0), (turning, 3))]
+    columns = [spread, np.zeros_like(spread)]
     columns[1][1::2] = np.eye(count)
     if abs(stretch) > _SQUARE:
         parts.append(node_rows(held, line.nodes, line.tangent, 0))
@@ -229,11 +263,8 @@ def track_rows(body: Imported, held: HeldModel) -> tuple[Any, Array]:
 
 def by_rotations(body: Imported, held: HeldModel) -> bool:
     """Whether slopes are rotations. Raises BadInput where they cannot be found."""
-    line, file = body.line, held.file
-    rows = [file.rows_of(int(node)) for node in line.nodes]
-    turning = np.abs(np.cross(line.tangent, unit(body.direction))) > _SQUARE
-    told = all((row[3:][turning] >= 0).all() for row in rows if (row >= 0).any())
-    asked = body.track.interpolation
+    rows = [held.file.rows_of(int(node)) for node in body.line.nodes]
+    asked, told = body.track.interpolation, told_rotations(body, held, unit(body.direction))
     if asked == "rotations" and not any((row[3:] >= 0).any() for row in rows):
         where, remedy = "track.interpolation", 'interpolation = "spline"'
         raise BadInput("the nodes of the track have no rotations", where=where, remedy=remedy)
@@ -243,6 +274,13 @@ def by_rotations(body: Imported, held: HeldModel) -> bool:
         what = "too few nodes for a smooth curve through their displacements"
         raise BadInput(what, where="track", expected=f"at least {SPLINE_NODES} nodes", received=str(len(rows)))
     return False
+
+
+def told_rotations(body: Imported, held: HeldModel, direction: Array) -> bool:
+    """Whether all nodes of the track tell the rotations that are its slopes in a direction (3,)."""
+    rows = [held.file.rows_of(int(node)) for node in body.line.nodes]
+    turning = np.abs(np.cross(body.line.tangent, direction)) > _SQUARE
+    return all((row[3:][turning] >= 0).all() for row in rows if (row >= 0).any())
 
 
 def node_rows(held: HeldModel, nodes: Any, direction: Array, first: int) -> Any:

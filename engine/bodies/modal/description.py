@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import Field, PrivateAttr, Strict, Tag
 
-from engine.bodies.modal.modal_body import Array, ModalBody
+from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import Outline, straight
 from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check
@@ -60,9 +61,14 @@ class Spot:
 Spots = tuple[tuple[str, Spot], ...]  # by the names of sensors
 
 
-def check_level(tangent: Array, direction: Array, gravity: Array) -> None:
-    """Raise BadInput for a track whose loads or whose gravity act along it too; unit vectors (3,)."""
-    for vector, what in ((gravity, "this track rises"), (direction, "the loads of this track act along it too")):
+def check_square(direction: Direction, tangent: Array, load: Array, gravity: Array) -> None:
+    """Raise BadInput for a track along, or across, which its loads or gravity act too; unit vectors (3,)."""
+    if direction == "across":
+        if abs(float(np.cross(load, tangent) @ gravity)) > LEVEL:
+            expected = "a track whose loads act in the upright plane through it"
+            raise BadInput("weights act across this track too", where="inertia_across", expected=expected)
+        return
+    for vector, what in ((gravity, "this track rises"), (load, "the loads of this track act along it too")):
         if abs(float(tangent @ vector)) > LEVEL:
             raise BadInput(what, where="inertia_along", expected="a level track with loads square to it")
 
@@ -174,10 +180,12 @@ class Body(SpecOfKind):
         """The springs on which a uniform beam stands instead, each with `at`, `stiffness` and `rotational`."""
         return ()
 
-    def check_along(self) -> None:
-        """Raise BadInput where the inertia of what rides cannot act along the track."""
-        what, expected = "this body does not move along its own track", "a frame, or a body out of finite-element files"
-        raise BadInput(what, where="inertia_along", expected=expected, remedy="inertia_along = false")
+    def check_inertia(self, direction: Direction) -> None:
+        """Raise BadInput where the inertia of what rides cannot act in a direction."""
+        where = f"inertia_{direction}"
+        what = f"this body does not move {direction} its own track"
+        expected = "a frame, or a body out of finite-element files" + " in space" * (direction == "across")
+        raise BadInput(what, where=where, expected=expected, remedy=f"{where} = false")
 
     @property
     def lacks_for_stress(self) -> str:

@@ -20,8 +20,8 @@ HELD, PROBED = 1e-9, 9
 SAME_PLACE = 1e-9
 
 
-#: In which a contact pushes on its track and feels it move: square to it as its loads act, or along it.
-Direction = Literal["across", "along"]
+#: In which a contact pushes on its track and feels it move: as its loads act, along it, or across both.
+Direction = Literal["load", "along", "across"]
 
 
 class Shapes(Protocol):
@@ -41,23 +41,27 @@ class Statics(Protocol):
         """d^j/dx^j of the deflection at `x` (X,) under the body's own weight, per unit gravity."""
 
 
-class AlongTrack(Protocol):
-    """Motion of a track along itself, and what unit forces along it do."""
+class SideMotion(Protocol):
+    """Motion of a track along itself, or across it and its loads, and what unit forces in that direction do.
+
+    wave_number (N,): as of `ModalBody`.
+    """
+
+    @property
+    def wave_number(self) -> Array: ...
 
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
         """d^j psi_k / ds^j at the stations `s` (S,) for several j up to 2, as (orders, S, N); unit modal mass."""
 
-    def own_at(self, x: ArrayLike, s: ArrayLike) -> Array:
-        """Motion along at `x` per unit force along at `s`, m/N, for pairs that are broadcast against each other."""
-
-    def influence_at(self, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^j/dx^j of the deflection at `x` per unit force along at `s`, likewise."""
+    def influence_at(self, direction: Direction, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion in a direction at `x` per unit force in its own at `s`, m^(1-j)/N, for pairs that are
+        broadcast against each other."""
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
-        """A section force, stress or strain at `x` per unit force along at `s`, likewise."""
+        """A section force, stress or strain at `x` per unit force at `s`, likewise."""
 
     def of_point(self, name: str, s: ArrayLike) -> Array:
-        """(S,) motion of a point per unit force along at `s`, m/N."""
+        """(S,) motion of a point per unit force at `s`, m/N."""
 
 
 class Sections(Protocol):
@@ -145,7 +149,7 @@ class Gauge:
     row (N,): what every mode moves it by, kg^(-1/2); along: its motion per unit force at places (S,) of the track, m/N;
     points: the same at points, by name; weight: its motion under the body's own weight per unit gravity; rigid: number
     of rigid-body modes; dampers: by the places of those at a support, the part of their force that it carries too;
-    pushed: as `along`, per unit force along the track, where that moves along itself.
+    pushed: as `along`, per unit force in the other directions in which the track moves.
     """
 
     row: Array
@@ -154,16 +158,13 @@ class Gauge:
     rigid: int
     weight: float
     dampers: Mapping[float | str, float] = field(default_factory=dict)
-    pushed: Callable[[Array], Array] | None = None
+    pushed: Mapping[Direction, Callable[[Array], Array]] = field(default_factory=dict)
 
     def influence(self, loaded: Array | str, direction: Direction) -> Array:
         """Its motion per unit force at places (S,) of the track in a direction, or at a point (1,); m/N."""
         if isinstance(loaded, str):
             return np.array([self.points[loaded]])
-        if direction == "across":
-            return self.along(loaded)
-        assert self.pushed is not None
-        return self.pushed(loaded)
+        return self.along(loaded) if direction == "load" else self.pushed[direction](loaded)
 
     def own_weight(self) -> float:
         """Its motion under own weight per unit gravity. Raises BadInput for a body that nothing holds."""
@@ -177,7 +178,7 @@ def gauge_at(body: ModalBody, name: str) -> Gauge:
     points = body.points
     between = {other: points.between(name, other) for other in points.numbers}
     weight = float(points.weight[points.numbers[name]])
-    pushed = None if body.along is None else partial(body.along.of_point, name)
+    pushed = {direction: partial(motion.of_point, name) for direction, motion in body.sides.items()}
     return Gauge(points.row(name), partial(points.influence, name), between, points.rigid, weight, pushed=pushed)
 
 
@@ -199,7 +200,7 @@ class ModalBody:
     gravity_share       of gravity along w: 1, or the cosine between gravity and the track's direction of loads
     points              places off the track; None: there are none
     gauges              places that sensors read off the track, by the sensors' names
-    along               motion of the track along itself, and what forces along it do; None: it has none
+    sides               motions of the track in other directions than its loads', and what forces in these do
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     """
@@ -219,7 +220,7 @@ class ModalBody:
     sections: Sections | None = None
     points: Points | None = None
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
-    along: AlongTrack | None = None
+    sides: Mapping[Direction, SideMotion] = field(default_factory=dict)
     checks: tuple[tuple[str, str], ...] = ()
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
@@ -274,25 +275,21 @@ class ModalBody:
         left, right = sizes[[0, -1]] <= HELD * sizes.max()
         return bool(left), bool(right)
 
-    def shapes_in(self, direction: Direction) -> Shapes | AlongTrack:
+    def shapes_in(self, direction: Direction) -> Shapes | SideMotion:
         """What its modes move its track by in a direction."""
-        if direction == "across":
-            return self.shapes
-        assert self.along is not None
-        return self.along
+        return self.shapes if direction == "load" else self.sides[direction]
 
     def flexibility_between(
-        self, one: Array | str, other: Array | str, directions: tuple[Direction, Direction] = ("across", "across")
+        self, one: Array | str, other: Array | str, directions: tuple[Direction, Direction] = ("load", "load")
     ) -> Array:
         """Motion of one place in its direction per unit force at another one in its own, m/N: places (S,) of the track,
         broadcast against each other, or a point's name."""
         if not isinstance(one, str) and not isinstance(other, str):
-            if directions == ("across", "across"):
+            if directions == ("load", "load"):
                 return self.influence_at(one, other)
-            assert self.along is not None
-            if directions == ("along", "along"):
-                return self.along.own_at(one, other)
-            return self.along.influence_at(*((one, other) if directions[1] == "along" else (other, one)))
+            if directions[1] == "load":
+                return self.sides[directions[0]].influence_at("load", other, one)
+            return self.sides[directions[1]].influence_at(directions[0], one, other)
         assert self.points is not None
         if isinstance(one, str) and isinstance(other, str):
             return np.array([self.points.between(one, other)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Direction, ModalBody
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
 from engine.scene.study import Study
@@ -19,7 +19,7 @@ from engine.unreduced.statics import unreduced_frequencies
 from results_schema.arrays import Array
 from results_schema.status import Status
 from tests.engine.build import mass
-from tests.march.along.test_inertia_along import GRAVITY, KILOGRAMS, RATIO, READ, WAYS, marched
+from tests.march.along.test_inertia_along import GRAVITY, KILOGRAMS, RATIO, READ, WAYS, in_space, marched, pushing
 from tests.naive.scene import Phase
 from tests.observation.test_off_track import PORTAL, study
 
@@ -58,39 +58,47 @@ def gantry(read: tuple[str, ...] = tuple(SENSORS), **more: Any) -> Study:
 
 
 class Twin:
-    """The corrected march with full matrices: one coordinate more, which the push alone feels, and after every step the
-    static responses that the kept modes miss, times both forces."""
+    """The corrected march with full matrices: one coordinate more for every push, which these alone feel, and after
+    every step the static responses that the kept modes miss, times all forces."""
 
-    def __init__(self, modal: ModalBody, phases: tuple[Phase, ...]) -> None:
-        assert modal.along is not None
-        self.modal, self.along, self.phases = modal, modal.along, phases
-        self.soft, self.omega = 1.0 / modal.omega**2, np.append(modal.omega, modal.omega[-1])
+    def __init__(self, modal: ModalBody, phases: tuple[Phase, ...], pushes: tuple[Direction, ...]) -> None:
+        self.modal, self.pushes, self.phases = modal, pushes, phases
+        self.soft, self.omega = 1.0 / modal.omega**2, np.append(modal.omega, modal.omega[[-1] * len(pushes)])
+        self.directions: tuple[Direction, ...] = ("load", *pushes)
 
-    def shapes(self, s: float) -> tuple[Array, Array]:
-        """(3, N + 1) shape, slope and bend across and along."""
-        across, along = (np.zeros((3, self.omega.size)) for _ in range(2))
-        across[:, :-1] = self.modal.shape_derivatives([s], (0, 1, 2))[:, 0]
-        along[:, :-1] = self.along.derivatives([s], (0, 1, 2))[:, 0]
-        left = float(self.along.own_at(s, s)[0]) - float(along[0, :-1] ** 2 @ self.soft)
-        along[0, -1] = self.omega[-1] * np.sqrt(left)
-        return across, along
+    def shapes(self, s: float) -> list[Array]:
+        """(3, N + P) shape, slope and bend as loads act, and in the directions of all pushes."""
+        count = len(self.soft)
+        found = [np.zeros((3, self.omega.size)) for _ in self.directions]
+        for shape, direction in zip(found, self.directions, strict=True):
+            shape[:, :count] = self.modal.shapes_in(direction).derivatives([s], (0, 1, 2))[:, 0]
+        at = np.array([s])
+        whole = [[self.modal.flexibility_between(at, at, (p, q))[0] for q in self.pushes] for p in self.pushes]
+        kept = np.array([shape[0, :count] for shape in found[1:]])
+        root = np.linalg.cholesky(np.array(whole) - kept * self.soft @ kept.T)
+        for shape, row in zip(found[1:], root, strict=True):
+            shape[0, count:] = self.omega[-1] * row
+        return found
 
     def missed(self, s: float) -> Array:
-        """(2, 2) of the sway and a deflection, per unit force across and along."""
-        across, along = (shape[0, :-1] for shape in self.shapes(s))
+        """(2, 1 + P) of the sway and a deflection, per unit force of the load and of pushes."""
+        kept = np.stack([shape[0, : len(self.soft)] for shape in self.shapes(s)])
         sway, at = self.modal.gauges["sway"], self.modal.shape([1.45])[0]
-        whole = [[sway.influence(np.array([s]), way)[0] for way in ("across", "along")]]
-        whole.append([self.modal.influence_at(1.45, s)[0], self.along.influence_at([1.45], [s])[0]])
+        here, there = np.array([s]), np.array([1.45])
+        whole = [[sway.influence(here, way)[0] for way in self.directions]]
+        whole.append([self.modal.flexibility_between(there, here, ("load", way))[0] for way in self.directions])
         rows = np.stack([sway.row, at])
-        return np.asarray(np.array(whole) - rows * self.soft @ np.stack([across, along]).T)
+        return np.asarray(np.array(whole) - rows * self.soft @ kept.T)
 
     def equations(self, t: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Matrices and force of the whole, and (2, 3 N + 4) forces of both contacts by a, v, u and themselves."""
+        """Matrices and force of the whole, and (1 + P, 3 N + 4) forces of all contacts by a, v, u and themselves."""
         phase = next(phase for phase in self.phases if t <= phase.end + 1e-12)
         s, ds, dds = phase.s(t), phase.ds(t), phase.dds(t)
         inertia, drag, stiffness = np.eye(self.omega.size), np.diag(2.0 * RATIO * self.omega), np.diag(self.omega**2)
         force, own = np.zeros(self.omega.size), []
-        for (shape, slope, bend), given in zip(self.shapes(s), (GRAVITY, -dds), strict=True):
+        prescribed = {"load": GRAVITY, "along": -dds, "across": 0.0}
+        for (shape, slope, bend), direction in zip(self.shapes(s), self.directions, strict=True):
+            given = prescribed[direction]
             rate, curve = 2.0 * ds * slope, ds**2 * bend + dds * slope
             inertia += KILOGRAMS * np.outer(shape, shape)
             drag += KILOGRAMS * np.outer(shape, rate)
@@ -117,17 +125,26 @@ class Twin:
             forces = own @ np.concatenate([a, v, u, [1.0]])
             phase = next(phase for phase in self.phases if now <= phase.end + 1e-12)
             rows = np.stack([self.modal.gauges["sway"].row, self.modal.shape([1.45])[0]])
-            found.append(rows @ u[:-1] + self.missed(phase.s(now)) @ forces)
+            found.append(rows @ u[: len(self.soft)] + self.missed(phase.s(now)) @ forces)
         return np.array(found).T
 
 
-@pytest.mark.parametrize("bed", ["frame", "beside its axis"])
+BEDS: dict[str, tuple[dict[str, Any], tuple[Direction, ...]]] = {
+    "frame": (PORTAL, ("along",)),
+    "beside its axis": (PORTAL | {"track": PORTAL["track"] | {"offset": [0.0, 0.0, 0.4]}}, ("along",)),
+    "in space": (in_space([0.0, 0.3, 0.4]), ("along", "across")),
+}
+
+
+@pytest.mark.parametrize("bed", BEDS)
 def test_the_corrected_march_is_that_of_a_dense_twin(bed: str) -> None:
+    """In space what is missed of one push at another counts too."""
     motion, phases = WAYS["out and back"]
-    table = PORTAL | ({} if bed == "frame" else {"track": PORTAL["track"] | {"offset": [0.0, 0.0, 0.4]}})
-    given = marched(motion, table | {"modes": 5}, solver={"steps": 400})
+    table, pushes = BEDS[bed]
+    carriage = pushing(motion, **{f"inertia_{direction}": True for direction in pushes})
+    given = marched(motion, table | {"modes": 5}, solver={"steps": 400}, carriage=carriage)
     dataset = engine.run(given)
-    expected = Twin(base_scene(given).bodies[0].modal, phases).march(dataset.elapsed.values.ravel())
+    expected = Twin(base_scene(given).bodies[0].modal, phases, pushes).march(dataset.elapsed.values.ravel())
     for name, values in zip(READ, expected, strict=False):
         found = dataset[name].values.ravel()
         np.testing.assert_allclose(found, values, rtol=0.0, atol=1e-9 * np.abs(values).max())

@@ -1,6 +1,7 @@
 """Masses that push along their track when they speed up and brake: against a dense twin, the unreduced model, momentum
 that is kept, and what the motion of the track along itself is made of."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 import engine
 from engine.bodies.imported import imported
-from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.modal_body import Direction, ModalBody
 from engine.bodies.reduced.body import save_body
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
@@ -40,6 +41,18 @@ def pushing(motion: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"car": mass(KILOGRAMS, motion, on="portal", inertia_along=True) | more}
 
 
+def in_space(offset: Sequence[float] = (0.0, 0.0, 0.0)) -> dict[str, Any]:
+    """The portal in space, clamped at both feet, with its track from b to c beside its axis."""
+    rail = SECTION | {"second_moment_lateral": 3e-6, "torsion_constant": 5e-6, "poissons_ratio": 0.3}
+    found = {key: part for key, part in PORTAL.items() if key not in ("plane", "node", "track", "point")}
+    found |= {"node": {name: [x, 0.0, z] for name, (x, z) in PORTAL["node"].items()}, "section": {"all": rail}}
+    found |= {"supports": {"a": "clamped", "d": "clamped"}}
+    found["member"] = {name: part | {"up": [0.0, 1.0, 0.0]} for name, part in PORTAL["member"].items()}
+    members = {"first": {"nodes": ["b", "m"]}, "second": {"nodes": ["m", "c"]}}
+    found["member"] |= {name: found["member"][name] | part for name, part in members.items()}
+    return found | {"track": {"members": ["first", "second"], "offset": list(offset)}}
+
+
 def marched(motion: dict[str, Any], bed: dict[str, Any] | None = None, steps: int = 400, **more: Any) -> Study:
     """A study with all histories, of the kept modes alone."""
     tables = {"carriage": pushing(motion), "output": {"histories": "all"}}
@@ -47,24 +60,29 @@ def marched(motion: dict[str, Any], bed: dict[str, Any] | None = None, steps: in
     return study(READ, bed, **(tables | {"solver": solver} | more))
 
 
-def dense(modal: ModalBody, phases: tuple[Phase, ...], times: Array, rows: list[Array], along: bool = True) -> Array:
+def dense(
+    modal: ModalBody,
+    phases: tuple[Phase, ...],
+    times: Array,
+    rows: list[Array],
+    directions: Sequence[Direction] = ("load", "along"),
+) -> Array:
     """(3, S) displacement of two rows and rate of the third, by average acceleration with full matrices: the mass feels
-    D2 w across and s'' + D2 u along its track, and gives both back."""
-    assert modal.along is not None
+    D2 w as its load acts, s'' + D2 u along its track and D2 v across both, and gives all back."""
     kept, damping = np.diag(modal.omega**2), np.diag(2.0 * RATIO * modal.omega)
 
     def equations(t: float) -> tuple[Array, Array, Array, Array]:
         phase = next(phase for phase in phases if t <= phase.end + 1e-12)
         s, ds, dds = phase.s(t), phase.ds(t), phase.dds(t)
-        inertia, drag, stiffness = np.eye(len(kept)), damping.copy(), kept.copy()
-        shapes = [modal.shape_derivatives([s], (0, 1, 2))[:, 0]]
-        shapes += [modal.along.derivatives([s], (0, 1, 2))[:, 0]] if along else []
-        for shape, slope, bend in shapes:
+        inertia, drag, stiffness, force = np.eye(len(kept)), damping.copy(), kept.copy(), np.zeros(len(kept))
+        given = {"load": GRAVITY, "along": -dds, "across": 0.0}
+        for direction in directions:
+            shape, slope, bend = modal.shapes_in(direction).derivatives([s], (0, 1, 2))[:, 0]
             inertia += KILOGRAMS * np.outer(shape, shape)
             drag += KILOGRAMS * np.outer(shape, 2.0 * ds * slope)
             stiffness += KILOGRAMS * np.outer(shape, ds**2 * bend + dds * slope)
-        force = KILOGRAMS * GRAVITY * shapes[0][0]
-        return inertia, drag, stiffness, force - KILOGRAMS * dds * shapes[1][0] if along else force
+            force += KILOGRAMS * given[direction] * shape
+        return inertia, drag, stiffness, force
 
     first = equations(0.0)
     u = KILOGRAMS * GRAVITY * modal.shape([phases[0].s(0.0)])[0] / modal.omega**2
@@ -96,7 +114,7 @@ def test_the_march_is_that_of_a_dense_twin(way: str, bed: str) -> None:
     dataset, modal = engine.run(given), base_scene(given).bodies[0].modal
     rows = [modal.gauges["sway"].row, modal.shape([1.45])[0], modal.gauges["rate"].row]
     expected = dense(modal, phases, dataset.elapsed.values.ravel(), rows)
-    without = dense(modal, phases, dataset.elapsed.values.ravel(), rows, along=False)
+    without = dense(modal, phases, dataset.elapsed.values.ravel(), rows, ("load",))
     for name, values, other in zip(READ, expected, without, strict=True):
         found = dataset[name].values.ravel()
         np.testing.assert_allclose(found, values, rtol=0.0, atol=1e-9 * np.abs(values).max())
@@ -165,26 +183,25 @@ def test_masses_that_ride_lower_the_frequency_of_sway() -> None:
 
 @pytest.mark.parametrize("offset", [[0.0, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, -0.2, 0.5]])
 def test_the_motion_along_is_that_of_nodes_beside_the_track(offset: list[float]) -> None:
-    """At the ends of the track that of points on rigid arms; in between, derivatives by differences."""
-    rail = SECTION | {"second_moment_lateral": 3e-6, "torsion_constant": 5e-6, "poissons_ratio": 0.3}
-    ends = {end: {"node": end, "offset": offset, "direction": [1.0, 0.0, 0.0]} for end in "bc"}
-    spatial = {key: part for key, part in PORTAL.items() if key not in ("plane", "node", "track", "point")}
-    spatial |= {"node": {name: [x, 0.0, z] for name, (x, z) in PORTAL["node"].items()}, "section": {"all": rail}}
-    spatial |= {"supports": {"a": "clamped", "d": "clamped"}, "point": ends}
-    spatial["member"] = {name: part | {"up": [0.0, 1.0, 0.0]} for name, part in PORTAL["member"].items()}
-    members = {"first": {"nodes": ["b", "m"]}, "second": {"nodes": ["m", "c"]}}
-    spatial["member"] |= {name: spatial["member"][name] | part for name, part in members.items()}
-    spatial["track"] = {"members": ["first", "second"], "offset": offset}
-    modal = body(spatial)
-    assert modal.points is not None and modal.along is not None
-    found = modal.along.derivatives([0.0, SPAN], (0,))[0]
-    expected = np.array([modal.points.row("point.b"), modal.points.row("point.c")])
-    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
-    s, h = np.array([0.31, 1.13, 2.57, 3.3]), 1e-4
-    for order in (0, 1):
-        before, after = (modal.along.derivatives(s + k * h, (order,))[0] for k in (-1, 1))
-        slope = modal.along.derivatives(s, (order + 1,))[0]
-        np.testing.assert_allclose((after - before) / (2.0 * h), slope, atol=1e-5 * np.abs(slope).max())
+    """At the ends of the track that of points on rigid arms, also across it; in between, derivatives by differences."""
+    ways: dict[Direction, list[float]] = {"along": [1.0, 0.0, 0.0], "across": [0.0, -1.0, 0.0]}
+    points = {
+        f"{direction}_{end}": {"node": end, "offset": offset, "direction": way}
+        for direction, way in ways.items()
+        for end in "bc"
+    }
+    modal = body(in_space(offset) | {"point": points})
+    assert modal.points is not None
+    for direction in ways:
+        side = modal.sides[direction]
+        found = side.derivatives([0.0, SPAN], (0,))[0]
+        expected = np.array([modal.points.row(f"point.{direction}_{end}") for end in "bc"])
+        np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+        s, h = np.array([0.31, 1.13, 2.57, 3.3]), 1e-4
+        for order in (0, 1):
+            before, after = (side.derivatives(s + k * h, (order,))[0] for k in (-1, 1))
+            slope = side.derivatives(s, (order + 1,))[0]
+            np.testing.assert_allclose((after - before) / (2.0 * h), slope, atol=1e-5 * np.abs(slope).max())
 
 
 def test_bodies_out_of_files_are_pushed_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
