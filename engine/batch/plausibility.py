@@ -11,6 +11,7 @@ from engine.batch.plan import Plan
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.scene.sweep import broken
+from engine.statics.directions import told_of
 from results_schema.arrays import Array
 
 FAST = 3.0  # times the critical speed
@@ -22,6 +23,12 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 def remarks(plan: Plan) -> list[str]:
     """One sentence per remark, each once, in the order of `REMARKS`; none for an ordinary study."""
     return list(dict.fromkeys(sentence for remark in REMARKS for sentence in remark(plan)))
+
+
+def _partly_inert(plan: Plan) -> Iterator[str]:
+    """Of the scene without sweep."""
+    if sentence := told_of(plan.base):
+        yield sentence
 
 
 def _doubtful(plan: Plan) -> Iterator[str]:
@@ -127,4 +134,4 @@ def _time_scale(grid: SceneGrid) -> Array:
 
 
 REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
-REMARKS = (_doubtful, _unsupported, _released, _leaves_between, _fast, _heavy, _deep, _thin)
+REMARKS = (_partly_inert, _doubtful, _unsupported, _released, _leaves_between, _fast, _heavy, _deep, _thin)

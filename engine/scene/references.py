@@ -69,7 +69,7 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
         _check_rider(study, name, carriage.riding_body)
     for direction in carriage.pushes:
         with _within(study, f"carriage.{name}"):
-            _check_inertia(study, carriage, direction)
+            check_inertia(study, carriage, direction)
 
 
 def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
@@ -111,8 +111,8 @@ def _within(study: Study, here: str) -> Iterator[None]:
         raise error.moved(study.source.where(f"{here}.{error.where}")) from None
 
 
-def _check_inertia(study: Study, carriage: Carriage, direction: Direction) -> None:
-    """The inertia of a carriage can act along or across its track."""
+def check_inertia(study: Study, carriage: Carriage, direction: Direction) -> None:
+    """The inertia of a carriage can act along or across its track. Raises BadInput, with the key within that."""
     if any(other.riding_body == carriage.on for other in study.carriage.values()):
         what = f"the body below rides too: its own motion holds it {direction}"
         where = f"inertia_{direction}"

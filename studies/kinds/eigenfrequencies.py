@@ -11,6 +11,7 @@ from engine.model.station_path import Along
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
+from engine.statics.directions import in_all_directions, told
 from results_schema.arrays import Array, Counts
 from results_schema.variable import outputs
 from results_schema.variables import declare
@@ -27,6 +28,7 @@ from studies.results.results import Results
 SHOWN = 3  # frequencies that a sentence lists
 MEASURED = 6  # positions at which errors are measured, beside the ends
 GOLDEN = 0.6180339887498949
+_WHOLE = "base_frequency_all_directions"
 STILL = 1e-3  # relative change along the way below which a frequency counts as constant
 
 
@@ -46,6 +48,9 @@ RESULTS = outputs("""
         resists are left out; NaN where there is none, or a contact is off the body
     base_frequency | position mode | Hz | alone nan |
         natural frequency of the coupled system, of the scene without sweep
+    base_frequency_all_directions | position mode | Hz | optional alone nan |
+        natural frequency if masses acted in all directions
+        in which their tracks move; of the scene without sweep, where they do not
     mode_shape | on_body position mode body_place | kg-0.5 | alone nan |
         coupled mode shape along every body, of the scene without sweep
         unit modal mass of the whole system; of the kept modes
@@ -89,7 +94,11 @@ class Eigenfrequencies(AtRestKind):
         for part in model.bodies:
             rows = part.modal.shape(np.linspace(0.0, part.modal.length, BODY_PLACES))
             lines.append(np.einsum("xn,snk->skx", rows, found.shapes[0, :, part.modes]))
-        return {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
+        shapes = {"base_frequency": found.omega[0] / (2.0 * np.pi), "mode_shape": _signed(np.stack(lines))}
+        whole = in_all_directions(model)
+        if whole is model:
+            return shapes
+        return shapes | {_WHOLE: self.variants(whole, VariantValues(model.study, {}, 1), along)["frequency"][0]}
 
     def unreduced(self, study: Study, model: SceneModel, positions: Array) -> dict[str, NDArray[Any]]:
         from engine.unreduced.scene import unreduced_model
@@ -105,14 +114,23 @@ class Eigenfrequencies(AtRestKind):
 
     def inner(self, model: SceneModel) -> dict[str, tuple[str, NDArray[Any]]]:
         mode = ("mode", np.arange(1, _count(model.study) + 1))
-        return {"frequency": mode, "base_frequency": mode, "mode_shape": mode}
+        return dict.fromkeys(("frequency", "base_frequency", "mode_shape", _WHOLE), mode)
 
     def findings(self, results: Results) -> list[str]:
-        said = [_along(results), *_across(results), *_together(results), *_sweep(results)]
+        said = [*_left_out(results), _along(results), *_across(results), *_together(results), *_sweep(results)]
         return [*said, *_unreduced(results), *_mode_counts(results)]
 
 
 KIND = Eigenfrequencies()
+
+
+def _left_out(results: Results) -> list[str]:
+    """What frequencies would be if masses acted in all directions; none where they do, or that changes nothing."""
+    if _WHOLE not in results.dataset:
+        return []
+    now, then = (np.asarray(results.dataset[name].values) for name in ("base_frequency", _WHOLE))
+    text = told(results.study, np.asarray(results.dataset["position"].values), now, then)
+    return [f"{text[0].upper()}{text[1:]}."] if text else []
 
 
 def _across(results: Results) -> list[str]:
@@ -122,6 +140,8 @@ def _across(results: Results) -> list[str]:
         return []
     modes = f"mode{'s' * (still.size > 1)} {listed([str(number) for number in still])}"
     verb, feel = ("move", "do not feel") if still.size > 1 else ("moves", "does not feel")
+    if any(carriage.pushes for carriage in results.study.carriage.values()):
+        return [f"{modes[0].upper()}{modes[1:]} {verb} no track along its loads."]
     return [
         f"{modes[0].upper()}{modes[1:]} {verb} no track along its loads and {feel} {results.carriage_name}, which "
         "presses along the loads alone: its mass across them is in no frequency."

@@ -13,6 +13,7 @@ from engine.march.step_rules import MOST_STEPS
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shuttle, study
+from tests.studies.at_rest import PORTAL
 
 MODES = 6
 
@@ -227,6 +228,12 @@ def passing(bed: Any = None, car: Any = None, **changes: Any) -> Study:
     return study(bed or beam(), car or mass(0.1, WAY), gravity=0.1, **changes)
 
 
+def on_portal(**more: Any) -> Study:
+    """A mass over a portal that sways."""
+    car = mass(20.0, shuttle(1.0, 3.0, 0.5, 0.2, 1), on="portal") | more
+    return Study(schema_version=1, kind="passage", body={"portal": PORTAL}, carriage={"car": car})
+
+
 CASES = {
     "210 GPa": passing(beam(youngs_modulus=210.0, density=7850.0)),
     "move away": passing(beam(supports="free-free")),
@@ -239,6 +246,7 @@ CASES = {
     "no structure bends so far": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.0005)),
     "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
     "in a first period": passing(beam(modes=1), solver={"steps": 30}),
+    "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
 }
 
 
@@ -249,6 +257,7 @@ def test_remarked(words: str) -> None:
 
 def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(passing())) == []
+    assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
 
 
 def test_every_remark_has_its_case() -> None:

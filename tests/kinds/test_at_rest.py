@@ -317,6 +317,28 @@ def test_shapes_across_the_loads_are_drawn_at_rest() -> None:
     assert sum("across the loads" in title for title in titles) >= 3
 
 
+def test_directions_in_which_a_mass_does_not_act_are_told_first() -> None:
+    """With what frequencies would be, those of the keys that it names; where it acts in all there is no word."""
+    way = {"kind": "cruise", "start": 1.0, "end": 3.0, "speed": 1.0}
+    car, found = {"on": "portal", "kind": "mass", "mass": 100.0, "motion": way}, []
+    for more in ({}, {"inertia_along": True, "inertia_across": True}):
+        body, asked = {"portal": small.PORTAL}, {"positions": 3}
+        found.append(
+            studies.run(engine.Study(kind="eigenfrequencies", body=body, carriage={"car": car | more}, question=asked))
+        )
+    plain, whole = found
+    told, lowest = answers.answer(plain)[0], float(whole.base_frequency.values[:, 0].min())
+    assert told.startswith(
+        "The mass of car does not act along or across its track: if it did (carriage.car.inertia_along"
+    )
+    assert (
+        f"the lowest frequency would be {lowest:.4g} Hz, not {float(plain.base_frequency.values[1, 0]):.4g} Hz" in told
+    )
+    np.testing.assert_allclose(plain.base_frequency_all_directions, whole.base_frequency, rtol=1e-9)
+    assert (whole.base_frequency.values[:, 0] < 0.98 * plain.base_frequency.values[:, 0]).all()
+    assert "base_frequency_all_directions" not in whole and "does not" not in "".join(answers.answer(whole))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("sweep", ["", MASS, f"{MASS}\ngravity = {{ of = 'gravity', values = [1.6, 9.8] }}"])
 def test_figures(kind: str, sweep: str) -> None:
