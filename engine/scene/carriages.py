@@ -31,11 +31,13 @@ class Carriage(SpecOfKind):
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
     headway: instead of a delay, the metres of its own way by which it trails a carriage that sets off at time 0.
     masses: keys that hold parts of its mass in kg; touching: of these, what touches the track; forces: keys in N.
+    may_push: directions beside that of its loads in which its inertia may act.
     """
 
     masses: ClassVar[tuple[str, ...]] = ()
     touching: ClassVar[tuple[str, ...]] = ()
     forces: ClassVar[tuple[str, ...]] = ()
+    may_push: ClassVar[tuple[Direction, ...]] = ()
 
     on: Annotated[str, Noun("the name of a body")]
     motion: AnyMotion
@@ -150,6 +152,8 @@ class PushingCarriage(Carriage):
     inertia_along: the mass also pushes along its track, by -m (s'' + u''), u the motion of the track along itself.
     inertia_across: it also pushes across track and loads, by -m v'', v the motion of the track so.
     """
+
+    may_push: ClassVar[tuple[Direction, ...]] = ("along", "across")
 
     inertia_along: bool = False
     inertia_across: bool = False

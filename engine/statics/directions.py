@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.model.station_path import frozen
 from engine.model.ties import PushTie
-from engine.scene.carriages import PushingCarriage
+from engine.scene.carriages import Carriage
 from engine.scene.references import check_inertia
 from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
@@ -31,16 +31,14 @@ def left_out(study: Study) -> dict[str, tuple[Direction, ...]]:
     """By the names of carriages, the directions in which their masses could act, and do not."""
     if study.solver.fidelity in ("force", "static"):
         return {}
-    sides: tuple[Direction, ...] = ("along", "across")
     found = {
-        name: tuple(way for way in sides if way not in carriage.pushes and _could(study, carriage, way))
+        name: tuple(way for way in carriage.may_push if way not in carriage.pushes and _could(study, carriage, way))
         for name, carriage in study.carriage.items()
-        if isinstance(carriage, PushingCarriage)
     }
     return {name: ways for name, ways in found.items() if ways}
 
 
-def _could(study: Study, carriage: PushingCarriage, direction: Direction) -> bool:
+def _could(study: Study, carriage: Carriage, direction: Direction) -> bool:
     try:
         check_inertia(study, carriage, direction)
     except BadInput:

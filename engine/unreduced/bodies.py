@@ -27,7 +27,7 @@ from engine.bodies.rigid.rigid import Rigid
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.unreduced.gauges import FullGauge, FullRead, full_gauge
-from engine.unreduced.track import AlongTrack, FrameTrack, Rows, no_rows, side_track
+from engine.unreduced.track import SIDE_TRACKS, AlongTrack, FrameTrack, Rows, no_rows
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.late import sparse
@@ -201,7 +201,7 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
         flexibility=flexibility,
         track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
         points={word: loads[:, number] for word, number in numbers.items()},
-        sides={direction: side_track(line, ends, assembly) for direction, line in side_lines(frame, track).items()},
+        sides={way: SIDE_TRACKS[way](line, ends, assembly) for way, line in side_lines(frame, track).items()},
         gauges={sensor: full_gauge(read, spot) for sensor, spot in study.spots(name)},
         gravity_share=float(track.direction @ gravity),
     )

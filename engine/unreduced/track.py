@@ -6,16 +6,18 @@ numbers, and bends the element between its ends besides.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine.bodies.frame.assembly import Assembly, cross_matrix
-from engine.bodies.frame.pushes import PushedLine, SideLine
+from engine.bodies.frame.pushes import PushedLine
 from engine.bodies.frame.sections import forces_from_ends, held_forces, section_weights, spread_forces
 from engine.bodies.frame.shapes import FORCES
 from engine.bodies.frame.track import TrackBeams, TrackPoints
+from engine.bodies.modal.modal_body import Direction
 from results_schema.arrays import Array, Counts
 
 WIDTH = 12  # degrees of freedom of an element
@@ -158,8 +160,17 @@ class AlongTrack:
         return self.axis.inside(s)
 
 
-def side_track(line: SideLine, ends: TrackPoints, assembly: Assembly) -> FrameTrack | AlongTrack:
-    """A track in another direction than its loads', in an assembly's numbers of degrees of freedom."""
-    lines = (line,) if isinstance(line, TrackBeams) else (line.axis, line.beside)
-    tracks = [FrameTrack.of(part, ends, assembly, np.zeros_like(part.axes[:, 0])) for part in lines]
-    return tracks[0] if isinstance(line, TrackBeams) else AlongTrack(line, *tracks)
+def along_track(line: PushedLine, ends: TrackPoints, assembly: Assembly) -> AlongTrack:
+    """The motion of a track along itself in an assembly's numbers of degrees of freedom."""
+    return AlongTrack(line, *(side_track(part, ends, assembly) for part in (line.axis, line.beside)))
+
+
+def side_track(track: TrackBeams, ends: TrackPoints, assembly: Assembly) -> FrameTrack:
+    """A track in another direction than its loads', likewise."""
+    return FrameTrack.of(track, ends, assembly, np.zeros_like(track.axes[:, 0]))
+
+
+SIDE_TRACKS: Mapping[Direction, Callable[[Any, TrackPoints, Assembly], FrameTrack | AlongTrack]] = {
+    "along": along_track,
+    "across": side_track,
+}

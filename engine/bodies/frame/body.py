@@ -13,7 +13,7 @@ import numpy as np
 from engine.bodies.frame.assembly import ABOUT_MODES, MASSES, Assembly, Content, Counts, assemble, rigid_motions
 from engine.bodies.frame.gauges import Read, frame_gauge, frame_points, loads_everywhere
 from engine.bodies.frame.geometry import unit
-from engine.bodies.frame.pushes import FrameSide, PushStatics, SideLine, side_lines, side_shapes
+from engine.bodies.frame.pushes import SIDE_SHAPES, FrameSide, PushStatics, SideLine, side_lines
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import mode_forces, track_shapes
 from engine.bodies.frame.statics import TrackStatics, responses, track_statics
@@ -112,7 +112,12 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         points=points,
         sides={
             direction: FrameSide(
-                direction, line.wave_number(omega), side_shapes(line, moved, forces), forces, points, pushes[direction]
+                direction,
+                line.wave_number(omega),
+                SIDE_SHAPES[direction](line, moved, forces),
+                forces,
+                points,
+                pushes[direction],
             )
             for direction, line in whole.sides.items()
         },

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,13 +90,17 @@ def side_lines(frame: Frame, track: TrackBeams) -> dict[Direction, SideLine]:
     return {"along": along, "across": replace(track, direction=across(track.axes[0, 0], track.direction))}
 
 
-def side_shapes(line: SideLine, moved: Array, forces: ModeForces) -> Shapes:
+def along_shapes(line: PushedLine, moved: Array, forces: ModeForces) -> AlongShapes:
     """Shapes by a line from displacements and rotations (E + 1, 6, N) of the track's points and the modes' section
     forces."""
-    if isinstance(line, TrackBeams):
-        return track_shapes(line, moved, forces)
     beside = track_shapes(line.beside, moved, forces) if line.lever else None
     return AlongShapes(track_shapes(line.axis, moved, forces), line.lever, beside)
+
+
+SIDE_SHAPES: Mapping[Direction, Callable[[Any, Array, ModeForces], Shapes]] = {
+    "along": along_shapes,
+    "across": track_shapes,
+}
 
 
 @dataclass(frozen=True, eq=False)
