@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -172,15 +173,17 @@ class Threads:
 
 
 def run_jobs(jobs: Sequence[Callable[[], object]], threads: int) -> None:
-    """Jobs on threads; on the caller's own where that is to be the only one."""
+    """Jobs on threads, begun in their order; on the caller's own thread where that is to be the only one."""
     if threads == 1:
         for job in jobs:
             job()
         return
-    import dask.threaded
-
-    graph = {("job", i): (job,) for i, job in enumerate(jobs)}
-    dask.threaded.get(graph, list(graph), num_workers=threads)
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for done in [pool.submit(job) for job in jobs]:
+            done.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _do(job: Callable[[], object], results: queue.Queue[Any], given_up: Halted) -> None:

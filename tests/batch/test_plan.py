@@ -1,12 +1,15 @@
 """How many steps, which scenes and groups: rules with numbers, refusals with their texts, sweeps of anything."""
 
 import math
+import threading
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from engine.batch.execution import run
+from engine.batch.places import run_jobs
 from engine.batch.plan import make_plan
 from engine.batch.plausibility import REMARKS, remarks
 from engine.march.step_rules import MOST_STEPS
@@ -122,6 +125,23 @@ def test_a_variant_of_few_is_computed_as_by_itself() -> None:
         alone = study(beam(modes=MODES), mass(masses[2], cruise(0.0, 1.0, speeds[i])))
         assert int(run(alone).steps_used) == whole[i, 2]
     assert len(np.unique(whole)) > 3
+
+
+def test_jobs_begin_in_their_order() -> None:
+    """Tables are dropped behind the jobs that need them: while the first job lasts, another thread does the next ones
+    in turn."""
+    seen: list[int] = []
+    enough = threading.Event()
+
+    def job(number: int) -> None:
+        if number == 0:
+            enough.wait(10.0)
+        seen.append(number)
+        if number == 30:
+            enough.set()
+
+    run_jobs([partial(job, number) for number in range(60)], 2)
+    assert seen[:30] == list(range(1, 31)) and sorted(seen) == list(range(60))
 
 
 def test_every_variant_is_in_one_group() -> None:

@@ -2,8 +2,6 @@
 
 import os
 
-import dask.threaded
-
 from studies.commands.cli import main
 
 
@@ -11,8 +9,6 @@ def forked(*arguments: str, screen: str = os.devnull) -> int:
     """The number of a process that runs the command; what it says goes to the file `screen`."""
     number = os.fork()
     if number == 0:
-        dask.threaded.pools.clear()  # of threads that this process does not have
-        dask.threaded.default_pool = None
         written = os.open(screen, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(written, 1)
         os.dup2(written, 2)
