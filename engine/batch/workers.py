@@ -18,7 +18,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -56,27 +56,31 @@ def on_this_machine(count: int, threads: int, memory: int | None = None) -> Iter
     """So many processes of this machine with so many threads each, that listen on its loopback alone. memory: bytes
     that each may take, an equal part of the machine's unless given."""
     memory = memory or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // count
-    with (
-        dask.config.set(QUIET),
-        LocalCluster(
-            n_workers=0,
-            host="127.0.0.1",
-            protocol="tcp",
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        processes = Processes((cluster.scheduler_address, str(threads), str(memory)))
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # what it has to say is said below
+    with ExitStack() as stack:
         try:
+            stack.enter_context(dask.config.set(QUIET))
+            cluster = stack.enter_context(
+                LocalCluster(
+                    n_workers=0,
+                    host="127.0.0.1",
+                    protocol="tcp",
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+            client = stack.enter_context(Client(cluster, set_as_default=False))
+            processes = Processes((cluster.scheduler_address, str(threads), str(memory)))
+            stack.callback(processes.end)
             processes.keep(count)
-            own_computer()  # compiles kernels, if they are not, once for all
-            with _answers(cluster.scheduler_address):
-                _wait_for(client, count, processes)
-            yield Workers(client, threads, partial(processes.keep, count))
-        finally:
-            processes.end()
+        except (OSError, RuntimeError) as error:
+            what, remedy = str(error) or type(error).__name__, "allow more open files (ulimit -n), or use threads"
+            raise WorkersGaveUp(f"they cannot be started ({what})", where="workers", remedy=remedy) from error
+        own_computer()  # compiles kernels, if they are not, once for all
+        with _answers(cluster.scheduler_address):
+            _wait_for(client, count, processes)
+        yield Workers(client, threads, partial(processes.keep, count))
 
 
 class Processes:

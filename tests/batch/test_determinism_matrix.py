@@ -22,6 +22,8 @@ from tests.accuracy.chosen import sweep
 from tests.engine.bodies_on_contacts import riding
 from tests.engine.build import Table, aboard, beam, cruise, mass, oscillator, shuttle, study, under
 from tests.engine.gantries import gantry
+from tests.floating.scenes import given_arm
+from tests.kinds import test_stability
 from tests.studies.every_way import TEXTS
 
 CHUNKS = (1, 7, 64, None)
@@ -68,7 +70,30 @@ STUDIES: dict[str, Callable[[], Study]] = {name: partial(by_scheme, name) for na
     CHOSEN: sweep,
     "each until it converges": lambda: sweep(sweep=swept("carriage.car.mass", 0.05, 0.25)["sweep"]),
 }
-PIECES = ("at rest", "frames that move", "robots")
+
+
+def sliding_by_scheme(name: str) -> Study:
+    """A mass that slides by itself, marched by a scheme."""
+    given = load(TEXTS["frames that move"])
+    return Study(**(given.data | {"solver": {"steps": 100, "scheme": name} | PARAMETERS.get(name, {})}))
+
+
+def driven_arm(fidelity: str) -> Study:
+    """An arm on driven joints with a mass and an oscillator: a given frame, or "full", one that floats."""
+    sweep = {"load": {"of": "carriage.load.mass", "values": [1.0, 2.0]}}
+    given = given_arm().data | {"question": {"duration": 0.5}, "sweep": sweep}
+    return Study(**given, solver={"steps": 100, "fidelity": fidelity})
+
+
+OF_FRAMES = [name for name, scheme in SCHEMES.items() if scheme(PARAMETERS.get(name, {})).stride == 1]
+PIECES: dict[str, Callable[[], Study]] = {
+    "at rest": lambda: load(TEXTS["at rest"]),
+    **{f"a mass that slides, {name}": partial(sliding_by_scheme, name) for name in OF_FRAMES},
+    "a given frame": partial(driven_arm, "auto"),
+    "a floating frame": partial(driven_arm, "full"),
+    "robots": lambda: load(TEXTS["robots"]),
+    "schemes for comparison": partial(test_stability.study, {"maps": ["schemes", "lagged-inertia"]}),
+}
 
 
 def found(given: Study, here: Place, chunk: int | None) -> Collector:
@@ -107,7 +132,7 @@ def in_pieces(given: Study, here: Place) -> xr.Dataset:
 @cache
 def pieces_alone(name: str) -> xr.Dataset:
     """On one thread."""
-    return in_pieces(load(TEXTS[name]), Threads(1))
+    return in_pieces(PIECES[name](), Threads(1))
 
 
 @pytest.fixture(scope="module", params=PLACES)
@@ -129,7 +154,7 @@ def test_one_hash(name: str, here: Place) -> None:
 @pytest.mark.fault(20)
 @pytest.mark.parametrize("name", PIECES)
 def test_one_hash_of_pieces(name: str, here: Place) -> None:
-    there, expected = in_pieces(load(TEXTS[name]), here), pieces_alone(name)
+    there, expected = in_pieces(PIECES[name](), here), pieces_alone(name)
     assert there.identical(expected)
     numbers = [key for key, array in expected.data_vars.items() if array.dtype.kind == "f"]
     assert len(numbers) > 3

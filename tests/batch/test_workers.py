@@ -1,5 +1,6 @@
 """Workers: the same bits, whatever dies; what ends every process is found; whom a study is not given to."""
 
+import errno
 import os
 import signal
 import socket
@@ -138,6 +139,29 @@ def test_a_worker_killed_as_it_starts_is_started_anew(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Processes, "keep", kill_the_first)
     with on_this_machine(1, 1) as here:
         assert killed and pids(here)[0] != killed[0]
+
+
+@pytest.mark.fault(34)
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("LocalCluster", RuntimeError("Cluster failed to start")),
+        ("Client", TimeoutError()),
+        ("subprocess.Popen", OSError(errno.EMFILE, "Too many open files")),
+    ],
+)
+def test_workers_that_cannot_be_started_are_given_up(
+    name: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where few files may be open, say."""
+
+    def fails(*arguments: Any, **options: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(f"engine.batch.workers.{name}", fails)
+    with pytest.raises(WorkersGaveUp, match="cannot be started") as found, on_this_machine(1, 1):
+        pass
+    assert (str(error) or "TimeoutError") in str(found.value)
 
 
 def greedy(most: int, lanes: Counts, halted: Halted) -> int:

@@ -1,8 +1,12 @@
 """Sines, cosines and exponentials of our own: against long doubles, exact identities, themselves in other company."""
 
+import ast
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from engine import kernels
 from engine.kernels.shapes import Span, beam_shapes
 from engine.kernels.sines import decay, sin_cos
 from results_schema.arrays import Array
@@ -10,6 +14,7 @@ from results_schema.arrays import Array
 LONG_PI = np.longdouble("3.14159265358979323846264338327950288")
 TURNS = np.concatenate([np.random.default_rng(1).uniform(-300.0, 300.0, 20_000), np.linspace(-2.0, 2.0, 4001)])
 PATHS = np.concatenate([np.random.default_rng(2).uniform(0.0, 60.0, 20_000), np.linspace(0.0, 700.0, 7001)])
+LIBRARIES_HAVE = {"sin", "cos", "tan", "arctan", "arctan2", "exp", "sinh", "cosh", "tanh", "log", "pow", "power"}
 AMPLITUDES = {"sine": 0, "cosine": 1, "near": 2, "far": 3}
 
 
@@ -27,6 +32,19 @@ def wave(kind: str, turns: Array, x: float | Array, order: int = 0) -> Array:
     found = np.empty((1, places.size, turns.size))
     beam_shapes(places, np.arange(places.size), span, np.array([order]), np.ones(1), found)
     return np.asarray(found[0])
+
+
+def test_kernels_ask_no_library_for_waves() -> None:
+    """Whose bits differ from machine to machine."""
+    folder, found, looked_at = Path(kernels.__path__[0]), set[str](), 0
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.decorator_list:
+                calls = (one.func for one in ast.walk(node) if isinstance(one, ast.Call))
+                names = {ast.unparse(one).rpartition(".")[2] for one in calls}
+                found |= {f"{path.name}: {node.name}: {name}" for name in names & LIBRARIES_HAVE}
+                looked_at += 1
+    assert looked_at > 200 and not found
 
 
 def test_sine_and_cosine() -> None:

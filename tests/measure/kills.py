@@ -47,7 +47,7 @@ def killed(name: str, kills: int, moments: random.Random) -> dict[str, int]:
     Path("again.nc").unlink()
     found = {"kills": 0, "bad parts": 0, "parts seen": 0, "finished": 0}
     while found["kills"] < kills:
-        number = forked("run", "study.toml", "-o", "a.nc")
+        number = forked("run", "study.toml", "-o", "a.nc", screen="said")
         time.sleep(moments.uniform(0.0, 1.0) * seconds)
         os.kill(number, signal.SIGKILL)
         ended = exit_code(number)
@@ -57,12 +57,12 @@ def killed(name: str, kills: int, moments: random.Random) -> dict[str, int]:
             found["kills"] += 1
             if not Path("a.nc").exists():
                 continue
-        assert ended in (0, 3, -signal.SIGKILL)
+        assert ended in (0, 3, -signal.SIGKILL), (ended, Path("said").read_text(encoding="utf-8"))
         assert_same_archives(open_archive("a.nc"), whole)
         assert exit_code(forked("run", "study.toml", "-o", "a.nc")) in (0, 3)
         Path("a.nc").unlink()
         found["finished"] += 1
-        left = {path.name for path in folder.iterdir()} - {"study.toml", "whole.nc"}
+        left = {path.name for path in folder.iterdir()} - {"study.toml", "whole.nc", "said"}
         assert left <= {"a.nc.parts", "a.nc.lock"}, left
     assert exit_code(forked("run", "study.toml", "-o", "a.nc")) in (0, 3)
     assert_same_archives(open_archive("a.nc"), whole)

@@ -4,6 +4,7 @@ import numpy as np
 
 from engine.kernels.floating.vectors import add, cross, dot, times
 from engine.kernels.jit import called
+from engine.kernels.sines import PI, sin_cos
 
 SMALL = 1e-8  # of the square of an angle: beyond the first terms of the series are 1e-18
 
@@ -37,7 +38,8 @@ def rotation(t):
         a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
     else:
         angle = np.sqrt(square)
-        a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / square
+        sine, cosine = sin_cos(angle / PI)
+        a, b = sine / angle, (1.0 - cosine) / square
     x, y, z = t
     return (
         (1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y),
