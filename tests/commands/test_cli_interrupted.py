@@ -1,7 +1,9 @@
 """Runs that are interrupted: exit codes, what is kept, and that what goes on ends as if nothing had happened."""
 
 import os
+import shlex
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from studies.protocol.options import RunOptions
 from studies.protocol.stopping import GRACE_SECONDS, Stop, stop_on_signals
 from studies.runs.runner import run_to_archive
 from tests.studies.every_way import assert_same_results
-from tests.studies.small import LONG, SCENES, start, write
+from tests.studies.small import LONG, ROOT, SCENES, command, start, write
 
 
 @pytest.fixture(autouse=True)
@@ -186,3 +188,27 @@ def test_what_has_gathered_is_kept_unless_the_disk_failed(error: BaseException, 
         parts.add(chunk(3))
         raise error
     assert len(written.parts) == kept
+
+
+JUMPING = """\
+import time
+
+real = time.time
+time.time = lambda: real() + 86400.0 * (int(2.0 * time.monotonic()) % 3 - 1)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.fault(20)
+@pytest.mark.parametrize("places", [(), ("--workers", "2")], ids=["threads", "workers"])
+def test_a_pause_a_clock_that_jumps_and_few_open_files_change_nothing(places: tuple[str, ...], here: Path) -> None:
+    assert main(["run", "small.toml", "-o", "whole.nc"]) == 0
+    (here / "sitecustomize.py").write_text(JUMPING, encoding="utf-8")
+    run = f"ulimit -n 64; exec {shlex.join(command('run', 'small.toml', '-o', 'small.nc', *places))}"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(here), str(ROOT)])}
+    running = subprocess.Popen(["bash", "-c", run], env=environment)
+    for number in (signal.SIGSTOP, signal.SIGCONT):
+        time.sleep(4.0)
+        running.send_signal(number)
+    assert running.wait(timeout=300) == 0
+    assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
