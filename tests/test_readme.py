@@ -105,6 +105,8 @@ def test_the_python_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         exec(block, names)
     assert Path("my-study.nc").exists() and Path("my-report/report.html").exists()
     assert 0.0 < names["both"].midspan_max.std("scheme").max() < 1e-4
+    assert names["ds"].peaks_per_cycle.values.ravel().tolist() == [2, 1, 2]
+    assert names["spectrum"].dims == ("train", "speed") and (names["spectrum"].diff("train") > 1e-3).all()
 
 
 def test_every_folder_of_code_is_told_of() -> None:
