@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar, cast
 from results_schema.errors import BadInput
 
 T = TypeVar("T")
-ABSENT = "is the package installed that brings this kind?"
+ABSENT = "is the package installed that brings it?"
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 from engine.study_file.document import Beside
 from engine.study_file.units import fault
 from results_schema.errors import shortened
-from results_schema.pieces import Pieces, unfinished
+from results_schema.pieces import ABSENT, Pieces, unfinished
 
 NUMBER, WORD, LIST, TABLE = "<number>", "<word>", "<list>", "<table>"
 
@@ -140,7 +140,7 @@ def one_of(
             return word
         every = (*words, *more)
         known = meant.get(word.lower().replace("_", "-").replace(" ", "-"))
-        remedy = f'did you mean "{known}"?' if known else nearest(word, every)
+        remedy = f'did you mean "{known}"?' if known else nearest(word, every) or (ABSENT if more else "")
         expected = f"one of {', '.join(every)}"
         raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
 

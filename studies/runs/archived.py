@@ -12,13 +12,13 @@ from engine.bodies.modal.description import Recorded
 from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
 from results_schema.late import xr
-from results_schema.pieces import ABSENT
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
 from results_schema.variables import declarations
 from studies.findings.numerics_used import is_marched
 from studies.findings.theory import first_omega
 from studies.protocol.study import Kind, kind_named
+from studies.results.formatting import listed
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -39,8 +39,11 @@ def results_of(archive: Archive) -> Results:
         study = _study(archive.root, models)
         found = list(_findings(archive, study))
     except BadInput as error:
-        if error.remedy == ABSENT:
-            raise ArchiveError(str(error), where=str(archive.path)) from error
+        from studies.runs.identity import PIECES, missing_pieces
+
+        if gone := missing_pieces(str(archive.root.attrs.get(PIECES, ""))):
+            what, remedy = f"this archive needs {listed(gone)}", "install what is not there"
+            raise ArchiveError(what, where=str(archive.path), remedy=remedy) from error
         raise _refused(archive.path, str(error)) from error
     if found:
         more = f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else ""

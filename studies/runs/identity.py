@@ -18,6 +18,8 @@ from studies.protocol.study import KINDS
 
 PROGRAM = Path(__file__).parents[2]
 PACKAGES = ("engine", "results_schema", "studies")
+TABLES = (BODIES, CARRIAGES, MOTIONS, QUANTITIES, ALL_SCHEMES, KINDS)
+PIECES = "foreign_pieces"  # the attribute of an archive that names those of its study
 DRAWING = PROGRAM / "studies" / "pictures"  # of what is finished: no number depends on it
 LIBRARIES = ("numpy", "scipy")  # numba and its compiler belong to the kernels' hash
 
@@ -56,6 +58,26 @@ def sources() -> list[Path]:
 def foreign_sources(study: Study) -> list[Path]:
     """The files of all pieces of a study that other packages bring."""
     return sorted({path for table, name in ((KINDS, study.kind), *used(study)) for path in table.sources(name)})
+
+
+def foreign_pieces(study: Study) -> str:
+    """The pieces of a study that other packages bring, one a line: group of entry points, name, package, version."""
+    pieces = [(table, name) for table, name in ((KINDS, study.kind), *used(study)) if name in table.foreign]
+    packages = {(table.group, name): table.foreign[name].dist for table, name in pieces}
+    named = [f"{' '.join(piece)} {own.name} {own.version}" for piece, own in packages.items() if own is not None]
+    return "\n".join(named)
+
+
+def missing_pieces(pieces: str) -> list[str]:
+    """Which of such pieces are not installed, in words."""
+    tables = {table.group: table for table in TABLES}
+    found = [(*line.split(" ", 2), "")[:3] for line in pieces.splitlines()]
+    gone = [(group, name, package) for group, name, package in found if name not in tables.get(group, ())]
+    nouns = {group: table.noun for group, table in tables.items()}
+    return [
+        f'the {nouns.get(group, "piece")} "{name}" of the package {package} (entry point {name} of {group})'
+        for group, name, package in gone
+    ]
 
 
 def sources_hash(paths: Sequence[Path]) -> str:

@@ -12,7 +12,7 @@ from engine.scene.study import Study
 from results_schema.store.archive import FILES, files_text
 from results_schema.store.reading import SCHEMA_VERSION
 from studies.protocol.study import study_attributes
-from studies.runs.identity import files_of
+from studies.runs.identity import PIECES, files_of, foreign_pieces
 
 CONVENTIONS = "CF-1.11"
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "xarray", "netCDF4", "dask", "pydantic", "pint")
@@ -25,6 +25,7 @@ def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
         "Conventions": CONVENTIONS,
         **study_attributes(study),
         **({FILES: files_text(hashes)} if (hashes := files_of(study)) else {}),
+        **({PIECES: pieces} if (pieces := foreign_pieces(study)) else {}),
         "schema_version": SCHEMA_VERSION,
         "results_key": key,
         "packages": [f"{name} {version_of(name)}" for name in ("wanderlast", *PACKAGES)],

@@ -131,15 +131,36 @@ def test_a_study_of_them_all_is_run(packages: Path) -> None:
     assert "of the largest reading is static" in page
 
 
-def test_without_its_package_a_study_and_its_archive_are_refused_in_words(packages: Path, tmp_path: Path) -> None:
-    """The archive is whole: it is the package that is missed."""
-    (packages.parent / "one.toml").write_text(scenes.text_of("passage").replace('"passage"', '"static-share"'))
-    assert wanderlast(packages, "run", "one.toml").returncode in (0, 3)
-    gone, said = tmp_path / "gone", "unknown kind of study"
-    for code, arguments in ((2, ["run", "one.toml"]), (4, ["report", "one.nc"]), (4, ["info", "one.nc"])):
-        refused = wanderlast(gone, *arguments)
-        assert refused.returncode == code and said in refused.stderr and "static-share" in refused.stderr
-        assert "package" in refused.stderr and "not what it holds" not in refused.stderr
+WITHOUT = {
+    "static-share": ('"passage"', '"static-share"', "kinds", "kind of study"),
+    "slope": (
+        'under = "table"\nquantity = "bending_moment"',
+        'body = "bed"\nat = 2\nquantity = "slope"',
+        "quantities",
+        "quantity",
+    ),
+    "damped": ("[sensor.midspan]", '[solver]\nscheme = "damped"\nsteps = 400\n\n[sensor.midspan]', "schemes", "scheme"),
+}
+
+
+@pytest.mark.parametrize("name", WITHOUT)
+def test_without_its_package_a_study_and_its_archive_are_refused_in_words(
+    name: str, packages: Path, tmp_path: Path
+) -> None:
+    """The archive is whole: it is the package that is missed, and named."""
+    old, new, group, noun = WITHOUT[name]
+    text = scenes.text_of("passage")
+    assert old in text
+    (packages.parent / "one.toml").write_text(text.replace(old, new, 1))
+    run = wanderlast(packages, "run", "one.toml")
+    assert run.returncode in (0, 3), run.stderr
+    gone = tmp_path / "gone"
+    refused = wanderlast(gone, "run", "one.toml")
+    assert refused.returncode == 2 and name in refused.stderr and "is the package installed" in refused.stderr
+    said = f'this archive needs the {noun} "{name}" of the package toys 1.0 (entry point {name} of wanderlast.{group})'
+    for command in ("report", "info"):
+        refused = wanderlast(gone, command, "one.nc")
+        assert refused.returncode == 4 and said in refused.stderr and "not what it holds" not in refused.stderr
         assert len(refused.stderr.splitlines()) == 1
     assert "one.nc: whole" in refused.stdout
     assert wanderlast(gone, "info", "one.nc", "--study").returncode == 0
