@@ -225,9 +225,8 @@ def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted
 
 
 def alike(apart: Array, held: Mask) -> Array:
-    """(results,) changes of a march, raised to a part of the largest, that of what is held and of what is not."""
-    raised = (np.maximum(apart, ALIKE * apart[own].max(initial=0.0)) for own in (held, ~held))
-    return np.asarray(np.where(held, *raised))
+    """(results,) changes of a march, those of what is held raised to a part of the largest of these."""
+    return np.maximum(apart, np.where(held, ALIKE * apart[held].max(), 0.0))
 
 
 def by_mode_counts(
