@@ -296,12 +296,21 @@ def usual_pilots(size: int) -> int:
     return min(PILOTS, max(FEWEST_PILOTS, size // SHARE_OF_PILOTS))
 
 
+def scenes_of_pilots(scenes: int, count: int) -> int:
+    """Of how many of the scenes of a sweep so many pilots are.
+
+    >>> scenes_of_pilots(1, 128), scenes_of_pilots(25, 128), scenes_of_pilots(100, 256)
+    (1, 16, 24)
+    """
+    return min(scenes, MOST_SCENES, max(1, count // LEAST_IN_SCENE))
+
+
 def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:
     """Flat numbers of pilots, as many as are worth it and at most so many, drawn at random: of a few scenes where there
     are many."""
     count = min(most, usual_pilots(cases.size))
     random = np.random.default_rng(SEED)
-    chosen = random.permutation(len(members))[: max(1, min(MOST_SCENES, count // LEAST_IN_SCENE))]
+    chosen = random.permutation(len(members))[: scenes_of_pilots(len(members), count)]
     pool = np.concatenate([members[number] for number in np.sort(chosen)])
     return np.sort(random.permutation(pool)[:count])
 

@@ -14,10 +14,11 @@ from math import prod
 import numpy as np
 
 from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
-from engine.accuracy.grids import SceneGrid, unit_steps
+from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
 from engine.accuracy.jobs import Share
 from engine.accuracy.ladder import ladder_of
+from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES
 from engine.march.envelopes import check_places, places_read
@@ -50,6 +51,7 @@ CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes
 EVERY_MARCH = "march"  # the kind of results that every march has
 NUMBERS_REDUCED = 4  # of 8 bytes, of a variant where extremes alone are kept: its number, its status, what it took
 PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
+LARGEST = 2  # times the tables of most references
 READ_BYTES = 40  # of a variant, at most, while an answer is made of some arrays over all variants
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
@@ -197,7 +199,17 @@ class Plan:
     @property
     def memory_bytes(self) -> int:
         """Expected peak of a run to an archive."""
-        return needed_memory(self.study, self.size, self.gathered_bytes)
+        return needed_memory(self.study, self.size, self.gathered_bytes) + self._tables_bytes
+
+    @property
+    def _tables_bytes(self) -> int:
+        """About what a march of cycles keeps of its tables: one of the largest references."""
+        grid = self.grids[0]
+        if not grid.grid.timeline(1, 1).repeats:
+            return 0
+        levels, numbers = in_full(grid), 4 * grid.scene.ties + len(self.study.sensor)
+        usual = level_work(grid, grid.values, levels, min(USUAL_LEVEL, len(levels.numerics) - 1)).max()
+        return int(min(KEPT_CYCLE, LARGEST * 8 * numbers * usual))
 
     @property
     def gathered_bytes(self) -> int:

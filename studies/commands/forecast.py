@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from engine.accuracy.choice import MOST_SCENES, PILOTS, usual_pilots
+from engine.accuracy.choice import PILOTS, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.batch.execution import warm_up
 from engine.batch.places import Shared, Threads
@@ -64,7 +64,7 @@ def forecast(
         found: Forecast | None = _of_convergence(plan, looked, threads)
     else:
         found = _choose(plan, threads, looked, end, rounds)
-    found = found or _without_pilots(plan, looked)
+    found = found or _without_pilots(plan, looked, threads)
     return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
 
 
@@ -107,15 +107,16 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 
 
-def _without_pilots(plan: Plan, looked: Looked) -> Forecast:
+def _without_pilots(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose pilots take longer than there is time."""
     pilots = usual_pilots(plan.size)
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
-    climbs = CLIMB * min(len(plan.grids), MOST_SCENES)
+    scenes = scenes_of_pilots(len(plan.grids), pilots)  # which are shared out as wholes, where there are several
+    seconds = CLIMB * looked.seconds * scenes / min(threads, scenes)
     if not looked.parts:
-        return Forecast(plan, "", (), climbs * looked.seconds, f"{less}; this may take longer")
+        return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
-    return Forecast(plan, title, chosen.rows(looked.parts), climbs * looked.seconds, less)
+    return Forecast(plan, title, chosen.rows(looked.parts), seconds, less)
 
 
 def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast | None:
@@ -137,7 +138,9 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
     usual = usual_pilots(plan.size)
     more = "" if pilots >= usual else f"; a run measures {usual} and knows better"
     title = f"What variants are computed with, by the measured errors of {min(pilots, usual)} pilots{more}"
-    seconds = took * max(1.0, usual / pilots) ** 0.5 + trial.seconds * _pace(trial) / threads
+    scenes, more_scenes = (scenes_of_pilots(len(plan.grids), count) for count in (pilots, max(usual, pilots)))
+    longer = more_scenes / scenes * max(1.0, usual * scenes / (pilots * more_scenes)) ** 0.5
+    seconds = took * longer + trial.seconds * _pace(trial) / threads
     return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)
 
 

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.choice import FEWEST_PILOTS, MOST_SCENES, NEIGHBOURS, PILOTS, coordinates, pilots_of
+from engine.accuracy.choice import (
+    FEWEST_PILOTS,
+    MOST_SCENES,
+    NEIGHBOURS,
+    PILOTS,
+    coordinates,
+    pilots_of,
+    scenes_of_pilots,
+)
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
@@ -69,7 +77,8 @@ def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
     found = pilots_of(plan.cases, plan.members)
     np.testing.assert_array_equal(found, pilots_of(plan.cases, plan.members))
     assert found.size == FEWEST_PILOTS == np.unique(found).size and found.max() < plan.size
-    assert sum(np.isin(members, found).any() for members in plan.members) <= MOST_SCENES < len(plan.members)
+    scenes = sum(np.isin(members, found).any() for members in plan.members)
+    assert scenes == scenes_of_pilots(len(plan.members), FEWEST_PILOTS) <= MOST_SCENES < len(plan.members)
 
 
 def test_more_variants_have_more_pilots() -> None:

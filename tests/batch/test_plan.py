@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.batch.execution import run
 from engine.batch.places import run_jobs
-from engine.batch.plan import make_plan
+from engine.batch.plan import LARGEST, make_plan, needed_memory
 from engine.batch.plausibility import REMARKS, remarks
 from engine.march.step_rules import MOST_STEPS
 from engine.scene.study import Study
@@ -142,6 +143,19 @@ def test_jobs_begin_in_their_order() -> None:
 
     run_jobs([partial(job, number) for number in range(60)], 2)
     assert seen[:30] == list(range(1, 31)) and sorted(seen) == list(range(60))
+
+
+def test_the_memory_of_cycles_has_room_for_their_tables() -> None:
+    """Beside what any study takes, about twice the tables of a usual reference; those of a passage are not kept."""
+    for motion, times in ((shuttle(0.2, 0.8, 1.0, 0.1, 3), LARGEST), (cruise(0.0, 1.0, 1.0), 0)):
+        plan = make_plan(study(beam(modes="auto"), mass(0.3, motion), sensor={"place": fixed(0.4)}))
+        grid, levels = plan.grids[0], in_full(plan.grids[0])
+        model = grid.model(levels.numerics[USUAL_LEVEL])
+        by = level_work(grid, grid.values, levels, USUAL_LEVEL).max() / (model.body_modes * grid.unit)
+        tables = grid.once(model, int(by))
+        kept = sum({id(table): table.bytes for table in map(tables.table, tables.timeline.segments)}.values())
+        room = plan.memory_bytes - needed_memory(plan.study, plan.size, plan.gathered_bytes)
+        assert kept * times / 1.5 <= room <= kept * times * 1.5
 
 
 def test_every_variant_is_in_one_group() -> None:

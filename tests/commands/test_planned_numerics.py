@@ -6,7 +6,8 @@ import pytest
 
 from engine.accuracy.jobs import InTurn
 from engine.batch.plan import Plan, make_plan
-from studies.commands.forecast import forecast
+from studies.commands import forecast as forecasting
+from studies.commands.forecast import Looked, forecast
 from studies.commands.planned_numerics import HEADINGS, chosen, rows
 from tests.engine.build import beam, cruise, mass, study
 
@@ -73,3 +74,14 @@ def test_pilots_are_measured_where_there_is_time() -> None:
 def test_what_there_was_no_time_for_is_said(sweep: dict[str, Any], words: str) -> None:
     seen = forecast(planned(beam(modes="auto"), sweep), 1, -1.0, patience=-1.0)
     assert not seen.rows and words in seen.remark
+
+
+def test_scenes_of_pilots_are_shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each scene climbs the ladder by itself: of 40 scenes 128 pilots are of 16, on two threads eight after another."""
+    lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
+    found = planned(beam(modes="auto"), {"length": lengths, "speed": SPEEDS | {"count": 30}})
+    monkeypatch.setattr(forecasting, "_converge", lambda *_: Looked([], 2.0))
+    monkeypatch.setattr(forecasting, "_audit", lambda *_: 0.0)
+    monkeypatch.setattr(forecasting, "AROUND", 0.0)
+    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0
+    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0
