@@ -22,8 +22,9 @@ def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
     """The estimated error of a result, of one sensor (or robot or rail) where it is over these, in its unit and the
     sweep's shape; NaN where none is known.
 
-    Errors of sensors are told over their largest static value. An archive tells that where it has their dynamic
-    amplification; else their own largest value stands for it, which is not far from it but near a resonance.
+    Errors of sensors are told over their largest static value, or their own where that is larger and something pushes
+    their body along its track. An archive tells the static one where it has their dynamic amplification; else their own
+    largest value stands for it, which is not far from it but near a resonance.
     """
     own = name in (*OF_TOOLS, *OF_RAILS)
     told = f"{name.partition('_')[0]} of {sensor}" if own else f"{name} {sensor}".strip()
@@ -63,6 +64,9 @@ def _scale_of_ends(results: Results, stem: str, own: xr.DataArray) -> Any:
     moves = kind_named(results.study.kind).moves_frames
     if stem in results.sensors and "dynamic_amplification" in results.dataset:
         static = own / results.of_sensor("dynamic_amplification", stem)
+        body = results.study.body_of(stem)
+        if any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values()):
+            return np.maximum(static.fillna(0.0), own)
         return static.where(np.isfinite(static), own)
     carriage = next((one for one in results.study.carriage if stem.startswith(f"{one}_")), "")
     what = stem.removeprefix(f"{carriage}_")

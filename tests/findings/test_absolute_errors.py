@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import studies
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting import answers
 from studies.reporting.comparison import compare
 from studies.reporting.summary import Range, in_tables
 from studies.results.results import Results
+from tests.engine.build import mass
+from tests.observation.test_off_track import study
 from tests.studies import scenes
 
 MASS = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+MASS_KEY = "carriage.car.mass"
 STILL = '[sensor.still]\nbody = "bed"\nat = 0.0'
 
 
@@ -47,6 +51,19 @@ def test_errors_are_over_what_the_archive_says() -> None:
         told = absolute_errors(with_error(both_ways, f"{result} midspan", 1e-3), result, "midspan")
         np.testing.assert_allclose(told, 1e-3 * scale, rtol=1e-6)
     assert np.isnan(absolute_errors(passage, "midspan_max_position", "none")).all()
+
+
+def test_errors_of_a_body_that_is_pushed_are_over_the_largest_value() -> None:
+    """As the march divides them: statics do not look at forces along a track, which sway a portal most."""
+    motion = {"kind": "point-to-point", "start": 0.4, "end": 2.8, "speed": 1.5, "acceleration": 6.0, "dwell": 0.1}
+    sensors = {"sway": {"node": "b", "direction": [1.0, 0.0, 0.0]}}
+    car = mass(400.0, motion, on="portal", inertia_along=True)
+    given = study(sensors, carriage={"car": car}, solver={"steps": 400}, sweep={"m": {"of": MASS_KEY, "values": [400]}})
+    results = Results.of(studies.run(given))
+    own = np.maximum(abs(results.dataset.sway_max), abs(results.dataset.sway_min)).values
+    assert np.all(results.numbers("dynamic_amplification", "sway") > 2.0)
+    told = absolute_errors(with_error(results, "sway_max", 0.25), "sway_max")
+    np.testing.assert_allclose(told, 0.25 * own, rtol=1e-6)
 
 
 def test_told_errors_are_as_large_as_what_finer_steps_change() -> None:
