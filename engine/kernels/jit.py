@@ -80,7 +80,8 @@ class Index(IndexDataCacheFile):
     lost, or get the code of the other."""
 
     def save(self, key: Any, data: Any) -> None:
-        with open(f"{self._index_path}.lock", "ab") as lock:
+        # where the disk is full, or another process has thrown the folder away, it is compiled again another time
+        with suppress(OSError), open(f"{self._index_path}.lock", "ab") as lock:
             with suppress(OSError):  # a file system without locks
                 fcntl.flock(lock, fcntl.LOCK_EX)
             super().save(key, data)

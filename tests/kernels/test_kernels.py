@@ -191,6 +191,15 @@ print(a_kernel.twice(3.0), jit._FOLDER, sep="\\n")
 
 
 @pytest.mark.fault(36)
+def test_a_kernel_that_cannot_be_kept_is_no_error(tmp_path: Path) -> None:
+    """In a folder that is there, and in one that another process has thrown away meanwhile."""
+    for folder in (tmp_path, tmp_path / "gone"):
+        index = jit.Index(str(folder), "a_kernel", "stamp of its source")
+        index.save("signature", "code")
+        assert index.load("signature") == ("code" if folder == tmp_path else None)
+
+
+@pytest.mark.fault(36)
 @pytest.mark.parametrize("place", ["/dev/null/kernels", "a file", "a link"])
 def test_an_unwritable_cache_folder(tmp_path: Path, place: str) -> None:
     """Another private folder takes its place, and kernels compile."""
