@@ -1,10 +1,13 @@
 """The kinds `eigenfrequencies` and `influence`: grids, refusals, comparisons, sentences, figures, commands."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import engine
 import studies
+from engine.bodies.reduced.body import save_body
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
@@ -15,6 +18,7 @@ from studies.reporting.summary import ranges
 from studies.results.formatting import scientific
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy
+from tests.bodies.frames import body
 from tests.engine.build import steel
 from tests.studies import at_rest as small
 from tests.studies.at_rest import KINDS, MASS, TABLE
@@ -146,6 +150,15 @@ def test_a_scene_without_a_finer_one_has_no_errors(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("studies.at_rest.at_rest.finer", refuse)
     found = studies.run(small.study("influence", "positions = 3"))
     assert np.isnan(found.estimated_error).all() and "accuracy" not in told_accuracy(None, Results.of(found))
+
+
+def test_saved_bodies_with_all_their_modes_have_no_errors(tmp_path: Path) -> None:
+    """What these leave out is not in the file; with some of them it is told."""
+    save_body(body(small.PORTAL | {"modes": 8}), tmp_path / "body.nc")
+    for modes, known in ((8, False), (3, True)):
+        table = {"kind": "reduced", "file": str(tmp_path / "body.nc"), "modes": modes}
+        given = small.study("eigenfrequencies", "positions = 3\nmodes = 2").with_values({"body.bed": table})
+        assert np.isfinite(studies.run(given).estimated_error).all() == known
 
 
 def test_a_contact_that_would_lift_is_flagged() -> None:

@@ -85,7 +85,11 @@ class Reduced(Body):
         )
 
     def finer(self) -> Reduced:
-        return self.with_more_modes(2)
+        """Raises BadInput where its file has no more modes, as what these leave out is not in it."""
+        found = self.with_more_modes(2)
+        if found == self:
+            raise BadInput("the file of this body has no more modes", where="modes")
+        return found
 
     def build(self) -> ModalBody:
         from engine.bodies.reduced.body import load_body
