@@ -23,8 +23,8 @@ RESULTS = outputs("""
     {carriage}_acceleration_along | position/phase/station | m s-2 | | acceleration along the track of {carriage}
         NaN where it is off the body
     {carriage}_acceleration_across | position/phase/station | m s-2 | |
-        acceleration in the direction of the deflection of {carriage}
-        NaN where it is off the body
+        acceleration across the track of {carriage}
+        in the direction of the deflection; NaN where it is off the body
 """)
 declare("trajectory", *MARCH, *RESULTS)
 

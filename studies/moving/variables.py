@@ -6,14 +6,20 @@ from results_schema.variables import Variable
 
 UNITS = {"position": "m", "speed": "m s-1", "contact_force": "N"}
 WORDS = {
-    "position": "place along its track",
-    "speed": "speed along its track",
-    "acceleration_along": "acceleration along its track",
-    "acceleration_x": "acceleration of the point that it touches, along x of the frame of its body",
-    "acceleration_y": "acceleration of the point that it touches, along y of the frame of its body",
-    "acceleration_z": "acceleration of the point that it touches, along z of the frame of its body",
-    "contact_force": "contact force, positive where it presses",
+    "position": "place",
+    "speed": "speed",
+    "acceleration_along": "acceleration along the track",
+    "acceleration_x": "acceleration along x",
+    "acceleration_y": "acceleration along y",
+    "acceleration_z": "acceleration along z",
+    "contact_force": "contact force",
 }
+TOUCHED = "of the point that it touches, in the axes of the frame of its body"
+MEANT = {
+    "position": "along its track",
+    "speed": "along its track",
+    "contact_force": "positive where it presses",
+} | {f"acceleration_{axis}": TOUCHED for axis in "xyz"}
 WORD_OF = {"max": "largest", "min": "smallest"}
 AT_STATIONS, BETWEEN = "over all stations", "over all stations and, by parabolas, between them"
 OF_SENSORS = f"{BETWEEN} (of velocities and accelerations at stations alone)"
@@ -29,13 +35,14 @@ def _ends(name: str, units: str, words: str, meaning: str) -> list[Variable]:
     return found
 
 
-def _history(name: str, dims: tuple[str, ...], units: str, words: str) -> Variable:
+def _history(name: str, dims: tuple[str, ...], units: str, words: str, meant: str = "") -> Variable:
+    gone = "NaN from the moment on at which a carriage has slid over an end of its track"
     return Variable(
         name,
         ("station", *dims),
         units=units,
         long_name=words,
-        meaning="NaN from the moment on at which a carriage has slid over an end of its track",
+        meaning=f"{meant}; {gone}" if meant else gone,
         required=False,
         lead="history",
         gaps_allowed=True,
@@ -47,8 +54,10 @@ def _of_carriages() -> list[Variable]:
     for end, _, _ in OF_CARRIAGES:
         units = UNITS.get(end, "m s-2")
         words = f"{WORDS[end]} of {{carriage}}"
-        where = BETWEEN if end == "position" else AT_STATIONS
-        found += [*_ends(f"{{carriage}}_{end}", units, words, where), _history(f"{{carriage}}_{end}", (), units, words)]
+        meant = MEANT.get(end, "")
+        where = "; ".join(text for text in (meant, BETWEEN if end == "position" else AT_STATIONS) if text)
+        name = f"{{carriage}}_{end}"
+        found += [*_ends(name, units, words, where), _history(name, (), units, words, meant)]
     return [
         *found,
         Variable(
@@ -116,7 +125,7 @@ RESULTS = (
     _history("frame_place", ("frame", "component"), "m", "place over the ground of the frame of a body"),
     _history("frame_attitude", ("frame", "quaternion"), "", "attitude of the frame of a body, as a unit quaternion"),
     _history("frame_velocity", ("frame", "component"), "m s-1", "velocity over the ground of the frame of a body"),
-    _history("frame_rate", ("frame", "component"), "rad s-1", "angular velocity of a body's frame, in its own axes"),
+    _history("frame_rate", ("frame", "component"), "rad s-1", "angular velocity of a body's frame in its axes"),
     _history("kinetic_energy", (), "J", "kinetic energy of everything"),
     _history("potential_energy", (), "J", "elastic energy, that of springs and of height"),
     _history("momentum", ("component",), "kg m s-1", "momentum of everything over the ground"),

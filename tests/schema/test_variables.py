@@ -115,13 +115,15 @@ def test_every_declaration_has_a_text_and_a_row_in_the_table():
         assert row.count("|") == 7
 
 
-def test_labels_of_axes_fit_one_line():
+def test_labels_of_axes_fit_one_line_and_those_of_histories_two():
     """xarray breaks what it writes beside an axis after 30 letters."""
     assert all(KINDS.values())  # imports every kind, which declares its results
     axes_of = {v.name: v for vs in registered().values() for v in vs if v.dims == (v.name,)}
     assert len(axes_of) > 40
     long = [name for name, v in axes_of.items() if len(f"{v.long_name} [{v.units or 1}]") > 30]
     assert long == []
+    histories = [v for vs in registered().values() for v in vs if v.lead == "history"]
+    assert max(len(f"{v.long_name} [{v.units}]") for v in histories) <= 60
 
 
 def test_sensor_units():
