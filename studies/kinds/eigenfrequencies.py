@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from engine.model.distinct_models import base_scene
 from engine.model.scene_model import SceneModel
 from engine.model.station_path import Along
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
-from engine.statics.directions import in_all_directions, told
+from engine.statics.directions import in_all_directions, told, told_of
 from results_schema.arrays import Array, Counts
 from results_schema.variable import outputs
 from results_schema.variables import declare
@@ -84,6 +85,10 @@ class Eigenfrequencies(AtRestKind):
             expected = '"auto"' if forced else 'a carriage of the kind "mass", "oscillator" or "body"'
             raise study.source.fault("solver.fidelity" if forced else "carriage", what, expected=expected)
         super().check(study)
+
+    def remarks(self, study: Study) -> tuple[str, ...]:
+        said = told_of(base_scene(study))
+        return (said,) if said else ()
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
         return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}

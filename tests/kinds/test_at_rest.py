@@ -13,6 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from studies.at_rest.findings import frequency_errors, reading_errors
 from studies.commands import catalogue
+from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.reporting.summary import ranges
 from studies.results.formatting import scientific
@@ -340,6 +341,8 @@ def test_directions_in_which_a_mass_does_not_act_are_told_first() -> None:
             studies.run(engine.Study(kind="eigenfrequencies", body=body, carriage={"car": car | more}, question=asked))
         )
     plain, whole = found
+    [remark], none = (kind_of(Results.of(one).study).remarks(Results.of(one).study) for one in found)
+    assert remark.startswith("the mass of car does not act along or across its track") and not none
     told, lowest = answers.answer(plain)[0], float(whole.base_frequency.values[:, 0].min())
     assert told.startswith(
         "The mass of car does not act along or across its track: if it did (carriage.car.inertia_along"
