@@ -22,7 +22,7 @@ from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
-from studies.results.findings_common import speeds_in_step, told_trains
+from studies.results.findings_common import MOST_IN_STEP, speeds_in_step, told_trains
 from studies.results.formatting import counted, duration, number, percent, quantity, spanned, typed_unit, unit_text
 
 FREQUENCIES_SHOWN = 6
@@ -221,24 +221,28 @@ def _ratios(plan: Plan) -> TextTable:
 
 
 def _in_step(plan: Plan) -> Iterator[TextTable]:
-    """Swept speeds at which the axles of a train come once in a first period."""
-    frequency, study = plan.base.first_omega / (2.0 * np.pi), plan.study
+    """Swept speeds at which the axles of a train come once in a period of one of the first frequencies."""
+    study, bodies = plan.study, {part.name: part for part in plan.base.bodies}
     for name, train in study.train.items():
         speeds = np.concatenate([grid.values.speed(axle_name(name, 0)) for grid in plan.grids])
-        lowest, highest = float(speeds.min()), float(speeds.max())
+        between = float(speeds.min()), float(speeds.max())
+        omega = bodies[train.on].modal.omega
+        excited = omega[plan.base.excited(bodies[train.on]) & (omega > 0.0)][:MOST_IN_STEP]
+        found = speeds_in_step(train, excited / (2.0 * np.pi), between) if between[0] < between[1] else []
         typed = next(
             (typed_unit(study, axis.name) for axis in plan.cases.axes if f"train.{name}.motion.speed" in axis.of), None
         )
         rows = [
             (
-                quantity(speed, "m s-1", 3) if typed is None else f"{number(speed * typed.factor)} {typed.unit}",
-                quantity(speed / frequency, "m", 3),
-                percent(share),
+                quantity(one.speed, "m s-1") if typed is None else f"{number(one.speed * typed.factor)} {typed.unit}",
+                f"{number(one.frequency)} Hz",
+                quantity(one.way, "m"),
+                percent(one.part),
             )
-            for speed, share in (speeds_in_step(train, frequency, (lowest, highest)) if highest > lowest else [])
+            for one in found
         ]
-        heading = f"Speeds at which {name} pushes in step with the first frequency, {number(frequency)} Hz"
-        yield TextTable(heading, ("speed", "way in a period", "part of its load"), rows)
+        heading = f"Speeds at which {name} pushes in step with one of the first frequencies of {train.on}"
+        yield TextTable(heading, ("speed", "frequency", "way in a period", "part of its load"), rows)
 
 
 def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:

@@ -17,6 +17,7 @@ from studies.protocol.study import kind_of
 from studies.reporting.drawing import page_of
 from studies.reporting.summary import in_tables
 from studies.results.findings_common import speeds_in_step, told_trains
+from studies.results.formatting import number
 from studies.results.results import Results
 from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
 
@@ -233,16 +234,28 @@ def test_forces_press_as_they_are_written() -> None:
 def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:
     """At f d/k, by all of their load; five of them have no other maxima above 0.3 but near 0.25."""
     regular = train(force(2.0, WAY) | {"axles": 5, "spacing": 3.0}).train["tram"]
-    found = speeds_in_step(regular, 2.0, (1.4, 7.0))
-    assert [speed for speed, _ in found] == pytest.approx([1.5, 2.0, 3.0, 6.0], rel=1e-3)
-    assert [share for _, share in found] == pytest.approx([1.0] * 4, abs=1e-3)
+    found = speeds_in_step(regular, [2.0], (1.4, 7.0))
+    assert [one.speed for one in found] == pytest.approx([6.0, 3.0, 2.0, 1.5], rel=1e-3)
+    assert [one.part for one in found] == pytest.approx([1.0] * 4, abs=1e-3)
+
+
+def test_of_several_frequencies_the_longest_ways_are_told() -> None:
+    """3 m and 1.5 m: not what is fastest, a fifth of the spacing at 50 Hz."""
+    regular = train(force(2.0, WAY) | {"axles": 5, "spacing": 3.0}).train["tram"]
+    found = speeds_in_step(regular, [2.0, 5.0, 50.0], (1.4, 40.0))
+    assert [one.speed for one in found] == pytest.approx([15.0, 7.5, 6.0, 3.0], rel=2e-3)
+    assert [one.frequency for one in found] == [5.0, 5.0, 2.0, 2.0]
 
 
 def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
-    whole = train(force(2.0, WAY) | REGULAR, **swept(speed={"of": "train.tram.motion.speed", "values": [0.01, 1.0]}))
+    """f_k d of the four first frequencies k^2 pi/2 sqrt(E I/(rho A))/L^2, in the unit of the sweep."""
+    whole = load(TEXT.replace("[5, 10]", '["5 km/h", "130 km/h"]'))
     tables = preview(kind_of(whole).parts(whole), 1).tables
     (table,) = [table for table in tables if "in step" in table.title]
-    assert len(table.rows) > 1 and table.headings == ("speed", "way in a period", "part of its load")
+    assert table.headings == ("speed", "frequency", "way in a period", "part of its load")
+    first = np.pi / 2.0 * np.sqrt(210e9 * 8.33e-6 / (7850.0 * 0.01)) / 15.0**2
+    frequencies = [k**2 * first for k in (4, 3, 2, 1)]
+    assert table.rows == [(f"{number(7.2 * f)} km/h", f"{number(f)} Hz", "2 m", "100 %") for f in frequencies]
 
 
 def test_equal_trains_push_in_step_at_equal_speeds() -> None:
