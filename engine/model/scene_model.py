@@ -262,7 +262,7 @@ def build_model(
         springs,
         contacts,
         tuple(swept),
-        tuple(_pushes(study, numerics, carriages, parts)),
+        tuple(_pushes(study, numerics, carriages)),
     )
     _check_rigid_modes(model)
     return model
@@ -340,15 +340,12 @@ def _springs(
     return tuple(found)
 
 
-def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie], parts: list[BodyPart]) -> Iterator[PushTie]:
+def _pushes(study: Study, numerics: Numerics, carriages: list[CarriageTie]) -> Iterator[PushTie]:
     """The inertia of carriages along and across their tracks, wherever any inertia acts."""
     if numerics.fidelity in ("force", "static"):
         return
     for number, tie in enumerate(carriages):
         for direction in study.carriage[tie.name].pushes:
-            if direction not in parts[tie.body].modal.sides:
-                what, where = f"this body does not move {direction} its own track", f"inertia_{direction}"
-                raise study.source.fault(f"carriage.{tie.name}.{where}", what, expected=f"{where} = false")
             push = PushTie(number, tie.body, direction, numerics.fidelity != "mass-without-convective")
             if push.prescribed and tie.rider.is_jolted(alone=len(carriages) == 1):
                 raise study.source.fault(

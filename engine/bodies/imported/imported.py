@@ -18,7 +18,7 @@ from engine.bodies.files.model import Counts, FileModel
 from engine.bodies.files.reader import Request, read_files, role_of
 from engine.bodies.files.track import NodeLine, line_as_told
 from engine.bodies.frame.frame import Place, Support, Vector
-from engine.bodies.frame.geometry import DIRECTIONS, unit
+from engine.bodies.frame.geometry import DIRECTIONS, across, unit
 from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_spot_name, check_square
 from engine.bodies.modal.modal_body import Array, Direction, ModalBody
@@ -30,6 +30,7 @@ from results_schema.quantities import OF_SECTION
 
 MAX_POINTS = 50
 MAX_TRACK = 1000
+_ROUNDED = 1e-9  # part of a unit vector that is rounding
 ALONG = 1e-3  # sine of the angle between track and load below which the load acts along the track
 _GROUP = re.compile(r"\d{1,18}(-\d{1,18})?(,\d{1,18}(-\d{1,18})?)*")
 
@@ -191,17 +192,24 @@ class Imported(Body):
         if spot.node not in self.model.nodes:
             raise BadInput("there is no such node", where="node", expected="its number", received=shortened(spot.node))
         place = int(np.flatnonzero(self.model.nodes == spot.node)[0])
-        rows = self.model.rows_of(place)[:3]
-        way = unit(self.gravity_direction if spot.direction is None else spot.direction)
-        held = {word for text in self.supports if place in self.group(text) for word in self.holds(text)}
-        free = [row >= 0 and not self.model.held[row] for row in rows]
-        if not any(way[axis] and free[axis] and DIRECTIONS[axis] not in held for axis in range(3)):
+        if not self._moves(place, unit(self.gravity_direction if spot.direction is None else spot.direction)):
             what = f"node {spot.node} does not move in this direction"
             raise BadInput(what, where="direction", expected="a direction that is not held", remedy="node elsewhere")
 
+    def _moves(self, place: int, way: Array) -> bool:
+        """Whether a node, by its place in the model's list, can move along a vector (3,)."""
+        held = {word for text in self.supports if place in self.group(text) for word in self.holds(text)}
+        free = [row >= 0 and not self.model.held[row] for row in self.model.rows_of(place)[:3]]
+        return any(abs(way[axis]) > _ROUNDED and free[axis] and DIRECTIONS[axis] not in held for axis in range(3))
+
     def check_inertia(self, direction: Direction) -> None:
-        if self.recorded is None:
-            check_square(direction, self.line.tangent, unit(self.direction), unit(self.gravity_direction))
+        if self.recorded is not None:
+            return
+        tangent, load = self.line.tangent, unit(self.direction)
+        way = tangent if direction == "along" else across(tangent, load)
+        if not any(self._moves(int(node), way) for node in self.line.nodes):
+            super().check_inertia(direction)
+        check_square(direction, tangent, load, unit(self.gravity_direction))
 
     def _check_track_rows(self) -> None:
         """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""

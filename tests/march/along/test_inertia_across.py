@@ -15,6 +15,7 @@ from engine.model.station_path import frozen
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies
+from engine.statics.directions import left_out
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_frequencies
 from results_schema.arrays import Array
@@ -253,7 +254,8 @@ def test_files_of_a_plane_are_refused(tmp_path: Path, monkeypatch: pytest.Monkey
     _, files = in_files(tmp_path)
     flat = files | {"supports": {"all": ["y", "rx", "rz"]}}
     with pytest.raises(BadInput, match=r"carriage\.car\.inertia_across: this body does not move across"):
-        base_scene(study({}, flat, carriage={"car": car(BRAKES, ("across",))}))
+        study({}, flat, carriage={"car": car(BRAKES, ("across",))})
+    assert left_out(study({}, flat, carriage={"car": car(BRAKES, ())})) == {"car": ("along",)}
 
 
 def test_a_track_that_rises_takes_the_inertia_across() -> None:
