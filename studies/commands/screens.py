@@ -174,9 +174,12 @@ def show_comparison(found: Comparison) -> None:
     if apart:
         blank()
         rows = [
-            (one.name, quantity(one.largest, one.units), _allowance(one), f"{one.beyond:,}", one.where) for one in apart
+            (one.name, *_quantities(one, *one.values, one.largest), _allowance(one), f"{one.beyond:,}") for one in apart
         ]
-        table("", ("result", "largest difference", "told errors there", "variants beyond these", "at"), rows)
+        title = "Where they differ most; beyond: variants that do by more than told errors"
+        table(title, ("result", "first", "second", "difference", "errors", "beyond"), rows)
+        ends = [(one.name, *_quantities(one, *one.extremes), one.where) for one in apart]
+        table("Values of largest size", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
         paragraphs(f"Only in one of them, or in another shape: {', '.join(found.only_in_one)}.")
     same = [one.name for one in found.differences if not one.largest]
@@ -188,6 +191,11 @@ def show_comparison(found: Comparison) -> None:
         paragraphs(
             f"Of {listed(blurred)} told errors are larger than the values, so that lying within them says nothing."
         )
+
+
+def _quantities(found: Difference, *values: float) -> Iterator[str]:
+    """Values of a result with their unit."""
+    return (quantity(value, found.units) for value in values)
 
 
 def _allowance(found: Difference) -> str:

@@ -29,17 +29,27 @@ class Change(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A result in both archives: the largest difference (second less first; NaN where one has no number), where, both
-    estimated errors together there (NaN: none is known), and in how many variants it is not known to lie within these.
-    blurred: whether these errors are larger than both values, so that nothing follows from lying within them."""
+    """A result in both archives: its values in the first and second where they differ most (NaN where one has no
+    number), where that is, both estimated errors together there (NaN: none is known), in how many variants it is not
+    known to lie within these, and its value of largest size in each."""
 
     name: str
     units: str
-    largest: float
+    values: tuple[float, float]
     where: str
     allowed: float
     beyond: int
-    blurred: bool
+    extremes: tuple[float, float]
+
+    @property
+    def largest(self) -> float:
+        """The largest difference: second less first."""
+        return 0.0 if np.array_equal(*self.values, equal_nan=True) else self.values[1] - self.values[0]
+
+    @property
+    def blurred(self) -> bool:
+        """Whether the errors are larger than both values, so that nothing follows from lying within them."""
+        return bool(self.largest and self.allowed > np.abs(self.values).max())
 
 
 @dataclass(frozen=True)
@@ -130,11 +140,14 @@ def _differences(first: Results, second: Results, names: list[tuple[Range, str]]
         place = tuple(map(int, np.unravel_index(int(np.argmax(apart)), apart.shape))) if apart.ndim else ()
         allowed = _allowed(first, second, found, apart)
         beyond = int(np.count_nonzero((apart != 0.0) & ~(apart <= allowed)))
-        where, differ = first.at(place[: len(first.dims)]), bool(apart[place])
-        size = max(abs(float(old[place])), abs(float(new[place])))
-        largest = float(new[place] - old[place]) if differ else 0.0
-        blurred = differ and bool(allowed[place] > size)
-        yield Difference(name, found.units, largest, where, float(allowed[place]), beyond, blurred)
+        values, extremes = (float(old[place]), float(new[place])), (_extreme(old), _extreme(new))
+        where = first.at(place[: len(first.dims)])
+        yield Difference(name, found.units, values, where, float(allowed[place]), beyond, extremes)
+
+
+def _extreme(values: Array) -> float:
+    """The value of largest size; NaN where there is none."""
+    return float(values.flat[np.argmax(np.where(np.isnan(values), -1.0, np.abs(values)))])
 
 
 def _of(results: Results, found: Range) -> xr.DataArray:

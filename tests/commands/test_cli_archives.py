@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from results_schema.store.archive import open_archive
 from studies.commands import catalogue
 from studies.commands.cli import main
 from studies.reporting.comparison import compare
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.runs.archived import results_of
 from tests.studies.small import SEPARATED, SMALL, write
@@ -115,6 +117,24 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     told = next(one for one in found.differences if one.name == "midspan_max")
     assert abs(told.largest) == pytest.approx(float(abs(apart).max()), rel=1e-12)
     assert [(change.key, change.first, change.second) for change in found.changes] == [("body.beam.modes", 4, 5)]
+
+
+def test_compare_shows_both_values_where_they_differ_most_and_both_of_largest_size(
+    here: Path, capsys: Captured
+) -> None:
+    write(here)
+    write(here, SMALL.replace("damping_ratio = 0.02", "damping_ratio = 0.03"), "damped.toml")
+    for name in ("small", "damped"):
+        assert main(["run", f"{name}.toml"]) == 0
+    shown = output(capsys, "compare", "small.nc", "damped.nc", code=3)
+    lines = shown.splitlines()
+    assert max(map(len, lines)) <= 80
+    told = [line for line in lines if line.startswith("midspan_max ")]
+    pair = [open_archive(f"{name}.nc").root.midspan_max.values for name in ("small", "damped")]
+    place = np.unravel_index(np.abs(pair[1] - pair[0]).argmax(), pair[0].shape)
+    apart = [quantity(float(value), "m") for value in (pair[0][place], pair[1][place], (pair[1] - pair[0])[place])]
+    assert re.split("  +", told[0])[1:4] == apart
+    assert re.split("  +", told[1])[1:3] == [quantity(float(values.max()), "m") for values in pair]
 
 
 def test_a_number_that_is_missing_in_one_archive_differs(here: Path, capsys: Captured) -> None:
