@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from results_schema.pieces import Pieces, no_row_of
+from results_schema.registry import Pieces, no_row_of
 
 
 class UniformSection(Protocol):

@@ -35,7 +35,7 @@ ROOMS = (
     *("engine.batch", "engine.methods", "engine.unreduced"),
     *("studies.results", "studies.protocol", "studies.findings", "studies.at_rest", "studies.precision"),
     *("studies.moving", "studies.robots"),
-    *("studies.maps", "studies.runs", "studies.pictures.common"),
+    *("studies.stability_maps", "studies.runs", "studies.pictures.common"),
     *("studies.pictures", "studies.kinds"),
     *("studies.reporting", "studies.commands", "studies"),
 )

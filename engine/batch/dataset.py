@@ -16,7 +16,7 @@ from engine.model.scene_model import SceneModel
 from engine.scene.sweep import Cases
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store.rows import Rows
 from results_schema.variables import Variable, axes, declarations, expand
 

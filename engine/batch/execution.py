@@ -14,7 +14,7 @@ import numpy as np
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job
-from engine.batch.places import Place, Shared, Threads, Where, cores, place, run_jobs
+from engine.batch.executors import Place, Shared, Threads, Where, cores, place, run_jobs
 from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
@@ -26,7 +26,7 @@ from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study
 from results_schema.arrays import Counts
 from results_schema.errors import Interrupted
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector
 
 Sink = Callable[[Chunk], object]

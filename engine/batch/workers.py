@@ -199,7 +199,7 @@ class Workers:
         *,
         grace: float = np.inf,
     ) -> Sequence[Counts]:
-        """As of `engine.batch.places.Place`; jobs in flight are not waited for."""
+        """As of `engine.batch.executors.Place`; jobs in flight are not waited for."""
         self._send(subject)
         key = self._key
         waiting, suspects = deque(map(_Try, jobs)), deque[_Try]()

@@ -23,7 +23,7 @@ from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
-    from engine.floating.rung import Rung
+    from engine.floating.model_choice import Rung
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 

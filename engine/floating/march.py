@@ -48,7 +48,7 @@ def march(
     fidelity: Fidelity = Fidelity.FRAME,
 ) -> Marched:
     """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending); fidelity: what
-    `engine.floating.rung` chose."""
+    `engine.floating.model_choice` chose."""
     V, h = values.size, duration / steps
     table = lanes(model, values, h)
     in_lanes = Lane(*map(in_blocks, table))

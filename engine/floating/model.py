@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.floating.attachments import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
 from engine.floating.bodies import elastic_body
 from engine.floating.elastic import CELLS, ElasticBody, Y, Z
-from engine.floating.grips import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
 from engine.floating.refusals import refuse_model, refuse_scene
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System

@@ -11,7 +11,7 @@ from engine.kernels.schemes import SCHEMES, USUAL_SCHEME, Scheme, SchemeRow
 from engine.study_file.spec import NUMBER, TABLE, WORD, Auto, Hint, Several, Spec, by_form, form_of, one_of
 from engine.study_file.units import Dimensionless, fault
 from results_schema.errors import shortened
-from results_schema.pieces import Pieces, no_row_of
+from results_schema.registry import Pieces, no_row_of
 
 #: The program's schemes and those of other packages.
 ALL_SCHEMES = Pieces(

@@ -13,7 +13,7 @@ from engine.study_file.document import Source
 from engine.study_file.spec import LIST, NUMBER, TABLE, WORD, Hint, KindOf, Noun, Spec, nearest
 from engine.study_file.units import Unit
 from results_schema.errors import BadInput, shortened
-from results_schema.pieces import ABSENT
+from results_schema.registry import ABSENT
 
 Keys = Sequence[str | int]
 

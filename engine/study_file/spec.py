@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 from engine.study_file.document import Beside
 from engine.study_file.units import fault
 from results_schema.errors import shortened
-from results_schema.pieces import ABSENT, Pieces, unfinished
+from results_schema.registry import ABSENT, Pieces, unfinished
 
 NUMBER, WORD, LIST, TABLE = "<number>", "<word>", "<list>", "<table>"
 

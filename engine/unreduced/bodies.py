@@ -30,7 +30,7 @@ from engine.unreduced.gauges import FullGauge, FullRead, full_gauge
 from engine.unreduced.track import SIDE_TRACKS, AlongTrack, FrameTrack, Rows, no_rows
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 BEAM_ELEMENTS = 64
 MOST_SUPPORTS = 50

@@ -25,7 +25,7 @@ from engine.unreduced.rows import Along, Readings, readings, rider_of, softness,
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.statics import level_readings, level_state, statics_at
 from results_schema.arrays import Array, Counts
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 BETA, GAMMA = 0.25, 0.5
 REGAIN = 0.05  # per step: the rate at which a rigid contact takes back its gap

@@ -21,7 +21,7 @@ from engine.scene.carriages import Contact, Suspension
 from engine.scene.study import Study
 from engine.unreduced.bodies import FullBody, Track, full_body
 from results_schema.arrays import Array
-from results_schema.late import linalg, sparse
+from results_schema.lazy_imports import linalg, sparse
 
 Link = Literal["force", "mass", "spring", "rigid", "push"]  # push: the inertia of a mass beside that along its loads
 

@@ -18,7 +18,7 @@ from engine.unreduced.rows import Along, at_positions, nowhere, readings, softne
 from engine.unreduced.scene import Unreduced
 from engine.unreduced.track import Rows
 from results_schema.arrays import Array, Counts
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 UNRESISTED = 1e-9  # of the largest: below it no contact resists a rigid-body motion
 BALANCED = 1e-7  # of the weight: more is a load that no contact carries

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from results_schema.errors import ArchiveError
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.reading import SCHEMA_VERSION, checked, groups_of, read_small_tables, verify

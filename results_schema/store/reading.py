@@ -14,7 +14,7 @@ import numpy as np
 
 from results_schema.blocks import CHUNK_BYTES, IN_MEMORY
 from results_schema.errors import ArchiveError, BadInput, WanderlastError
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store import files
 from results_schema.store.links import refuse_pointers
 from results_schema.store.tables import CONTENTS, DIGEST, Column, Numbers, Table, checksum, contents, digest
@@ -185,7 +185,7 @@ class _Left:
         """The array, or what reads it when it is asked for, with the checksum of what is there now."""
         if variable.dtype is str or math.prod(variable.shape) * variable.dtype.itemsize <= CHUNK_BYTES:
             return _all_of(variable)
-        from results_schema.store.on_disk import on_disk
+        from results_schema.store.arrays_on_disk import on_disk
 
         place = f"{variable.group().path.rstrip('/')}/{variable.name}"
         data = on_disk(variable.shape, variable.dtype, partial(self._part, place))

@@ -200,7 +200,7 @@ class RowsOnDisk:
 
     def array(self, name: str, shape: tuple[int, ...]) -> Any:
         """An array of a dataset over the grid of all variants, `shape`, that is read when it is asked for."""
-        from results_schema.store.on_disk import on_disk
+        from results_schema.store.arrays_on_disk import on_disk
 
         dtype, rest = self._kinds[name]
         return on_disk((*shape, *rest), dtype, partial(self._over_grid, name, shape))

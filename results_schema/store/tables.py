@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.blocks import BLOCK_BYTES, slices
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 
 CONTENTS = "contents"
 DIGEST = "contents_sha256"

@@ -21,7 +21,7 @@ from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
 from studies.at_rest.errors import PART, error_of, finer
 from studies.at_rest.labelling import Gathering, asked_coordinates

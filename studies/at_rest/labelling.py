@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.distinct_models import base_scene
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
 from results_schema.variables import axes
 from studies.at_rest.errors import PART

@@ -13,7 +13,7 @@ from results_schema.store.files import is_hdf5
 from studies.protocol.study import KINDS
 
 LIBRARY = Path(__file__).parents[1] / "library"
-STARTS = Path(__file__).parents[1] / "starts"
+STARTS = Path(__file__).parents[1] / "study_templates"
 MEASURED = LIBRARY / "measured.json"  # what `python -m tests.gallery` found of every built-in study
 EVERY_STUDY = STARTS / "every-study.part"
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from engine.accuracy.choice import PILOTS, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.batch.execution import warm_up
-from engine.batch.places import Shared, Threads
+from engine.batch.executors import Shared, Threads
 from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
 from studies.results.formatting import quantity

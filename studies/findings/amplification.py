@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.scene.study import Study
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
 from studies.results.places import Index, extreme
 from studies.results.results import Results

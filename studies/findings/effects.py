@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import ALIKE, listed, number, percent
 from studies.results.results import Results

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.results.formatting import counted, scientific
 from studies.results.results import Results

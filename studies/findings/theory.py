@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.model.scene_model import PROBED, UNFELT, SceneModel
 from results_schema.arrays import Array
-from results_schema.late import interpolate, xr
+from results_schema.lazy_imports import interpolate, xr
 from studies.results.results import Results
 
 CYCLE_POINTS = 720

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engine.observation.cycle_reduction import Compared, Cycle
 from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import AXES, MARCH, axes, declare

@@ -11,7 +11,7 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Time
 from results_schema.arrays import Array, Counts
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variables import declare
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather

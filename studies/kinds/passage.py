@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification

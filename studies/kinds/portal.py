@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from results_schema.variables import declare
 from studies.protocol.study import PiecedKind, question_of
 from studies.robots import findings
-from studies.robots.missed import told_missed
 from studies.robots.question import Question
+from studies.robots.tolerance_missed import told_missed
 from studies.robots.variables import RESULTS
 
 if TYPE_CHECKING:

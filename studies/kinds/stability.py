@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
 from results_schema.variables import declare
-from studies.maps.map_scene import Ground
-from studies.maps.mapping import Asked
-from studies.maps.table import MAPS
 from studies.protocol.parts import Piece, usual
 from studies.protocol.study import PiecedKind, question_of
+from studies.stability_maps.map_scene import Ground
+from studies.stability_maps.mapping import Asked
+from studies.stability_maps.table import MAPS
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage

@@ -13,7 +13,7 @@ from engine.study_file.spec import Spec, ascending, distinct, one_of
 from engine.study_file.units import fault
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
 from results_schema.variables import axes, declare
 from studies.precision import checks

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from engine.floating.converge import Converged
     from engine.floating.model import FloatingModel
-    from engine.floating.rung import Rung
+    from engine.floating.model_choice import Rung
     from engine.scene.study import Study
     from engine.scene.sweep import Cases
 
@@ -125,7 +125,7 @@ def results_names(model: FloatingModel) -> list[str]:
 
 def _rung(scene: Scene, cases: Cases, duration: Callable[[Mapping[str, Array], int], Array], longest: float) -> Rung:
     """The model of a scene, by pilots all over it, whichever of its variants are marched."""
-    from engine.floating.rung import PILOTS, choose
+    from engine.floating.model_choice import PILOTS, choose
     from engine.scene.variants import VariantValues
 
     pilots = scene.variants[spread(scene.variants.size, PILOTS)]
@@ -144,7 +144,7 @@ def _march(
     work: Work,
 ) -> xr.Dataset:
     """The results of some variants of one scene, whose longest takes so many seconds, on threads."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.batch.plan import shown
     from engine.floating.converge import converge
     from engine.floating.model import build
@@ -173,7 +173,7 @@ def again(
     study: Study, duration: Callable[[Mapping[str, Array], int], Array], variants: Counts, work: Work
 ) -> dict[int, tuple[Array, Array] | None]:
     """Observed and told errors of some variants, scene by scene on threads."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.floating.converge import observed
     from engine.scene.sweep import expand
     from engine.scene.variants import VariantValues

@@ -33,7 +33,7 @@ from studies.results.places import Index, extreme
 from studies.results.results import Results
 from studies.robots.findings import accuracy, of_front
 from studies.robots.limits import Limit, limits, longest_axis, words_of
-from studies.robots.missed import model_of
+from studies.robots.tolerance_missed import model_of
 
 MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES, MOST_MARKED = 6, 4, 3, 40, 12
 SIZE = 0.4  # of the distance between rails as drawn: how large the largest deflection is drawn at most

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from results_schema.late import xr
-from studies.maps.rigid import INERTIAL, STEPS
+from results_schema.lazy_imports import xr
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import (
     Figure,
@@ -24,6 +23,7 @@ from studies.pictures.common.figures import (
     zero_line,
 )
 from studies.results.formatting import counted, number, percent
+from studies.stability_maps.rigid import INERTIAL, STEPS
 
 NOTABLE = 1.1  # overshoot from which on a scheme gets a colour
 GROWS = 1.001  # per period: less is rounding

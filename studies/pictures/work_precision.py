@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, shades
 from studies.precision import findings as advice

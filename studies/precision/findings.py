@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Status
 from studies.precision.pareto import (
     Automatic,

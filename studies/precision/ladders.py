@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from engine.batch.places import Shared, Threads
+from engine.batch.executors import Shared, Threads
 from engine.batch.plan import make_plan
 from engine.march.tables import SceneTables
 from engine.methods.ode import ModalEquations

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 
 FORMAL_ORDERS = {"richardson": 4, "rk4": 4, "lagged-inertia": 1, "lagged-convective": 1}  # of all others 2
 SLOPES_ALIKE = 0.3  # of three or more errors, where their slope is the scheme's own within NEAR

@@ -29,7 +29,7 @@ from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
-from results_schema.late import interpolate
+from results_schema.lazy_imports import interpolate
 from results_schema.status import Status
 from studies.precision.variables import QUANTITIES
 from studies.protocol.parts import Work

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import Variable
 from results_schema.variables import axes
 from studies.protocol.parts import usual

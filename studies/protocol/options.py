@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from engine.batch.places import Where
+    from engine.batch.executors import Where
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """threads, workers, scheduler: as of `engine.batch.places.Where`. Raises BadInput for what cannot be."""
+    """threads, workers, scheduler: as of `engine.batch.executors.Where`. Raises BadInput for what cannot be."""
 
     overwrite: bool = False
     threads: int | None = None
@@ -19,7 +19,7 @@ class RunOptions:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        from engine.batch.places import check_place
+        from engine.batch.executors import check_place
 
         check_place(**self.where)
 

@@ -17,7 +17,7 @@ from engine.accuracy.jobs import Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Counts
 from results_schema.errors import Interrupted, WorkersGaveUp
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector, Gatherer, Rows, RowsOnDisk, joined
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
@@ -29,7 +29,7 @@ from studies.results.results import Results
 
 if TYPE_CHECKING:
     from engine.batch.execution import Progress
-    from engine.batch.places import Place
+    from engine.batch.executors import Place
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind
 
@@ -54,7 +54,7 @@ class Work:
         stage: Callable[[str], None] | None = None,
         place: Place | None = None,
     ) -> None:
-        from engine.batch.places import Threads, cores
+        from engine.batch.executors import Threads, cores
 
         self.place: Place = place or Threads(threads or cores())
         self.stop = stop or Stop()

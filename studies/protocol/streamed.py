@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Rows, RowsOnDisk, joined
 from studies.results.axes import VARIANT
 from studies.results.results import Results

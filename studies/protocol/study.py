@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput
-from results_schema.late import xr
-from results_schema.pieces import ABSENT, Pieces, lacks, no_row_of
+from results_schema.lazy_imports import xr
+from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
 
@@ -271,7 +271,7 @@ def run(study: Study, **options: Any) -> xr.Dataset:
 
     options: progress and chunk, and where to run, as of `engine.run`.
     """
-    from engine.batch.places import Where, place
+    from engine.batch.executors import Where, place
 
     started = time.perf_counter()
     parts, store = kind_of(study).parts(study), Memory()

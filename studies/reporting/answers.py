@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.findings.cells import findings_of_cells
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named

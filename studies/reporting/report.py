@@ -20,7 +20,7 @@ from markupsafe import Markup, escape
 
 from engine.study_file.document import Beside
 from results_schema.errors import BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.archive import Archive, open_archive

@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.scene.trains import axle_name
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error

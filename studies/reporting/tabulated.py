@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store import files
 from studies.results.axes import Axis
 from studies.results.results import Results

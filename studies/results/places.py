@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 
 Index = tuple[int, ...]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import LOST, Status, label
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.cells import counts_of

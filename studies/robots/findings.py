@@ -13,7 +13,7 @@ from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import listed, percent, quantity, spanned
 from studies.results.places import extreme
 from studies.robots.limits import DOING, told_limits
-from studies.robots.missed import model_of, told_missed
+from studies.robots.tolerance_missed import model_of, told_missed
 
 if TYPE_CHECKING:
     from studies.results.results import Results

@@ -67,7 +67,7 @@ def _converged(study: Study, question: Question, work: Work) -> Converged:
 
 def _march(study: Study, question: Question, cases: Cases, variants: Counts, work: Work) -> xr.Dataset:
     """The results of some variants, on threads."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.batch.plan import shown
 
     kept, found = set(shown(study, cases.size).tolist()), dict[int, dict[str, NDArray[Any]]]()
@@ -88,7 +88,7 @@ def _march(study: Study, question: Question, cases: Cases, variants: Counts, wor
 
 def again(study: Study, question: Question, variants: Counts, work: Work) -> dict[int, tuple[Array, Array] | None]:
     """Observed and told errors of some variants, on threads."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.robots.converge import observed
     from engine.scene.sweep import expand
 
@@ -130,7 +130,7 @@ def _traces(converged: Converged) -> dict[str, NDArray[Any]]:
 
 def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
     """Errors of all robots while one of them stands still where it starts, on threads."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.robots.results import DOING
 
     rows = dict[str, Array]()

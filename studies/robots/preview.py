@@ -65,7 +65,7 @@ def tables(study: Study) -> Iterator[TextTable]:
 
 def foreseen(study: Study, question: Question, threads: int, audited: int) -> Foreseen:
     """What a run takes, by some of its variants, which are marched as it does."""
-    from engine.batch.places import run_jobs
+    from engine.batch.executors import run_jobs
     from engine.bodies.modal.description import MAX_MODES
     from engine.robots.converge import Ladder, climb, converge
     from engine.robots.modes import MODES, open_bodies

@@ -11,7 +11,7 @@ import numpy as np
 from engine.bodies.modal.description import Recorded
 from engine.scene.study import Study
 from results_schema.errors import ArchiveError, BadInput
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store.archive import Archive
 from results_schema.validate import group_findings, root_findings
 from results_schema.variables import declarations

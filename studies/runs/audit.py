@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from engine.accuracy.jobs import Crashed, Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
 from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
@@ -100,7 +100,7 @@ def _again(parts: Pieces, variants: Counts, asked: Callable[[], bool], threads: 
 def _shared_out(plan: Plan, variants: Counts, work: Work) -> Audit:
     """The audit; variants that end every process that computes them so closely are left out."""
     from engine.batch.audit import audit
-    from engine.batch.places import Shared
+    from engine.batch.executors import Shared
 
     kept = variants
     while True:

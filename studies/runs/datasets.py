@@ -6,7 +6,7 @@ from pathlib import Path
 
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.store import files
 from results_schema.store.archive import Archive, write_archive
 from studies.protocol.study import kind_of

@@ -12,8 +12,8 @@ from engine.scene.motions.along_bodies import MOTIONS
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
 from results_schema.errors import BadInput
-from results_schema.pieces import Pieces
 from results_schema.quantities import QUANTITIES
+from results_schema.registry import Pieces
 from studies.protocol.study import KINDS
 
 PROGRAM = Path(__file__).parents[2]

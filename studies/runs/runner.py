@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from engine.batch.places import place
+from engine.batch.executors import place
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study

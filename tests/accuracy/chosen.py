@@ -9,7 +9,7 @@ from engine.accuracy.choice import Choice
 from engine.accuracy.reference import converge, in_full
 from engine.accuracy.results import differences, results_of
 from engine.batch.execution import execute
-from engine.batch.places import Shared, Threads
+from engine.batch.executors import Shared, Threads
 from engine.batch.plan import Plan, make_plan
 from engine.march.outcome import Flat
 from engine.scene.study import Study

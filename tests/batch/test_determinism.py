@@ -18,7 +18,7 @@ import engine.march.march
 from engine.accuracy.ladder import ladder_of
 from engine.batch.dataset import build
 from engine.batch.execution import execute, run
-from engine.batch.places import Threads
+from engine.batch.executors import Threads
 from engine.batch.plan import EVERY_MARCH, Plan, make_plan
 from engine.model.lane_table import LaneTable, to_blocks
 from engine.model.scene_model import SceneModel

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from engine.batch.execution import execute
-from engine.batch.places import Place, Threads
+from engine.batch.executors import Place, Threads
 from engine.batch.plan import make_plan
 from engine.batch.workers import on_this_machine
 from engine.kernels.schemes import SCHEMES

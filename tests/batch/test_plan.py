@@ -10,7 +10,7 @@ import pytest
 
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.batch.execution import run
-from engine.batch.places import run_jobs
+from engine.batch.executors import run_jobs
 from engine.batch.plan import LARGEST, make_plan, needed_memory
 from engine.batch.plausibility import REMARKS, remarks
 from engine.march.step_rules import MOST_STEPS

@@ -21,8 +21,8 @@ from engine.accuracy.jobs import Halted, Job
 from engine.batch import chunk as chunk_of_plan
 from engine.batch.chunk import march_chunk
 from engine.batch.execution import execute
+from engine.batch.executors import Place, Threads
 from engine.batch.handshake import check_computer, own_computer
-from engine.batch.places import Place, Threads
 from engine.batch.plan import Plan, make_plan
 from engine.batch.workers import Processes, Workers, of_scheduler, on_this_machine
 from engine.scene.study import Study

@@ -19,8 +19,8 @@ import numpy as np
 from engine.floating.converge import FIRST_MODES, converge, levels, weights
 from engine.floating.march import march
 from engine.floating.model import FloatingModel, build
+from engine.floating.model_choice import choose
 from engine.floating.results import Outcome, differences, outcome, results_of
-from engine.floating.rung import choose
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.scene.study import Study, load

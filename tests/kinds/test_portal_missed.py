@@ -14,7 +14,7 @@ from results_schema.status import Status
 from studies.commands.cli import main
 from studies.protocol.study import kind_of
 from studies.results.results import Results
-from studies.robots.missed import told_missed
+from studies.robots.tolerance_missed import told_missed
 from tests.robots.scenes import ARM, drive, scene
 
 LIFTS = [

@@ -12,14 +12,14 @@ import engine
 import studies
 from results_schema.errors import BadInput
 from studies.kinds.stability import KIND
-from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
-from studies.maps.map_scene import Ground, threshold
-from studies.maps.methods import METHODS, hht
-from studies.maps.table import MAPS
 from studies.protocol.parts import Work
 from studies.protocol.study import kind_of, question_of
 from studies.reporting import report
 from studies.results.results import Results
+from studies.stability_maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
+from studies.stability_maps.map_scene import Ground, threshold
+from studies.stability_maps.methods import METHODS, hht
+from studies.stability_maps.table import MAPS
 from tests.bodies import frames
 from tests.engine.build import beam
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from studies.maps import alias, frozen, rigid, separation, shuttle
+from studies.stability_maps import alias, frozen, rigid, separation, shuttle
 
 
 def alias_said(*growth: tuple[float, float, float]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.batch.execution import execute, run
-from engine.batch.places import Threads
+from engine.batch.executors import Threads
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput

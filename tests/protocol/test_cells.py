@@ -12,7 +12,7 @@ import xarray as xr
 import engine
 import studies
 from engine.accuracy.jobs import Job
-from engine.batch.places import Threads
+from engine.batch.executors import Threads
 from engine.batch.plan import Plan
 from engine.scene.study import Study
 from results_schema.arrays import Counts

@@ -17,8 +17,8 @@ from engine.scene.carriages import CARRIAGES
 from engine.scene.motions.along_bodies import MOTIONS
 from engine.scene.settings import ALL_SCHEMES
 from results_schema.errors import BadInput
-from results_schema.pieces import Pieces
 from results_schema.quantities import QUANTITIES
+from results_schema.registry import Pieces
 from studies.protocol.study import KINDS
 from tests.studies import scenes
 

@@ -12,7 +12,7 @@ from engine.accuracy.choice import Pilots
 from engine.accuracy.jobs import Job
 from engine.accuracy.ladder import Rungs
 from engine.accuracy.reference import Marches
-from engine.batch.places import Threads
+from engine.batch.executors import Threads
 from engine.scene.study import Study
 from results_schema.errors import Interrupted
 from results_schema.store.parts import PartStore

@@ -12,7 +12,7 @@ import studies
 from engine.batch import plan
 from results_schema import blocks
 from results_schema.errors import ArchiveError, BadInput
-from results_schema.store import files, on_disk, parts, reading, rows, tables
+from results_schema.store import arrays_on_disk, files, parts, reading, rows, tables
 from results_schema.store.archive import open_archive
 from results_schema.store.rows import Rows, RowsOnDisk
 from results_schema.store.tables import Column, Table, seal
@@ -171,9 +171,9 @@ def test_slices_of_what_is_on_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
         return numbers[(rows, *at)].copy()
 
     for most in (0, 2**20):
-        monkeypatch.setattr(on_disk, "RECENT_BYTES", most)
-        array = on_disk.OnDisk(numbers.shape, numbers.dtype, read)
-        variable = tables.xr.Variable(("x", "y", "z"), on_disk.indexing.LazilyIndexedArray(array))
+        monkeypatch.setattr(arrays_on_disk, "RECENT_BYTES", most)
+        array = arrays_on_disk.OnDisk(numbers.shape, numbers.dtype, read)
+        variable = tables.xr.Variable(("x", "y", "z"), arrays_on_disk.indexing.LazilyIndexedArray(array))
         for key in (
             (slice(2, 5),),
             (7, 1, 2),
@@ -193,7 +193,7 @@ def test_an_archive_that_is_replaced_while_it_is_read_is_no_mixture(
 ) -> None:
     path = ran("passage", tmp_path / "a.nc")
     on_disk_alone(monkeypatch)
-    monkeypatch.setattr(on_disk, "RECENT_BYTES", 0)
+    monkeypatch.setattr(arrays_on_disk, "RECENT_BYTES", 0)
     root = open_archive(path).root
     assert root["midspan_max"].values.size == 100
     files.write_whole(path, lambda temporary: temporary.write_bytes(path.read_bytes()))
@@ -204,7 +204,7 @@ def test_an_archive_that_is_replaced_while_it_is_read_is_no_mixture(
 def test_memory_holds_a_few_arrays_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """24 arrays of 4 MB through a file into an archive, and out of it: less than 24 MB at any time."""
     monkeypatch.setattr(reading, "IN_MEMORY", 0)
-    monkeypatch.setattr(on_disk, "RECENT_BYTES", 2**23)
+    monkeypatch.setattr(arrays_on_disk, "RECENT_BYTES", 2**23)
     monkeypatch.setattr(tables, "BLOCK_BYTES", 2**20)
     for module in (blocks, rows):
         monkeypatch.setattr(module, "BLOCK_BYTES", 2**21)

@@ -25,7 +25,7 @@ from engine.bodies.beam.statics import Restraint, rigid_body_modes
 from engine.bodies.modal.modal_body import Array
 from engine.kernels.shapes import Span, beam_shapes
 from engine.linear_algebra import one_thread
-from results_schema.late import linalg
+from results_schema.lazy_imports import linalg
 
 _LAST_BIT = 1e-17
 SHARED = 32  # modes that a body is decomposed into at least: studies ask for few and for many of the same one

@@ -22,7 +22,7 @@ from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import Line, file_bytes, read_lines, read_paths, real, whole, written
 from engine.bodies.files.track import line_as_told
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 _HEAD = re.compile(r"\s*NBLOCK\s*,\s*(\d+)\s*(?:,\s*(\w*)\s*(?:,\s*(\d*)\s*(?:,\s*(\d*)\s*)?)?)?$", re.IGNORECASE)
 _FORMAT = re.compile(

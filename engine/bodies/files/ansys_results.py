@@ -19,7 +19,7 @@ from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.track import NodeLine
 from results_schema.arrays import Mask
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 COMPONENTS = ("x", "y", "z", "xy", "yz", "xz")
 DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}

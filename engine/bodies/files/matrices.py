@@ -12,7 +12,7 @@ import numpy as np
 from engine.bodies.files.model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
 from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 _SPARSE = ("csr", "csc", "coo")
 _MODAL = ("0", "q", "modal")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -18,7 +18,7 @@ from engine.bodies.files.model import Array, FileModel, checked, hashes_of, turn
 from engine.bodies.files.optional_packages import extra, foreign
 from engine.bodies.files.text import file_bytes, read_lines, read_paths, written
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 Row = tuple[int, int]  # a node and a direction 1 to 6, or a scalar point and 0
 PAIRS = (("kaa", "maa"), ("kxx", "mxx"), ("kaax", "maax"), ("kgg", "mgg"), ("k2gg", "m2gg"))

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from engine.bodies.frame.elements import Beams, consistent_mass, lumped_mass, stiffness
 from engine.bodies.frame.geometry import DIRECTIONS, member_axes, member_ends
 from engine.bodies.modal.modal_body import Array
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 if TYPE_CHECKING:
     from engine.bodies.frame.frame import Frame

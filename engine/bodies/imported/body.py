@@ -31,7 +31,7 @@ from engine.bodies.modal.description import AUTO_MODES, Spots
 from engine.bodies.modal.flexibility import Flexibility, solving
 from engine.bodies.modal.modal_body import Array, Direction, Gauge, ModalBody, Points, Sections
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported

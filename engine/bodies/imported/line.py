@@ -23,7 +23,7 @@ from engine.bodies.imported.model import HeldModel
 from engine.bodies.modal.modal_body import Array, Direction, refuse_loose
 from engine.kernels.shapes import combined_rows
 from results_schema.errors import BadInput
-from results_schema.late import interpolate, sparse
+from results_schema.lazy_imports import interpolate, sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported

@@ -17,7 +17,7 @@ from engine.bodies.modal.flexibility import Flexibility, factorised, symmetric_l
 from engine.bodies.modal.modal_body import Array
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
-from results_schema.late import linalg, sparse
+from results_schema.lazy_imports import linalg, sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported

@@ -17,7 +17,7 @@ from engine.bodies.modal.flexibility import factorised
 from engine.bodies.modal.modal_body import Array
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
-from results_schema.late import sparse
+from results_schema.lazy_imports import sparse
 
 
 @dataclass(frozen=True, eq=False)

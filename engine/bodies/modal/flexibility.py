@@ -17,7 +17,7 @@ import numpy as np
 from engine.bodies.modal.modal_body import Array
 from engine.linear_algebra import one_thread
 from results_schema.errors import BadInput, shortened
-from results_schema.late import linalg, sparse
+from results_schema.lazy_imports import linalg, sparse
 
 DENSE = 200  # degrees of freedom up to which all eigenvalues are computed
 _COLUMNS = 64  # right-hand sides solved at a time

@@ -16,7 +16,7 @@ from engine.scene.motions.point_to_point import PointToPoint
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, Several, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
-from results_schema.late import interpolate
+from results_schema.lazy_imports import interpolate
 
 
 class Cruise(Motion):

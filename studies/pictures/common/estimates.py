@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.findings.numerics_used import is_marched, known
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, draw, legend_beside, logarithmic, on_method

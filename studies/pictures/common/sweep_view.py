@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 
 from results_schema.arrays import Array, Counts, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from studies.pictures.common.figures import BLUE, VERMILION, Figure, draw, legend_of_all, note, on_method, zero_line
 from studies.results.formatting import counted, percent, scale_for
 from studies.results.results import Results

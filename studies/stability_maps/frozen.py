@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, dataset_of
 from studies.protocol.parts import Work
 from studies.results.formatting import counted, number, percent
+from studies.stability_maps.map_scene import GROWS, Ground, MapScene, threshold
+from studies.stability_maps.mapping import Asked, Map, dataset_of
 
 STEPS = 2000  # per passage
 SLOWEST, FASTEST = 0.3, 1.2  # speed ratio times the root of the mass ratio

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from results_schema.arrays import Array
-from studies.maps.map_scene import AVERAGE
+from studies.stability_maps.map_scene import AVERAGE
 
 if TYPE_CHECKING:
     from engine.methods.comparison import ComparisonScheme

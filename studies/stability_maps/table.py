@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from studies.maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
-from studies.maps.mapping import Map
+from studies.stability_maps import alias, frozen, lagged, overshoot, rigid, schemes, separation, shuttle
+from studies.stability_maps.mapping import Map
 
 MAPS: Mapping[str, Map] = {
     module.MAP.name: module.MAP for module in (schemes, lagged, alias, shuttle, frozen, separation, overshoot, rigid)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of
-from studies.maps.methods import LABELS, METHODS, Method
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number
+from studies.stability_maps.map_scene import Ground, MapScene
+from studies.stability_maps.mapping import Asked, Map, dataset_of
+from studies.stability_maps.methods import LABELS, METHODS, Method
 
 FIRST_STEPS = 20
 FREQUENCY_STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # omega h

@@ -9,12 +9,12 @@ import numpy as np
 
 from engine.kernels.layout import BELOW_AT, SMALLEST
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of
 from studies.protocol.parts import Work
 from studies.results.formatting import counted, listed, number, percent, spanned
+from studies.stability_maps.map_scene import Ground, MapScene
+from studies.stability_maps.mapping import Asked, Map, dataset_of
 
 MODES, STEPS = 20, 6000
 SLOWEST, FASTEST = 0.05, 1.5  # speed ratios

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of, times
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number, percent
+from studies.stability_maps.map_scene import Ground, MapScene
+from studies.stability_maps.mapping import Asked, Map, dataset_of, times
 
 MODES, STEPS = 3, 600
 SLOWEST, FASTEST, HEAVIEST = 0.3, 1.4, 1.0  # frequency ratios, mass ratio

@@ -10,11 +10,11 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, Strict
 
 from engine.study_file.spec import Spec, distinct
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variables import Variable, axes
-from studies.maps.map_scene import Ground
 from studies.protocol.parts import Work
 from studies.results.formatting import number
+from studies.stability_maps.map_scene import Ground
 
 Part = Annotated[float, Field(gt=0, le=100)]
 Parts = Annotated[tuple[Part, ...], Strict(False), Field(min_length=1, max_length=40), AfterValidator(distinct)]

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, dataset_of
-from studies.maps.methods import LABELS, METHODS, Method
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number
+from studies.stability_maps.map_scene import GROWS, Ground, MapScene, threshold
+from studies.stability_maps.mapping import Asked, Map, dataset_of
+from studies.stability_maps.methods import LABELS, METHODS, Method
 
 STEPS = 50  # marched for the measured growth
 SMALLEST, LARGEST, FAR = 0.1, 20.0, 1000.0  # omega h: of the map, and up to where a limit is looked for

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import Ground
-from studies.maps.mapping import Asked, Map, dataset_of
-from studies.maps.methods import METHODS, Method
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number, percent
+from studies.stability_maps.map_scene import Ground
+from studies.stability_maps.mapping import Asked, Map, dataset_of
+from studies.stability_maps.methods import METHODS, Method
 
 MODES, STEPS, COUNTED = 8, 400, 0.98
 INERTIAL = "as inertia"

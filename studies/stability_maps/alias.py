@@ -9,13 +9,13 @@ import numpy as np
 
 from engine.march.step_rules import alias_steps
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import Ground, MapScene
-from studies.maps.mapping import Asked, Map, dataset_of, times
-from studies.maps.methods import hht
 from studies.protocol.parts import Work
 from studies.results.formatting import counted, number, percent
+from studies.stability_maps.map_scene import Ground, MapScene
+from studies.stability_maps.mapping import Asked, Map, dataset_of, times
+from studies.stability_maps.methods import hht
 
 FEW, MANY, SAFE = (0.3, 0.9), 1.1, 1.5  # times the rule's steps
 MASSES = (0.25, 0.5, 1.0)  # mass ratios: heavy enough to show it, and light enough for passages not to grow

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from results_schema.arrays import Array
-from results_schema.late import xr
+from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
-from studies.maps.map_scene import GROWS, Ground, MapScene, threshold
-from studies.maps.mapping import Asked, Map, dataset_of
 from studies.protocol.parts import Work
 from studies.results.formatting import listed, number
+from studies.stability_maps.map_scene import GROWS, Ground, MapScene, threshold
+from studies.stability_maps.mapping import Asked, Map, dataset_of
 
 LIGHTEST, HEAVIEST = 0.01, 3.0  # mass ratios
 SHOWN = (1, 3, 5, 10, 20)

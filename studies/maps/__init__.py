@@ -1,1 +1,0 @@
-"""The maps of the kind "stability", one file each, listed in `studies.maps.table`."""
