@@ -16,7 +16,7 @@ from studies.results.results import Results
 (DYNAMIC_AMPLIFICATION,) = outputs("""
     dynamic_amplification | sensor | | nan | dynamic amplification
         largest absolute value over the largest absolute static value of the same model; NaN where the static value is
-        zero (velocities, accelerations)
+        zero (velocities, accelerations); both with the body's own weight where own_weight = true
 """)
 
 
@@ -51,6 +51,12 @@ def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
         dynamic_amplification=(joined.dims, joined.values, DYNAMIC_AMPLIFICATION.attributes()),
     )
     return with_derived_errors(found, derived_from(study))
+
+
+def with_own_weight(study: Study, sensor: str) -> str:
+    """That both parts of a sensor's amplification count own weight, to stand behind it; "" where that does not act."""
+    weighs = study.body[study.body_of(sensor)].own_weight and not study.sensor[sensor].reads.of_contact
+    return " (own weight in both)" if weighs else ""
 
 
 def derived_from(study: Study) -> Mapping[str, tuple[str, ...]]:

@@ -17,7 +17,7 @@ from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import AXES, MARCH, axes, declare
 from studies.findings import indices, theory
-from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
 from studies.findings.peaks import PEAKS, peaks
 from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
@@ -287,7 +287,7 @@ def _amplified(results: Results, sensor: str) -> list[str]:
     if top is None:
         return []
     result = f"dynamic_amplification {sensor}"
-    loosely = uncertainty(results, result, top)
+    loosely = with_own_weight(results.study, sensor) + uncertainty(results, result, top)
     said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{loosely}{in_words(results, top)}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]

@@ -11,7 +11,7 @@ from results_schema.arrays import Array, Mask
 from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
-from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification, with_own_weight
 from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
 from studies.findings.effects import told_effects, unchanged
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -93,6 +93,7 @@ def _largest(results: Results, sensor: str) -> str:
         return f"{said}{where}."
     static = sizes(results, sensor)[best] / gain[best]
     amplified = f"{number(float(gain[best]))} times the static {quantity(float(static), results.sensors[sensor])}"
+    amplified += with_own_weight(results.study, sensor)
     if best == top:
         return f"{said}, {amplified},{where}."
     loosely = uncertainty(results, f"dynamic_amplification {sensor}", best)

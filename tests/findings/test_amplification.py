@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.findings.amplification import with_derived_errors
+import studies
+from engine.scene.study import Study, load
+from studies.findings.amplification import sizes, with_derived_errors
+from studies.protocol.study import kind_of
+from studies.results.results import Results
 from tests.studies import scenes
 
 
@@ -20,6 +24,25 @@ def test_the_error_of_an_amplification_is_the_larger_of_both_extremes(kind: str,
         assert float(found.tolerance.sel(result=f"dynamic_amplification {sensor}")) == 1e-3
     assert found.estimated_error.dtype == np.float32 and found.estimated_error.dims[-1] == "result"
     assert found.result.attrs["long_name"] == "reported number"
+
+
+@pytest.mark.parametrize("kind", ["passage", "double-peak"])
+def test_the_answer_says_that_own_weight_counts_in_an_amplification(kind: str) -> None:
+    """With the sag 5 rho A g L^4/(384 E I) of a pinned beam in the static value too."""
+    light, heavy = (study_of(kind, own) for own in ("false", "true"))
+    static = []
+    for study in (light, heavy):
+        found = Results.of(studies.run(study))
+        gain = float(found.dataset["dynamic_amplification"].sel(sensor="midspan"))
+        static.append(float(sizes(found, "midspan")) / gain)
+        (said,) = (one for one in kind_of(study).findings(found) if "times the static" in one and "midspan" in one)
+        assert ("(own weight in both)" in said) == (study is heavy)
+    sag = 5.0 * 7850.0 * 0.01 * 9.80665 * 10.0**4 / (384.0 * 210e9 * 8e-6)
+    assert static[1] - static[0] == pytest.approx(sag, rel=1e-3)
+
+
+def study_of(kind: str, own_weight: str) -> Study:
+    return load(scenes.text_of(kind).replace("modes = 3", f"modes = 3\nown_weight = {own_weight}"))
 
 
 def test_an_error_that_is_not_known_stays_so() -> None:
