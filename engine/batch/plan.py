@@ -26,7 +26,8 @@ from engine.march.outcome import Asked
 from engine.march.step_rules import check_even_steps, check_free_vibration, check_most_steps, check_slowest, check_steps
 from engine.march.tables import SceneTables
 from engine.model.distinct_models import base_scene, scenes, split
-from engine.model.scene_model import SceneModel, check_moves
+from engine.model.refusals import check_moves
+from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
 from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, REST_STATIONS, WHOLE_STATIONS, counts_shown

@@ -253,7 +253,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
 
 def kind_of(study: Study) -> Kind:
     """The kind of a study, after its check. Raises BadInput."""
-    from engine.model.scene_model import check_stands
+    from engine.model.refusals import check_stands
 
     kind = kind_named(study.kind, study.source.where("kind"))
     if not kind.moves_frames:
