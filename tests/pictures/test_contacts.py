@@ -8,7 +8,7 @@ import pytest
 from studies.pictures.common.figures import Figure
 from studies.pictures.passage import pictures
 from studies.results.results import Results
-from tests.kinds.test_kinds import FOLLOWER, MASSES
+from tests.findings.test_answers import FOLLOWER, MASSES
 from tests.studies import scenes
 
 PACE = scenes.pace("passage", 2, 40, 8)
