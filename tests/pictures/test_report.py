@@ -103,8 +103,8 @@ def test_the_page_opens_with_six_figures_at_most_and_folds_methods(tmp_path: Pat
     found = answers.figures(dataset)
     text = write_report(archive(tmp_path, dataset), tmp_path / "out").read_text(encoding="utf-8")
     unfolded = re.sub(r"<details.*?</details>", "", text, flags=re.DOTALL)
-    assert unfolded.count("<figure>") == min(6, sum(not figure.on_method for figure in found))
-    assert text.count("<figure>") == len(found) and any(figure.on_method for figure in found)
+    assert unfolded.count("<figure id=") == min(6, sum(not figure.on_method for figure in found))
+    assert text.count("<figure id=") == len(found) and any(figure.on_method for figure in found)
     assert "<h2>Answer</h2>" in unfolded and "How exact, and how it was computed" not in unfolded
     assert "<th>5 %</th><th>50 %</th>" in unfolded
     # a value and its error break between them alone, and stand beside the sensor that they are of
