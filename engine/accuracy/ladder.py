@@ -226,8 +226,8 @@ class Climb:
         self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        for swift in (True, False):
-            for marches in self.share(self.rungs, list(self._climbs(swift))):
+        for scheme in reversed(dict.fromkeys(numerics.scheme for numerics in self.ladder.columns)):
+            for marches in self.share(self.rungs, list(self._climbs(scheme))):
                 self._take(marches)
         for name, enough in self.enough.items():
             self._fill(name, enough)
@@ -275,21 +275,25 @@ class Climb:
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
 
-    def _climbs(self, swift: bool) -> Iterator[Job[list[March]]]:
-        """Of all columns of the last scheme, or of the others, that can hold the tolerance of some pilots at all."""
+    def _climbs(self, scheme: Scheme) -> Iterator[Job[list[March]]]:
+        """Of all columns of a scheme that can hold the tolerance of some pilots at all, as far as no other scheme holds
+        well for all with less work."""
         for column, floor in self.floor.items():
             numerics = self.ladder.columns[column]
             worth = np.flatnonzero(floor <= HOPELESS * self.span[1])
-            if worth.size and swift == (numerics.scheme is self.ladder.columns[-1].scheme):
-                most = np.inf if swift else self._least_work(numerics.fidelity)
+            if worth.size and numerics.scheme == scheme:
+                most = self._least_work(numerics)
                 yield Job(partial(Rungs.climb, column=column, floor=floor, most=most), worth)
 
-    def _least_work(self, name: str) -> float:
-        """Modes x steps of the cheapest rung of a model that holds well for all pilots; infinite where none does."""
-        own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
-        holds = np.all(self.held[own] <= LEAVES * self.span[0], axis=2)
-        work = np.stack([self.rungs.work(column) for column in own])
-        return float(np.min(np.where(holds, work, np.inf)))
+    def _least_work(self, beside: Numerics) -> float:
+        """Modes x steps of the cheapest marched rung of the same model by other schemes that holds well for all pilots;
+        infinite where none does."""
+        least = np.inf
+        for column, numerics in enumerate(self.ladder.columns):
+            if numerics.fidelity == beside.fidelity and numerics.scheme != beside.scheme:
+                holds = np.all(self.held[column] <= LEAVES * self.span[0], axis=1)
+                least = min(least, float(self.rungs.work(column)[holds].min(initial=np.inf)))
+        return least
 
     def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
         """March some pilots on each of some rungs."""
