@@ -173,11 +173,9 @@ def show_comparison(found: Comparison) -> None:
     apart = [one for one in found.differences if one.largest]
     if apart:
         blank()
-        rows = [
-            (one.name, *_quantities(one, *one.values, one.largest), _allowance(one), f"{one.beyond:,}") for one in apart
-        ]
+        rows = [(one.name, *_quantities(one, *one.values), *_beside(one), f"{one.beyond:,}") for one in apart]
         title = "Where they differ most; beyond: variants that do by more than told errors"
-        table(title, ("result", "first", "second", "difference", "errors", "beyond"), rows)
+        table(title, ("result", "first", "second", "apart", "errors", "beyond"), rows)
         ends = [(one.name, *_quantities(one, *one.extremes), one.where) for one in apart]
         table("Values of largest size", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
@@ -198,9 +196,11 @@ def _quantities(found: Difference, *values: float) -> Iterator[str]:
     return (quantity(value, found.units) for value in values)
 
 
-def _allowance(found: Difference) -> str:
-    """Both told errors of a result together, where it differs most."""
-    return quantity(found.allowed, found.units, 2) if math.isfinite(found.allowed) else "unknown"
+def _beside(found: Difference) -> Iterator[str]:
+    """How far both values of a result are apart where they differ most (0: rounding beside its largest), and both told errors
+    together there."""
+    yield quantity(found.largest, found.units, beside=max(map(abs, found.extremes)))
+    yield quantity(found.allowed, found.units, 2) if math.isfinite(found.allowed) else "unknown"
 
 
 def _value(value: Any) -> str:
