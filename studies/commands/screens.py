@@ -197,7 +197,7 @@ def _quantities(found: Difference, *values: float) -> Iterator[str]:
 
 
 def _beside(found: Difference) -> Iterator[str]:
-    """How far both values of a result are apart where they differ most (0: rounding beside its largest), and both told errors
+    """How far both values of a result are apart where they differ most (0: rounding beside its largest), and its errors
     together there."""
     yield quantity(found.largest, found.units, beside=max(map(abs, found.extremes)))
     yield quantity(found.allowed, found.units, 2) if math.isfinite(found.allowed) else "unknown"
