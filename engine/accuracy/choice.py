@@ -17,120 +17,20 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
 from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
-from engine.accuracy.reference import DOUBTED
-from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
-from engine.kernels.nearest_pilots import cheapest, held_errors, nearest, told_errors
+from engine.accuracy.neighbour_errors import (
+    TELLING,
+    NeighbourErrors,
+    Numbers,
+    Places,
+    nearest_others,
+    neighbour_errors_of,
+)
+from engine.accuracy.results import Result, results_of
+from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
 from engine.scene.sweep import Cases
 from engine.scene.variants import VariantValues, axes_of_scene, cases_tolerance
 from results_schema.arrays import Array, Counts
-
-Numbers = NDArray[np.int32]
-
-#: Of the estimated errors for pilots that were left out are no smaller than the true ones: 0.993 doubled the work of
-#: `double-peak`, and told hardly better (displacements of 12 random scenes 2.0 % below the true errors, not 2.5 %).
-SURE = 0.985
-TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 some variants of `double-peak` missed it
-
-
-@dataclass(frozen=True, eq=False)
-class NeighbourErrors:
-    """What pilots tell their neighbours. error (M, R) told by each of their marches; held (P, 2, columns x cuts): the
-    errors that are held over their tolerances, of those that follow the study's and of those that have their own;
-    wanted: the same by which it is decided."""
-
-    error: Array
-    held: Array
-    wanted: Array
-
-    def errors(self, march: Numbers, rung: Numbers, neighbours: Numbers) -> Array:
-        """(R, V) estimated errors by the marches (columns x cuts, P) of neighbours (V, k) that tell of a variant's
-        rung; NaN where no estimate exists."""
-        found = np.empty((self.error.shape[1], rung.size))
-        told_errors(self.error, march, rung, neighbours, found)
-        return found
-
-    def worst(self, rung: Numbers, neighbours: Numbers, tighter: Array) -> Array:
-        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
-        `solver.tolerance` of the variants over the study's."""
-        found = np.empty(rung.size)
-        held_errors(self.held, rung, neighbours, tighter, found)
-        return found
-
-
-def neighbour_errors_of(
-    asked: Asked, measured: Measured, others: Numbers, span: tuple[float, float]
-) -> NeighbourErrors:
-    """What pilots tell whose neighbours among each other are others (P, k). span: the least and the largest
-    `solver.tolerance` of the study's variants over its own."""
-    results = results_of(asked)
-    decisive = deciding(results, asked.study.solver.tolerance)
-    follow = tuple(r if r.follows else r._replace(tolerance=np.nan) for r in decisive)
-    parts = follow, tuple(r._replace(tolerance=np.nan) if r.follows else r for r in decisive)
-    telling = TELLING[0] * span[0], TELLING[1] * span[1]
-    whole = worst_held(measured.error.T, decisive)[measured.march]  # with what the study fixes
-    margin, worst_margin = _margins(measured, whole, others, telling)
-    margin = np.where(np.isfinite(tolerances(decisive)), worst_margin, margin)
-    error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
-    if measured.free:  # what is told is what decides
-        wanted = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
-        held, wanted = (_by_rung([worst_held(e.T, part)[measured.march] for part in parts]) for e in (error, wanted))
-    else:
-        _, held_margin = _margins(measured, measured.held, others, telling)
-        held = _by_rung(
-            [np.where(np.isfinite(tolerances(part)).any(), held_margin * measured.held, 0.0) for part in parts]
-        )
-        wanted = held
-    return NeighbourErrors(error, held, wanted)
-
-
-def _settled(measured: Measured, results: tuple[Result, ...], least: float) -> Array:
-    """(P, R) errors of references; those that are off by more than they may ever be count as if they were not, as
-    dearer marches of their neighbours could hardly be told to hold."""
-    most: Array = np.array([DOUBTED * r.tolerance * (least if r.follows else 1.0) for r in results])
-    return np.where(most < measured.reference.T, 0.0, measured.reference.T)
-
-
-def worst_but_one(errors: Array, axis: int) -> Array:
-    """The largest but one along an axis, the only one where there is one; NaN counts as the largest."""
-    place = max(0, errors.shape[axis] - 2)
-    return np.asarray(np.take(np.partition(errors, place, axis=axis), place, axis=axis))
-
-
-def nearest_others(pilots: Array, count: int) -> Numbers:
-    """(P, count or fewer) the nearest of pilots (D, P) to each, but itself."""
-    found = np.empty((pilots.shape[1], min(count + 1, pilots.shape[1])), dtype=np.int32)
-    nearest(np.ascontiguousarray(pilots.T), pilots, found)
-    return found[:, 1:]
-
-
-def _by_rung(held: Sequence[Array]) -> Array:
-    """(P, 2, columns x cuts) both parts of what is held; pilots without a truth say nothing."""
-    found = np.stack(held)
-    found = np.where(found > 0.0, found, 0.0).reshape(2, -1, found.shape[-1])
-    return np.ascontiguousarray(np.moveaxis(found, -1, 0))
-
-
-def _margins(measured: Measured, worst: Array, others: Numbers, telling: tuple[float, float]) -> tuple[Array, float]:
-    """(R,) what a pilot's neighbours tell of its errors must be multiplied with to be no less than these, for all but a
-    few; and the same of the ``worst`` (columns, cuts, P) of some of them, where these matter on rungs that variants may
-    take."""
-    if not others.shape[1]:
-        return np.ones(measured.error.shape[1]), 1.0
-    worst, held, march = worst[measured.marched], measured.held[measured.marched], measured.march[measured.marched]
-    most, most_held = (worst_but_one(part[:, others], axis=2) for part in (worst, held))
-    matter = np.isfinite(most) & np.isfinite(worst) & (most > telling[0])
-    near = np.nonzero(matter & (most_held < telling[1]))
-    own = measured.error[march[near]]
-    tell = worst_but_one(measured.error[march[near[0][:, None], others[near[1]]]], axis=1)
-    return np.array([_quantile(*pair) for pair in zip(own.T, tell.T, strict=True)]), _quantile(worst[near], most[near])
-
-
-def _quantile(own: Array, told: Array) -> float:
-    """The ratio of errors to what is told of them that few are beyond."""
-    known = (told > 0.0) & np.isfinite(own) & np.isfinite(told)
-    return float(max(1.0, np.quantile(own[known] / told[known], SURE))) if known.any() else 1.0
-
 
 SEED = 20261122  # of the pilots; audits have another
 PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times
@@ -151,28 +51,30 @@ SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell
 @dataclass(frozen=True, eq=False)
 class Choice:
     """The rung of every variant. pilots (P,): their flat numbers; neighbours (V, k) numbers of pilots; rung (V,): of
-    the ladder's columns x cuts."""
+    the ladder's columns x cuts. weights: how much each axis of the sweep counts."""
 
+    cases: Cases
     ladder: Ladder
     results: tuple[Result, ...]
     pilots: Counts
     measured: Measured
+    weights: Array
     neighbours: NDArray[np.unsignedinteger[Any]]
     rung: NDArray[np.int32]
     neighbour_errors: NeighbourErrors
 
     def errors(self, variants: Counts) -> Array:
         """(R, V) estimated errors for some variants; NaN where no estimate exists."""
-        return self.neighbour_errors.errors(self._march, self.rung[variants], self._near(variants))
+        return self.neighbour_errors.errors(self._march, self.rung[variants], *self._around(variants))
 
     def held(self, variants: Counts, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        return self.neighbour_errors.worst(self.rung[variants], self._near(variants), tighter)
+        return self.neighbour_errors.worst(self.rung[variants], *self._around(variants), tighter)
 
-    def _near(self, variants: Counts) -> Numbers:
-        """(V, k) numbers of pilots, as kernels take them."""
-        return self.neighbours[variants].astype(np.int32)
+    def _around(self, variants: Counts) -> tuple[Array, Numbers]:
+        """(V, D) weighted places and (V, k) numbers of pilots, as kernels take them."""
+        return coordinates(self.cases, variants) * self.weights, self.neighbours[variants].astype(np.int32)
 
     @cached_property
     def _march(self) -> NDArray[np.int32]:
@@ -246,6 +148,7 @@ class _Neighbours(NamedTuple):
     weights: Array
     pilots: Array
     wanted: Array
+    slopes: Array
     ranked: NDArray[np.int32]
     worth: int
 
@@ -254,10 +157,11 @@ class _Neighbours(NamedTuple):
         neighbours = np.empty((part.size, min(NEIGHBOURS, self.order.size)), dtype=np.int32)
         own = VariantValues.of(self.asked.study, self.cases, part)
         rung, tighter = np.empty(part.size, dtype=np.int32), own.tighter
-        nearest(coordinates(self.cases, part) * self.weights, self.pilots, neighbours)
+        places = coordinates(self.cases, part) * self.weights
+        nearest(places, self.pilots, neighbours)
         inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
         neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
-        cheapest(self.wanted, self.worth, neighbours, tighter, rung)
+        cheapest(self.wanted, (self.slopes, places), self.worth, neighbours, tighter, rung)
         return part, neighbours.astype(_number_type(self.order.size)), self.ranked[rung]
 
 
@@ -265,21 +169,22 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     """The choice for all variants of a sweep by what its pilots found. Raises Halted."""
     (scene, order, measured), asked, cases = found, of.asked, of.cases
     cost = of.cost(scene)
-    pilots = coordinates(cases, order)
-    weights = _weights(pilots, measured)
-    pilots = np.ascontiguousarray((pilots * weights).T)
+    along = coordinates(cases, order)
+    places = Places(along, _weights(along, measured))
+    pilots = places.weighted
     ranked = np.argsort(cost, kind="stable").astype(np.int32)
     ranked = ranked[np.any(np.isfinite(measured.held.reshape(cost.size, -1)[ranked]), axis=1)]
     worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
-    errors = neighbour_errors_of(asked, measured, nearest_others(pilots, NEIGHBOURS), of.span)
+    errors = neighbour_errors_of(asked, measured, places, nearest_others(pilots, NEIGHBOURS), of.span)
     rung = np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=_number_type(order.size))
     rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
-    wanted = np.ascontiguousarray(errors.wanted[:, :, ranked])
-    subject = _Neighbours(asked, cases, order, weights, pilots, wanted, ranked, worth)
+    wanted, slopes = (np.ascontiguousarray(part[..., ranked]) for part in (errors.wanted, errors.held_slopes))
+    subject = _Neighbours(asked, cases, order, places.weights, pilots, wanted, slopes, ranked, worth)
     for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
         neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
-    return Choice(of.ladder(scene), results_of(asked), order, measured, neighbours, rung, errors)
+    results = results_of(asked)
+    return Choice(cases, of.ladder(scene), results, order, measured, places.weights, neighbours, rung, errors)
 
 
 def _number_type(pilots: int) -> np.dtype[Any]:

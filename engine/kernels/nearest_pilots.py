@@ -1,4 +1,10 @@
-"""Which pilots are a variant's nearest, and the cheapest rung that holds for all of them."""
+"""Which pilots are a variant's nearest, the cheapest rung that holds for all of them but one, and what they tell.
+
+The logarithm of an error on a rung is a plane over the places of variants, ``slopes`` (D, rungs), and what each pilot
+leaves of it.
+"""
+
+import math
 
 import numpy as np
 
@@ -41,11 +47,11 @@ def _sorted_within(apart, farthest, distance, found):
 
 @piece
 def worst_but_one(held, rung, near, limit):
-    """The largest but one of the errors ``held`` (P, 2, rungs) on a rung of the pilots ``near`` (k,), the only one if
-    k = 1: the first count over the variant's ``limit``, the second as they are."""
-    worst, second = 0.0, 0.0
+    """The largest but one of ``held`` (P, 2, rungs), logarithms of errors less the plane, on a rung of the pilots
+    ``near`` (k,), the only one if k = 1: the first count less the variant's ``limit``, the second as they are."""
+    worst, second = -np.inf, -np.inf
     for p in near:
-        error = max(held[p, 0, rung] / limit, held[p, 1, rung])
+        error = max(held[p, 0, rung] - limit, held[p, 1, rung])
         if error > worst:
             worst, second = error, worst
         elif error > second:
@@ -53,41 +59,67 @@ def worst_but_one(held, rung, near, limit):
     return second if near.size > 1 else worst
 
 
+@piece
+def plane_at(slopes, rung, place):
+    """What the plane of a rung says at a place (D,)."""
+    found = 0.0
+    for d in range(place.size):
+        found += slopes[d, rung] * place[d]
+    return found
+
+
 @kernel
-def cheapest(held, worth, neighbours, limit, found):
-    """found (V,): the first rung that holds by `worst_but_one` of a variant's neighbours (V, k) with its ``limit``
-    (V,); where there is none, the first that is within ALIKE of the least among the first ``worth``."""
-    missed = np.empty(AT_ONCE, dtype=np.int64)
+def cheapest(held, planes, worth, neighbours, tighter, found):
+    """found (V,): the first rung that holds by `worst_but_one` of a variant's neighbours (V, k), what is held to the
+    study's tolerance ``tighter`` (V,) than that; where there is none, the first that is within ALIKE of the least among
+    the first ``worth``. planes: slopes (D, rungs), and places (V, D)."""
+    slopes, places = planes
+    missed, plane = np.empty(AT_ONCE, dtype=np.int64), np.empty(AT_ONCE)
     for v in range(neighbours.shape[0]):
-        found[v] = -1
+        found[v], limit = -1, math.log(tighter[v])
         for first in range(0, held.shape[2], AT_ONCE):
-            found[v] = _first_held(held, first, neighbours[v], limit[v], missed)
+            _planes_at(slopes, first, places[v], plane)
+            found[v] = _first_held(held, plane, first, neighbours[v], limit, missed)
             if found[v] >= 0:
                 break
         if found[v] < 0:
-            least = np.inf
-            for rung in range(worth):
-                least = min(least, worst_but_one(held, rung, neighbours[v], limit[v]))
-            for rung in range(worth):
-                if worst_but_one(held, rung, neighbours[v], limit[v]) <= ALIKE * least:
-                    found[v] = rung
-                    break
-            found[v] = worth - 1 if found[v] < 0 else found[v]
+            found[v] = _least_held(held, slopes, places[v], worth, neighbours[v], limit)
 
 
 @piece
-def _first_held(held, first, near, limit, missed):
+def _planes_at(slopes, first, place, found):
+    """found (AT_ONCE,): what the planes of rungs, from ``first`` on, say at a place (D,)."""
+    found[:] = 0.0
+    for d in range(place.size):
+        for rung in range(min(AT_ONCE, slopes.shape[1] - first)):
+            found[rung] += slopes[d, first + rung] * place[d]
+
+
+@piece
+def _first_held(held, plane, first, near, limit, missed):
     """The first of AT_ONCE rungs, from ``first`` on, that all but one of the pilots ``near`` (k,) hold, all if k = 1;
-    -1 where there is none. missed (AT_ONCE,): room for by how many each is missed."""
+    -1 where there is none. plane (AT_ONCE,): at the variant. missed (AT_ONCE,): room for by how many each is missed."""
     missed[:] = 0
     for p in near:
         following, own = held[p, 0][first : first + AT_ONCE], held[p, 1][first : first + AT_ONCE]
         for rung in range(following.size):
-            missed[rung] += (following[rung] > limit) | (own[rung] > 1.0)
+            missed[rung] += (following[rung] + plane[rung] > limit) | (own[rung] + plane[rung] > 0.0)
     for rung in range(min(AT_ONCE, held.shape[2] - first)):
         if missed[rung] <= (1 if near.size > 1 else 0):
             return first + rung
     return -1
+
+
+@piece
+def _least_held(held, slopes, place, worth, near, limit):
+    """The first of the rungs before ``worth`` that is within ALIKE of the least error of these."""
+    least = np.inf
+    for rung in range(worth):
+        least = min(least, worst_but_one(held, rung, near, limit) + plane_at(slopes, rung, place))
+    for rung in range(worth):
+        if worst_but_one(held, rung, near, limit) + plane_at(slopes, rung, place) <= least + math.log(ALIKE):
+            return rung
+    return worth - 1
 
 
 AT_ONCE = 64  # rungs that are looked at together: most variants find theirs among the first
@@ -95,24 +127,32 @@ ALIKE = 1.25  # times the least error: as good as that, where none is small enou
 
 
 @kernel
-def held_errors(held, rung, neighbours, limit, found):
-    """found (V,): `worst_but_one` of every variant on its own rung (V,)."""
+def held_errors(held, rung, planes, neighbours, tighter, found):
+    """found (V,): by `worst_but_one` the error of every variant on its own rung (V,); as `cheapest`."""
+    slopes, places = planes
     for v in range(neighbours.shape[0]):
-        found[v] = worst_but_one(held, rung[v], neighbours[v], limit[v])
+        worst = worst_but_one(held, rung[v], neighbours[v], math.log(tighter[v]))
+        found[v] = math.exp(worst + plane_at(slopes, rung[v], places[v]))
 
 
 @kernel
-def told_errors(error, march, rung, neighbours, found):
+def told_errors(error, march, rung, planes, neighbours, found):
     """found (R, V): the largest but one, the only one if k = 1, of the errors (M, R) of the marches (rungs, P) that
-    tell a variant's neighbours (V, k) of its rung (V,); NaN where that is not finite: NaN counts as the largest."""
+    tell a variant's neighbours (V, k) of its rung (V,), each times what the plane rises by from there; NaN where that
+    is not finite: NaN counts as the largest. planes: slopes (D, rungs), places (V, D), and those of pilots (D, P)."""
+    slopes, places, pilots = planes
     few = neighbours.shape[1] == 1
     worst, second = np.empty(error.shape[1]), np.empty(error.shape[1])
     for v in range(neighbours.shape[0]):
         worst[:] = second[:] = -np.inf
         for p in neighbours[v]:
-            of_march = error[march[rung[v], p]]
+            rises = 0.0
+            for d in range(pilots.shape[0]):
+                rises += slopes[d, rung[v]] * (places[v, d] - pilots[d, p])
+            times, of_march = math.exp(rises), error[march[rung[v], p]]
             for r in range(worst.size):
-                own = of_march[r] if np.isfinite(of_march[r]) else np.inf
+                own = times * of_march[r]
+                own = own if np.isfinite(own) else np.inf
                 second[r] = max(second[r], min(worst[r], own))
                 worst[r] = max(worst[r], own)
         for r in range(worst.size):

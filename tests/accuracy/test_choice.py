@@ -33,10 +33,12 @@ def near_by_numpy(points: Array, pilots: Array, count: int) -> NDArray[np.int64]
     return np.argsort(apart, axis=1, kind="stable")[:, :count]
 
 
-def cheapest_by_numpy(held: Array, worth: int, neighbours: Any, limit: Array) -> NDArray[np.int64]:
+def cheapest_by_numpy(
+    held: Array, slopes: Array, points: Array, worth: int, neighbours: Any, limit: Array
+) -> NDArray[np.int64]:
     found = []
-    for near, most in zip(neighbours, limit, strict=True):
-        worst = np.sort(np.maximum(held[near, 0] / most, held[near, 1]), axis=0)[-2]
+    for near, most, place in zip(neighbours, limit, points, strict=True):
+        worst = np.sort(np.maximum(held[near, 0] / most, held[near, 1]), axis=0)[-2] * np.exp(place @ slopes)
         fits = np.flatnonzero(worst <= 1.0)
         least = worst[:worth].min()
         alike = np.flatnonzero(worst[:worth] <= ALIKE * least) if np.isfinite(least) else np.array([worth - 1])
@@ -44,30 +46,30 @@ def cheapest_by_numpy(held: Array, worth: int, neighbours: Any, limit: Array) ->
     return np.array(found)
 
 
-def given_numbers(seed: int) -> tuple[Array, Array, Array, Array]:
+def given_numbers(seed: int) -> tuple[Array, Array, Array, Array, Array]:
     """Points on a coarse lattice, so that many distances are equal, and errors on 150 rungs, more than are looked at
     together, the cheaper ones the larger, some of them unknown."""
     random = np.random.default_rng(seed)
     points, pilots = (random.integers(0, 6, (size, 3)) / 4.0 for size in (50, 20))
     held = np.exp(random.normal(0.0, 1.5, (20, 2, 150)) + np.linspace(6.0, 0.0, 150) - np.array([[0.0], [1.0]]))
     held[random.random(held.shape) < 0.1] = np.inf
-    return points, pilots, held, np.exp(random.normal(0.0, 1.0, 50))
+    return points, pilots, held, np.exp(random.normal(0.0, 1.0, 50)), random.normal(0.0, 1.0, (3, 150))
 
 
 def by_kernels(seed: int) -> tuple[Any, Any]:
-    points, pilots, held, limit = given_numbers(seed)
+    points, pilots, held, limit, slopes = given_numbers(seed)
     neighbours, rung = np.empty((50, 4), dtype=np.int32), np.empty(50, dtype=np.int32)
     nearest(points, np.ascontiguousarray(pilots.T), neighbours)
-    cheapest(held, 90, neighbours, limit, rung)
+    cheapest(np.log(held), (slopes, points), 90, neighbours, limit, rung)
     return neighbours, rung
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_kernels_are_their_numpy_twins(seed: int) -> None:
-    points, pilots, held, limit = given_numbers(seed)
+    points, pilots, held, limit, slopes = given_numbers(seed)
     neighbours, rung = by_kernels(seed)
     np.testing.assert_array_equal(neighbours, near_by_numpy(points, pilots, 4))
-    np.testing.assert_array_equal(rung, cheapest_by_numpy(held, 90, neighbours, limit))
+    np.testing.assert_array_equal(rung, cheapest_by_numpy(held, slopes, points, 90, neighbours, limit))
     assert len(np.unique(rung)) > 3
 
 
