@@ -286,5 +286,6 @@ def _joined(parts: Sequence[Measured]) -> Measured:
         np.concatenate([part.reference for part in parts], axis=1),
         np.any([part.marched for part in parts], axis=0),
         sum(part.work for part in parts),
+        np.concatenate([part.spent for part in parts]),
         parts[0].free,
     )

@@ -62,7 +62,8 @@ class Measured:
     it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
     largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
     the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
-    over a passage or cycle of all their marches; free: whether the study fixes nothing that the references change."""
+    over a passage or cycle of all their marches; spent (P,): the same of each one's reference; free: whether the study
+    fixes nothing that the references change."""
 
     error: Array
     pilot: Counts
@@ -71,6 +72,7 @@ class Measured:
     reference: Array
     marched: NDArray[np.bool_]
     work: float
+    spent: Array
     free: bool
 
 
@@ -237,7 +239,7 @@ class Climb:
         """What the jobs found."""
         work = float(self.work + truth.spent.sum())
         pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
-        return Measured(error, pilot, self.march, self.held, truth.error, self.marched, work, free)
+        return Measured(error, pilot, self.march, self.held, truth.error, self.marched, work, truth.spent, free)
 
     def _judge(self, name: str) -> None:
         """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave

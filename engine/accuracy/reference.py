@@ -176,7 +176,7 @@ def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int,
     """(V,) whether a level takes more work, over the whole time, than a closer reference is worth."""
     if level == len(levels.numerics):
         return np.zeros(values.size, dtype=np.bool_)
-    return _units(grid) * level_work(grid, values, levels, level) > dear
+    return passages(grid) * level_work(grid, values, levels, level) > dear
 
 
 def left_over(change: Array, before: Array) -> Array:
@@ -266,10 +266,10 @@ def usual_work(grid: SceneGrid, values: VariantValues, dear: float) -> Array:
     more = min(usual + 1, len(levels.numerics) - 1)
     level = np.where(_is_dear(grid, values, levels, more, dear), usual, more)
     work = [level_work(grid, values, levels, number) for number in (usual, more)]
-    return _units(grid) * np.where(level == usual, *work)
+    return passages(grid) * np.where(level == usual, *work)
 
 
-def _units(grid: SceneGrid) -> float:
+def passages(grid: SceneGrid) -> float:
     """Passages or cycles of the whole time."""
     return max(rider.end for rider in grid.scene.riders)
 

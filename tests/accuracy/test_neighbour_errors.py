@@ -41,6 +41,7 @@ def measured(error: Array, reference: float = 0.0) -> Measured:
         reference=np.full((results, COUNT), reference),
         marched=np.ones((1, 1), dtype=np.bool_),
         work=0.0,
+        spent=np.zeros(COUNT),
         free=True,
     )
 

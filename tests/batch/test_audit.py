@@ -1,6 +1,7 @@
 """Which variants an audit takes, and what it finds of them."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,15 @@ def test_less_is_audited_of_what_takes_long_beside_the_run() -> None:
     cars = [mass(0.2, cruise(0.0, 1.0, speed)) for speed in (1e-3, 1e-4, 1e-5)]
     sizes = [audit_size(masses(4000, car=car, solver={"fidelity": "static"})) for car in cars]
     assert sizes == sorted(sizes, reverse=True) and (sizes[0], sizes[-1]) == (40, 0)
+
+
+def test_what_pilots_took_tells_how_many_are_audited() -> None:
+    """Of the same sweep, whose references take a million times as long, none is."""
+    plan = chosen_plan(STUDIES["passages"])
+    assert plan.choice is not None and audit_size(plan) == 16
+    measured = plan.choice.measured
+    plan.choice = replace(plan.choice, measured=replace(measured, spent=1e6 * measured.spent))
+    assert audit_size(plan) == 0
 
 
 def test_parts_are_joined_to_the_same_audit() -> None:
