@@ -61,25 +61,64 @@ class Choice:
     weights: Array
     neighbours: NDArray[np.unsignedinteger[Any]]
     rung: NDArray[np.int32]
-    neighbour_errors: NeighbourErrors
+    foreseen: Cheapest
+    found: Cheapest
 
-    def errors(self, variants: Counts) -> Array:
-        """(R, V) estimated errors for some variants; NaN where no estimate exists."""
-        return self.neighbour_errors.errors(self._march, self.rung[variants], *self._around(variants))
+    def errors(self, variants: Counts, rung: Numbers, vibration: Array | None = None) -> Array:
+        """(R, V) estimated errors of some variants on rungs (V,); NaN where no estimate exists. vibration (V,): of
+        their marches, where it is known."""
+        return self._by(vibration).errors.errors(self._march, rung, *self._around(variants, vibration))
 
-    def held(self, variants: Counts, tighter: Array) -> Array:
+    def held(self, variants: Counts, rung: Numbers, tighter: Array, vibration: Array | None = None) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
-        return self.neighbour_errors.worst(self.rung[variants], *self._around(variants), tighter)
+        return self._by(vibration).errors.worst(rung, *self._around(variants, vibration), tighter)
 
-    def _around(self, variants: Counts) -> tuple[Array, Numbers]:
+    def again(self, variants: Counts, tighter: Array, vibration: Array) -> Numbers:
+        """(V,) the rungs of some variants of which it is known how much they vibrate."""
+        return self.found.of(*self._around(variants, vibration), tighter)
+
+    def _by(self, vibration: Array | None) -> Cheapest:
+        return self.foreseen if vibration is None else self.found
+
+    def _around(self, variants: Counts, vibration: Array | None) -> tuple[Array, Numbers]:
         """(V, D) weighted places and (V, k) numbers of pilots, as kernels take them."""
-        return coordinates(self.cases, variants) * self.weights, self.neighbours[variants].astype(np.int32)
+        places = coordinates(self.cases, variants) * self.weights
+        if vibration is not None:
+            places = np.concatenate([places, vibration[:, None]], axis=1)
+        return places, self.neighbours[variants].astype(np.int32)
 
     @cached_property
     def _march(self) -> NDArray[np.int32]:
         """(columns x cuts, P) the march that tells of a rung."""
         return self.measured.march.reshape(-1, self.measured.march.shape[2])
+
+
+class Cheapest(NamedTuple):
+    """How variants find the cheapest rung that holds: what is wanted of rungs in the order of their work, their slopes
+    and their numbers, how many are worth it where none holds, and the errors that are told."""
+
+    errors: NeighbourErrors
+    wanted: Array
+    slopes: Array
+    ranked: NDArray[np.int32]
+    worth: int
+
+    @classmethod
+    def by(cls, errors: NeighbourErrors, cost: Array, held: Array) -> Cheapest:
+        """By what pilots tell. cost (columns x cuts,), held (columns x cuts, P) of rungs, infinite where no pilot was
+        on them."""
+        ranked = np.argsort(cost, kind="stable").astype(np.int32)
+        ranked = ranked[np.any(np.isfinite(held[ranked]), axis=1)]
+        worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
+        wanted, slopes = (np.ascontiguousarray(part[..., ranked]) for part in (errors.wanted, errors.held_slopes))
+        return cls(errors, wanted, slopes, ranked, worth)
+
+    def of(self, places: Array, neighbours: Numbers, tighter: Array) -> Numbers:
+        """(V,) the rungs of variants at weighted places (V, D)."""
+        rung = np.empty(tighter.size, dtype=np.int32)
+        cheapest(self.wanted, (self.slopes, places), self.worth, neighbours, tighter, rung)
+        return np.asarray(self.ranked[rung])
 
 
 class Pilots(NamedTuple):
@@ -146,45 +185,39 @@ class _Neighbours(NamedTuple):
     cases: Cases
     order: Counts
     weights: Array
-    pilots: Array
-    wanted: Array
-    slopes: Array
-    ranked: NDArray[np.int32]
-    worth: int
+    foreseen: Cheapest
 
     def of(self, part: Counts, halted: Halted) -> tuple[Counts, Numbers, Numbers]:
         """The neighbours and the rungs of a row of variants, with their flat numbers."""
         neighbours = np.empty((part.size, min(NEIGHBOURS, self.order.size)), dtype=np.int32)
         own = VariantValues.of(self.asked.study, self.cases, part)
-        rung, tighter = np.empty(part.size, dtype=np.int32), own.tighter
         places = coordinates(self.cases, part) * self.weights
-        nearest(places, self.pilots, neighbours)
+        nearest(places, self.foreseen.errors.pilots, neighbours)
         inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
         neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
-        cheapest(self.wanted, (self.slopes, places), self.worth, neighbours, tighter, rung)
-        return part, neighbours.astype(_number_type(self.order.size)), self.ranked[rung]
+        rung = self.foreseen.of(places, neighbours, own.tighter)
+        return part, neighbours.astype(_number_type(self.order.size)), rung
 
 
 def choose(of: Pilots, found: Found, share: Share) -> Choice:
     """The choice for all variants of a sweep by what its pilots found. Raises Halted."""
-    (scene, order, measured), asked, cases = found, of.asked, of.cases
-    cost = of.cost(scene)
+    (scene, order, measured), cases = found, of.cases
     along = coordinates(cases, order)
     places = Places(along, _weights(along, measured))
-    pilots = places.weighted
-    ranked = np.argsort(cost, kind="stable").astype(np.int32)
-    ranked = ranked[np.any(np.isfinite(measured.held.reshape(cost.size, -1)[ranked]), axis=1)]
-    worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
-    errors = neighbour_errors_of(asked, measured, places, nearest_others(pilots, NEIGHBOURS), of.span)
+    others, held = nearest_others(places.weighted, NEIGHBOURS), measured.held.reshape(-1, order.size)
+    foreseen = Cheapest.by(neighbour_errors_of(of.asked, measured, places, others, of.span), of.cost(scene), held)
+    known = foreseen
+    if of.grids[scene].listens:
+        beside = Places(np.c_[along, measured.vibration], np.append(places.weights, 1.0))
+        known = Cheapest.by(neighbour_errors_of(of.asked, measured, beside, others, of.span), of.cost(scene), held)
     rung = np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=_number_type(order.size))
     rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
-    wanted, slopes = (np.ascontiguousarray(part[..., ranked]) for part in (errors.wanted, errors.held_slopes))
-    subject = _Neighbours(asked, cases, order, places.weights, pilots, wanted, slopes, ranked, worth)
+    subject = _Neighbours(of.asked, cases, order, places.weights, foreseen)
     for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
         neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
-    results = results_of(asked)
-    return Choice(cases, of.ladder(scene), results, order, measured, places.weights, neighbours, rung, errors)
+    ladder, results = of.ladder(scene), results_of(of.asked)
+    return Choice(cases, ladder, results, order, measured, places.weights, neighbours, rung, foreseen, known)
 
 
 def _number_type(pilots: int) -> np.dtype[Any]:
@@ -287,5 +320,6 @@ def _joined(parts: Sequence[Measured]) -> Measured:
         np.any([part.marched for part in parts], axis=0),
         sum(part.work for part in parts),
         np.concatenate([part.spent for part in parts]),
+        np.concatenate([part.vibration for part in parts]),
         parts[0].free,
     )

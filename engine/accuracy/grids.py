@@ -86,6 +86,12 @@ class SceneGrid:
         """What marches read besides the sensors."""
         return "accelerations" if self.asked.accelerated else "contacts"
 
+    @property
+    def listens(self) -> bool:
+        """Whether it matters how much a variant vibrates: cycles resonate, within parts of a sweep that are too narrow
+        for neighbours to tell of."""
+        return self.asked.reduction is not None
+
     def of_pilots(self) -> SceneGrid:
         """The same scene for marches that only measure errors: envelopes at a few places."""
         return replace(self, places=PILOT_PLACES)

@@ -11,17 +11,18 @@ from math import lcm
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine.accuracy.grids import MOST_COMPARED
 from engine.accuracy.jobs import InTurn
 from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, is_free, level_work
-from engine.accuracy.results import differences, results_of, tolerances, worst_held
+from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
-from engine.march.outcome import number_of, outcome, used
+from engine.march.outcome import number_of, outcome, used, vibration
 from engine.model.timeline import MOST_STATIONS
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, split
 from results_schema.status import Fidelity
 from results_schema.statuses import lost
 
@@ -149,21 +150,63 @@ class MarchGroup(Group):
     def found(
         self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
     ) -> Found:
-        results = results_of(self.grid.asked)
-        stations = self.grid.stations(self.model, self.by)
-        now = outcome(self.grid.asked, self.tables, values, stations if kept == "histories" else stations[:0], halted)
-        unknown = np.full((len(results), variants.size), np.nan)
         if choice is None:
+            now, unknown = self._marched(values, halted, kept), np.full((len(self._results), variants.size), np.nan)
             return Found(now, used(self.tables, variants.size), unknown, unknown[0])
-        tighter = values.tighter
-        held = choice.held(variants, tighter)
-        if not np.isfinite(tolerances(results)).any():
-            held = np.full(variants.size, -np.inf)  # what is only told decides, and misses nothing
-        return Found(now, used(self.tables, variants.size), choice.errors(variants), held)
+        if self.grid.listens and self.numerics.fidelity != "static":
+            found = self._heard(values, variants, choice, halted, kept)
+        else:
+            now, rung = self._marched(values, halted, kept), choice.rung[variants]
+            held = choice.held(variants, rung, values.tighter)
+            found = Found(now, used(self.tables, variants.size), choice.errors(variants, rung), held)
+        if not np.isfinite(tolerances(self._results)).any():  # what is only told decides, and misses nothing
+            return found._replace(held=np.full(variants.size, -np.inf))
+        return found
+
+    @property
+    def _results(self) -> tuple[Result, ...]:
+        return results_of(self.grid.asked)
+
+    def _marched(self, values: VariantValues, halted: Halted, kept: Kept) -> Outcome:
+        """Some of its variants, marched as was chosen."""
+        stations = self.grid.stations(self.model, self.by)
+        return outcome(self.grid.asked, self.tables, values, stations if kept == "histories" else stations[:0], halted)
+
+    def _heard(self, values: VariantValues, variants: Counts, choice: Choice, halted: Halted, kept: Kept) -> Found:
+        """The same of cycles: those that vibrate more than was foreseen by so much that they do not hold are marched
+        again on the rung that does."""
+        now, rung = self._marched(values, halted, "histories"), choice.rung[variants].copy()
+        taken = used(self.tables, variants.size)
+        heard = vibration(self.tables, values, self.grid.stations(self.model, self.by), now)
+        missed = np.flatnonzero(choice.held(variants, rung, values.tighter, heard) > 1.0)
+        if missed.size:
+            rung[missed] = choice.again(variants[missed], values.tighter[missed], heard[missed])
+            for group, lanes in on_rungs(self.grid, rung[missed], variants[missed], values.part(missed)):
+                own = missed[lanes]
+                now = now.replaced(own, group._marched(values.part(own), halted, "histories"))
+                for name, column in used(group.tables, own.size).items():
+                    taken[name][own] = column
+                group.forget()
+        held = choice.held(variants, rung, values.tighter, heard)
+        return Found(now, taken, choice.errors(variants, rung, heard), held)
 
     def forget(self) -> None:
         if "tables" in self.__dict__:
             self.tables.forget()
+
+
+def on_rungs(
+    grid: SceneGrid, rungs: NDArray[np.int32], variants: Counts, values: VariantValues
+) -> Iterator[tuple[MarchGroup, Counts]]:
+    """Variants of a scene by their rungs (V,), those that must take more steps apart, of like pace side by side, as
+    they rise and fall together; with each group its variants' places among these."""
+    ladder, pace = ladder_of(grid.asked, grid), values.scene_time_scale
+    for own in split(np.arange(variants.size), rungs):
+        column, cut = divmod(int(rungs[own[0]]), len(ladder.cuts))
+        by = grid.safe_cuts(ladder.columns[column], values.part(own), ladder.cuts[cut])
+        for part in split(np.arange(own.size), by):
+            lanes = own[part[np.argsort(pace[own[part]], kind="stable")]]
+            yield MarchGroup(grid, variants[lanes], ladder.columns[column], int(by[part[0]])), lanes
 
 
 @dataclass(eq=False)

@@ -20,7 +20,7 @@ from engine.accuracy.jobs import Halted, InTurn, Job, Share
 from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
-from engine.march.outcome import Asked, outcome
+from engine.march.outcome import Asked, outcome, vibration
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel
@@ -62,8 +62,8 @@ class Measured:
     it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
     largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
     the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
-    over a passage or cycle of all their marches; spent (P,): the same of each one's reference; free: whether the study
-    fixes nothing that the references change."""
+    over a passage or cycle of all their marches; spent (P,): the same of each one's reference; vibration (P,): of
+    cycles; free: whether the study fixes nothing that the references change."""
 
     error: Array
     pilot: Counts
@@ -73,6 +73,7 @@ class Measured:
     marched: NDArray[np.bool_]
     work: float
     spent: Array
+    vibration: Array
     free: bool
 
 
@@ -239,7 +240,15 @@ class Climb:
         """What the jobs found."""
         work = float(self.work + truth.spent.sum())
         pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
-        return Measured(error, pilot, self.march, self.held, truth.error, self.marched, work, truth.spent, free)
+        errors = error, pilot, self.march, self.held, truth.error, self.marched
+        return Measured(*errors, work, truth.spent, self._vibration(truth), free)
+
+    def _vibration(self, truth: Converged) -> Array:
+        """(P,) how much the pilots vibrate in a cycle; nothing of what is no cycle."""
+        if not self.grid.listens:
+            return np.zeros(self.values.size)
+        tables = self.grid.tables(self.grid.scene, 1)
+        return vibration(tables, self.values, self.grid.stations(self.grid.scene, 1), truth.outcome)
 
     def _judge(self, name: str) -> None:
         """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave

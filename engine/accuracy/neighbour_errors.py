@@ -36,7 +36,8 @@ AGAINST_SLOPES = 1.0
 
 
 class Places(NamedTuple):
-    """Places (P, D) of pilots along the axes of the sweep, from 0 to 1, and how much each axis counts (D,)."""
+    """Places (P, D) of pilots along the axes of the sweep, from 0 to 1, and how much each axis counts (D,); how much
+    pilots vibrate may be a further axis, along which errors rise."""
 
     along: Array
     weights: Array

@@ -15,9 +15,8 @@ import numpy as np
 
 from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
-from engine.accuracy.groups import ConvergingGroup, Group, MarchGroup
+from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
 from engine.accuracy.jobs import Share
-from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES
@@ -25,7 +24,7 @@ from engine.march.envelopes import check_places, places_read
 from engine.march.outcome import Asked
 from engine.march.step_rules import check_even_steps, check_free_vibration, check_most_steps, check_slowest, check_steps
 from engine.march.tables import SceneTables
-from engine.model.distinct_models import base_scene, scenes, split
+from engine.model.distinct_models import base_scene, scenes
 from engine.model.refusals import check_moves
 from engine.model.scene_model import SceneModel
 from engine.model.timeline import Window
@@ -34,7 +33,7 @@ from engine.observation.histories import CYCLE_STATIONS, REST_STATIONS, WHOLE_ST
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
 from engine.scene.variants import VariantValues, cases_tolerance
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, split
 from results_schema.blocks import IN_MEMORY
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
@@ -139,22 +138,10 @@ class Plan:
             self.__dict__.pop("seconds", None)
 
     def _marching(self) -> Iterator[Group]:
-        """Variants of one scene by their rung, of like pace side by side: they rise and fall together."""
+        """Variants of one scene by their rung."""
         for grid, members in zip(self.grids, self.members, strict=True):
             rungs = np.zeros(members.size, dtype=np.int32) if self.choice is None else self.choice.rung[members]
-            for own in split(np.arange(members.size), rungs):
-                yield from self._on_rung(grid, members[own], grid.values.part(own), int(rungs[own[0]]))
-
-    def _on_rung(self, grid: SceneGrid, variants: Counts, values: VariantValues, rung: int) -> Iterator[Group]:
-        """Variants on a rung, those that must take more steps apart."""
-        ladder = ladder_of(self.asked, grid)
-        column, cut = divmod(rung, len(ladder.cuts))
-        numerics = ladder.columns[column]
-        by = grid.safe_cuts(numerics, values, ladder.cuts[cut])
-        pace = values.scene_time_scale
-        for part in split(np.arange(variants.size), by):
-            lanes = part[np.argsort(pace[part], kind="stable")]
-            yield MarchGroup(grid, variants[lanes], numerics, int(by[part[0]]))
+            yield from (group for group, _ in on_rungs(grid, rungs, members, grid.values))
 
     @cached_property
     def seconds(self) -> float:

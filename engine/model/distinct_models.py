@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel, build_model
 from engine.scene.study import Study
 from engine.scene.sweep import Cases
 from engine.scene.variants import VariantValues, structural
-from results_schema.arrays import Counts
+from results_schema.arrays import Counts, split
 
 
 def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
@@ -54,12 +52,3 @@ def structure(cases: Cases, variants: Counts) -> Counts:
         if dim in dims:
             code = code * size + positions[dim]
     return code
-
-
-def split(items: Counts, codes: NDArray[np.signedinteger[Any]]) -> Iterator[Counts]:
-    """Items by equal codes, both in ascending order."""
-    if items.size and np.all(codes == codes[0]):
-        yield items
-        return
-    order = np.argsort(codes, kind="stable")
-    yield from np.split(items[order], np.flatnonzero(np.diff(codes[order])) + 1)

@@ -37,8 +37,9 @@ def chosen(plan: Plan) -> list[Part]:
 def _chosen(plan: Plan, group: MarchGroup) -> Part:
     assert plan.choice is not None
     some = group.variants[spread(group.variants.size, MOST_LOOKED_AT)]
-    held = plan.choice.held(some, plan.cases_tolerance[some])
-    return Part(group.variants.size, used(group.tables, 1), _largest(plan, plan.choice.errors(some)), held)
+    rung = plan.choice.rung[some]
+    held = plan.choice.held(some, rung, plan.cases_tolerance[some])
+    return Part(group.variants.size, used(group.tables, 1), _largest(plan, plan.choice.errors(some, rung)), held)
 
 
 def converged(plan: Plan, found: Found) -> Iterator[Part]:

@@ -42,6 +42,7 @@ def measured(error: Array, reference: float = 0.0) -> Measured:
         marched=np.ones((1, 1), dtype=np.bool_),
         work=0.0,
         spent=np.zeros(COUNT),
+        vibration=np.zeros(COUNT),
         free=True,
     )
 
