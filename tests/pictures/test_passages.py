@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,6 +19,7 @@ from tests.studies import scenes
 PLACES = (1.0, 2.0, 3.0, 4.0, 6.0)
 SENSORS = "\n".join(f'[sensor.place_{at:g}]\nbody = "bed"\nat = {at}' for at in PLACES)
 SHAKEN = '[sensor.shaken]\nbody = "bed"\nat = 5.0\nquantity = "acceleration"'
+LIMITED = 'quantity = "acceleration"\nfrequency_limit = "30 Hz"'
 MASS = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
 
 
@@ -69,6 +72,21 @@ def test_what_has_a_limit_comes_first_with_its_limit_as_a_line_and_in_words() ->
         assert f"{'beyond' if beyond else 'within'} the limit of" in found[name].title
     told = [sentence.partition(":")[0] for sentence in answers.answer(dataset)]
     assert "shaken" in told and results.sensors["shaken"] == "m s-2"
+
+
+def test_labels_of_panels_are_whole_and_apart() -> None:
+    """Of four stacked panels, beside which what is read takes three lines."""
+    places = "\n".join(f"[sensor.up_{at}]\nbody = 'bed'\nat = {at}.5\n{LIMITED}" for at in (2, 4, 6, 7))
+    found = figures(scenes.run("passage", scenes.pace("passage"), extra=places))
+    for name in ("largest-acceleration-of-modes-up-to-30-hz", "response"):
+        found[name].drawing.draw_without_rendering()
+        labels = [axes.yaxis.label for axes in panels(found[name]).values()]
+        boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.y0)
+        whole = found[name].drawing.bbox
+        assert len(boxes) == 4 and boxes[0].y0 >= whole.y0 and boxes[-1].y1 <= whole.y1
+        assert all(lower.y1 < upper.y0 for lower, upper in pairwise(boxes))
+        assert all(box.x0 >= whole.x0 for box in boxes)
+    assert any("\nof modes up to 30 Hz\n" in label.get_text() for label in labels)
 
 
 def test_a_limit_far_off_is_told_and_does_not_flatten_the_curves() -> None:
