@@ -18,7 +18,9 @@ from engine.scene.study import Study
 from results_schema.errors import BadInput
 from studies.commands import catalogue
 from studies.commands.preview import FREQUENCIES_SHOWN
+from studies.pictures.common.figures import MUTED
 from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
+from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, in_a_row, layout, starts
 from studies.reporting.drawing import PAGE, page_of, write_drawing
 from studies.results.formatting import number
@@ -243,6 +245,18 @@ def test_a_train_is_one_row_with_the_speeds_of_its_sweep() -> None:
     assert [row[key] for key in ("axles", "length", "load per axle")] == ["5", "2.5 m", "1 kN to 3 kN"]
     assert (row["in all"], row["speed"]) == ("10 kN", "9 km/h to 18 km/h")
     assert "stand as tram_1 has come to 1 m, 1 axle further off left out;" in page.figures[0].caption
+
+
+def test_axles_are_drawn_with_their_loads_and_the_way_to_those_behind() -> None:
+    """A line goes on beyond the end of the body, to the last axle that is shown."""
+    model = base_scene(hauled({"force": [3e3, 1e3, 2e3, 2e3, 2e3]}))
+    axes = pictures(layout(model, in_a_row(model)))[0].drawing.axes[0]
+    names = {text.get_text() for text in axes.texts}
+    assert {"tram_1 (3 kN)", "tram_4 (2 kN)"} <= names and not any("tram_5" in name for name in names)
+    ends = [
+        np.asarray(line.get_xdata(), dtype=float).tolist() for line in axes.get_lines() if line.get_color() == MUTED
+    ]
+    assert any(one == pytest.approx([0.0, -0.5]) for one in ends if len(one) == 2)
 
 
 def test_top_speeds_are_those_of_the_sweep() -> None:
