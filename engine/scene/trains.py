@@ -71,9 +71,14 @@ class Train(Spec):
         return self.distances[-1] * self.spacing_scale
 
     @property
+    def axle_loads(self) -> Array:
+        """(axles,) N or kg of every axle."""
+        return np.asarray(np.sum([np.array(self.own(key)) * self.scale(key) for key in self.loads], axis=0))
+
+    @property
     def load(self) -> float:
         """N or kg of all its axles together."""
-        return sum(sum(self.own(key)) * self.scale(key) for key in self.loads)
+        return float(self.axle_loads.sum())
 
     def in_step(self, wavelength: Array) -> Array:
         """The part of its load that pushes in step with a wave of so many m (L,): the train's spectrum
@@ -174,6 +179,11 @@ class Trains(Spec):
     """All trains of a study file."""
 
     train: dict[str, AnyTrain] = Field(default_factory=dict)
+
+    @property
+    def axles(self) -> dict[str, str]:
+        """The train of every carriage that is an axle, by its name."""
+        return {axle_name(name, axle): name for name, train in self.train.items() for axle in range(train.count)}
 
 
 def axle_name(train: str, axle: int) -> str:

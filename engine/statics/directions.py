@@ -12,7 +12,6 @@ from engine.model.station_path import frozen
 from engine.model.ties import PushTie
 from engine.scene.carriages import Carriage
 from engine.scene.references import check_inertia
-from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies
 from results_schema.arrays import Array
@@ -67,9 +66,7 @@ def told(study: Study, places: Array, now: Array, then: Array) -> str:
         return ""
     mode = int(np.argmax(lower.any(axis=0)))
     place = int(np.nanargmin(np.where(lower[:, mode], then[:, mode], np.nan)))
-    owners = {
-        axle_name(name, axle): f"train.{name}" for name, train in study.train.items() for axle in range(train.count)
-    }
+    owners = {axle: f"train.{name}" for axle, name in study.axles.items()}
     ways = {owners.get(name, f"carriage.{name}"): found for name, found in left_out(study).items()}
     masses = "; ".join(
         f"the mass of {owner.split('.')[1]} does not act {' or '.join(found)} its track"

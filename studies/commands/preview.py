@@ -10,10 +10,12 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
+from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
+from engine.scene.sensors import Envelope, Sensor
 from engine.scene.study import Study
 from engine.scene.sweep import Axis, Cases, cells_of, expand
 from engine.scene.trains import axle_name
@@ -21,9 +23,20 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
+from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
-from studies.results.findings_common import MOST_IN_STEP, speeds_in_step, told_trains
-from studies.results.formatting import counted, duration, number, percent, quantity, spanned, typed_unit, unit_text
+from studies.results.findings_common import told_trains
+from studies.results.formatting import (
+    counted,
+    duration,
+    number,
+    percent,
+    quantity,
+    spanned,
+    typed_speed,
+    typed_unit,
+    unit_text,
+)
 
 FREQUENCIES_SHOWN = 6
 
@@ -222,27 +235,29 @@ def _ratios(plan: Plan) -> TextTable:
 
 def _in_step(plan: Plan) -> Iterator[TextTable]:
     """Swept speeds at which the axles of a train come once in a period of one of the first frequencies."""
-    study, bodies = plan.study, {part.name: part for part in plan.base.bodies}
+    study, bodies = plan.study, model_groups(plan.base) if plan.study.train else {}
+    readers: list[Sensor | Envelope] = [*study.sensor.values(), *study.envelope.values()]
     for name, train in study.train.items():
-        speeds = np.concatenate([grid.values.speed(axle_name(name, 0)) for grid in plan.grids])
-        between = float(speeds.min()), float(speeds.max())
-        omega = bodies[train.on].modal.omega
-        excited = omega[plan.base.excited(bodies[train.on]) & (omega > 0.0)][:MOST_IN_STEP]
-        found = speeds_in_step(train, excited / (2.0 * np.pi), between) if between[0] < between[1] else []
-        typed = next(
-            (typed_unit(study, axis.name) for axis in plan.cases.axes if f"train.{name}.motion.speed" in axis.of), None
-        )
+        axle = axle_name(name, 0)
+        speeds = np.concatenate([grid.values.speed(axle) for grid in plan.grids])
+        between, typed = (float(speeds.min()), float(speeds.max())), typed_speed(study, axle)
+        one_speed, body = between[0] == between[1], bodies[f"/model/{train.on}"]
+        found = [] if one_speed else speeds_in_step(study, name, body, between, readers)
+        most = max(found, key=lambda one: one.swing, default=None)
         rows = [
             (
                 quantity(one.speed, "m s-1") if typed is None else f"{number(one.speed * typed.factor)} {typed.unit}",
                 f"{number(one.frequency)} Hz",
                 quantity(one.way, "m"),
                 percent(one.part),
+                f"{quantity(one.swing, one.units, 2)}{', the strongest' * (one is most)}",
             )
             for one in found
         ]
         heading = f"Speeds at which {name} pushes in step with one of the first frequencies of {train.on}"
-        yield TextTable(heading, ("speed", "frequency", "way in a period", "part of its load"), rows)
+        yield TextTable(
+            heading, ("speed", "frequency", "way in a period", "part of its load", "swing of its mode"), rows
+        )
 
 
 def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:

@@ -112,17 +112,18 @@ def show_outcome(outcome: Outcome) -> None:
 
 
 def show_details(outcome: Outcome) -> None:
-    """How a run was computed: the range of every result with both variants, models, schemes, work, and the audit."""
+    """How a run was computed: the range of every result that people read with both variants, models, schemes, work, and
+    the audit."""
     from studies.reporting import summary
 
     results = Results.of(outcome.results)
     rows = [
         (_name(found), found.said(end), "" if found.is_constant else end.where)
-        for found in summary.ranges(results)
-        for end in (found.smallest, found.largest)
+        for found in summary.shown(results)
+        for end in ((found.largest,) if found.is_constant else (found.smallest, found.largest))
     ]
     blank()
-    table("Smallest and largest of every result", ("result", "value", "where"), rows)
+    table("Smallest and largest of results", ("result", "value", "where"), rows)
     paragraphs(*told_choices(results), *told_audit(outcome.audit, results))
 
 

@@ -180,7 +180,7 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
         zero_line(axes)
         if limit > 0.0:
             axes.set_ylim(-1.08 * limit * scale.factor, 1.08 * limit * scale.factor)
-        axes.set_ylabel(f"lag of {seen.results.noun(sensor)}\n{seen.results.place(sensor)} ({scale.unit})")
+        axes.set_ylabel(seen.results.label(sensor, scale.unit, "lag of"))
         if axes is not rows[0] and axes.get_legend() is not None:
             axes.get_legend().remove()
         if colours and axes is rows[0] and theory.first_mode_bears(seen.results):

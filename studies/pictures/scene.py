@@ -14,14 +14,14 @@ from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION, WIDTH, Figure, draw
 from studies.pictures.moving_shapes import FRONT, PLAN, SIDE, SPACE, view_of
 from studies.pictures.scene_layout import TURNED_UP, UP, Layout, Placed
-from studies.results.formatting import number
+from studies.pictures.scene_names import PLOT, ROW, Label, in_rows, write
+from studies.results.formatting import counted, number, quantity
 
 SYMBOL = 1.0 / 42.0  # of the width of the picture
 WIDE = 1.5  # least width over height of a picture
 SPRING = 3.0  # symbols: half of the length of a spring at most
 MOST_NAMED = 16  # nodes of a body, and carriages
 FEW_LINES = 30  # that are drawn bold
-PLOT, ROW, LETTER = 7.3, 0.17, 0.064  # inches: width of the plot, height of a row of names, width of a letter
 COLOURS = (BLUE, PURPLE, SKY)  # of bodies
 IN_MOTION = " Frames that move, their springs and loads, and robots (red, the tool a triangle) are as at time 0."
 AXES, ENDS = np.eye(3), np.array([-1.0, 1.0])
@@ -76,23 +76,6 @@ class Sheet(NamedTuple):
             self.symbol(place, place + self.u * outward, curve)
 
 
-class Label(NamedTuple):
-    """A name with the place (2,) that it belongs to on the sheet; above: of those that always stand above."""
-
-    place: Array
-    text: str
-    colour: str
-    above: bool = False
-
-
-class Named(NamedTuple):
-    """A name in the rows above or below a drawing: its middle, and the number of its row."""
-
-    label: Label
-    x: float
-    row: int
-
-
 def pictures(scene: Layout) -> list[Figure]:
     """The scene in one view where it lies in a plane, else in space and from three sides."""
     view = view_of(scene.points)
@@ -113,13 +96,12 @@ def _picture(scene: Layout, view: Array) -> Figure:
     for label in _labels(scene, view, u):
         is_high = high - low > 20.0 * u and label.place[1] > 0.5 * (low + high)
         (above if label.above or is_high else below).append(label)
-    rows = _in_rows(above, ends), _in_rows(below, ends)
+    rows = in_rows(above, ends), in_rows(below, ends)
     top, bottom = (max((one.row + 1.3 for one in found), default=0.3) * step for found in rows)
     study = scene.model.study
     caption = (
-        "To scale, in metres; symbols are not. Carriages (red) stand where they start, those that follow as far behind "
-        "as they trail; arrows along their ways; green: sensors; dashed: a track beside what carries it. What rides is "
-        "drawn a little above its track."
+        f"To scale, in metres; symbols are not. {_standing(scene)}; arrows along their ways; green: sensors; dashed: a "
+        "track beside what carries it. What rides is drawn a little above its track."
         f"{IN_MOTION * any((study.frame, study.load, study.spring, study.robot))}"
     )
 
@@ -130,33 +112,24 @@ def _picture(scene: Layout, view: Array) -> Figure:
         _draw_scene(scene, sheet)
         _draw_ways(scene, ways, sheet)
         _name_nodes(scene, sheet)
-        _write(rows[0], axes, high, step)
-        _write(rows[1], axes, low, -step)
+        write(rows[0], axes, high, step)
+        write(rows[1], axes, low, -step)
         _draw_scale(sheet, high)
 
     height = PLOT * (high + top - low + bottom) / width + (0.15 if view is SPACE else 0.5)
     return draw("scene", "The scene to scale", caption, height, fill)
 
 
-def _in_rows(names: Sequence[Label], ends: tuple[float, float]) -> list[Named]:
-    """Names in rows, from left to right, so that none covers another."""
-    found, taken, letter = list[Named](), list[float](), LETTER * (ends[1] - ends[0]) / PLOT
-    for label in sorted(names, key=lambda one: float(one.place[0])):
-        half = 0.5 * letter * (len(label.text) + 2)
-        x = min(max(float(label.place[0]), ends[0] + half), ends[1] - half)
-        row = next((place for place, end in enumerate(taken) if end <= x - half), len(taken))
-        taken[row : row + 1] = [x + half]
-        found.append(Named(label, x, row))
-    return found
-
-
-def _write(names: Sequence[Named], axes: Any, edge: float, step: float) -> None:
-    """Names in their rows beyond an edge, each with a line to its place."""
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    for (place, text, colour, _), x, row in names:
-        height = edge + (row + 0.6) * step
-        axes.plot([place[0], x], [place[1], height], color=colour, linewidth=0.5, alpha=0.6, zorder=1.0)
-        axes.text(x, height, text, color=colour, ha="center", va="center", fontsize=8.0, bbox=box, zorder=6.0)
+def _standing(scene: Layout) -> str:
+    """Where carriages stand, as the beginning of a sentence."""
+    if not scene.model.study.train:
+        return "Carriages (red) stand where they start, those that follow as far behind as they trail"
+    first = next(iter(scene.model.study.axles))
+    hidden = len(scene.model.carriages) - len(scene.positions)
+    left_out = f", {counted(hidden, 'axle')} further off left out" if hidden else ""
+    stay = not all(carriage.motion.passes for carriage in scene.model.study.carriage.values())
+    others = ", those that stay on their bodies as they start" if stay else ""
+    return f"Carriages (red) stand as {first} has come to {number(scene.positions[first])} m{left_out}{others}"
 
 
 def _draw_scale(sheet: Sheet, high: float) -> None:
@@ -216,7 +189,7 @@ def _draw_scene(scene: Layout, sheet: Sheet) -> None:
     for place, body in enumerate(scene.bodies.values()):
         frame = study.frame.get(body.part.name)
         _draw_body(body, sheet, COLOURS[place % len(COLOURS)], stands=frame is None or frame.stands)
-    for name in study.carriage:
+    for name in scene.positions:
         _draw_carriage(scene, name, sheet)
     for name, line in scene.robots.items():
         for foot in scene.feet(name):
@@ -297,6 +270,10 @@ def _draw_spring(body: Placed, spring: Elastic, sheet: Sheet) -> None:
 
 def _draw_carriage(scene: Layout, name: str, sheet: Sheet) -> None:
     carriage, u, foot = scene.model.study.carriage[name], sheet.u, scene.touched(name)
+    body, place = scene.bodies[carriage.on], scene.positions[name]
+    edge = min(max(place, 0.0), body.part.modal.length)
+    if edge != place:  # the way to it goes on beyond the end of its body
+        sheet.line(body.along(np.array([edge, place])), color=MUTED, linewidth=0.8, zorder=1.1)
     for standing in scene.contacts.get(name, ()):
         top = standing.below + (standing.above - standing.below) @ UP * UP
         sheet.line(np.array([top, standing.above]), linewidth=1.6)
@@ -365,11 +342,11 @@ def _labels(scene: Layout, view: Array, u: float) -> list[Label]:
         found.append(Label(view @ at, body.part.name, colour, above=True))
         for lump in body.outline.masses:
             found.append(Label(view @ body.at(lump.place), f"{lump.name} ({number(lump.mass)} kg)", INK))
-    ties = {tie.name: tie for tie in scene.model.carriages}
-    for name in list(ties) if len(ties) <= MOST_NAMED else list(ties)[:: len(ties) - 1]:
+    ties, shown = {tie.name: tie for tie in scene.model.carriages}, list(scene.positions)
+    for name in shown if len(shown) <= MOST_NAMED else shown[:: len(shown) - 1]:
         carriage = study.carriage[name]
         mass = carriage.moving_mass + ties[name].own_mass
-        load = f"{number(mass)} kg" if mass > 0.0 else f"{number(carriage.sum_of(carriage.forces))} N"
+        load = f"{number(mass)} kg" if mass > 0.0 else quantity(carriage.sum_of(carriage.forces), "N")
         found.append(Label(view @ (scene.touched(name) + u * UP), f"{name} ({load})", VERMILION, above=True))
     for name, sensor in study.sensor.items():
         where = scene.read(sensor)

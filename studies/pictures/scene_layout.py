@@ -18,6 +18,7 @@ from engine.bodies.modal.outline import Outline
 from engine.model.scene_model import BodyPart, SceneModel
 from engine.scene.carriages import Carriage, Contact
 from engine.scene.frames import GROUND
+from engine.scene.motions.base import Motion
 from engine.scene.robots import Arm, Robot
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
@@ -29,6 +30,7 @@ TURNED_UP = np.diag([1.0, -1.0, -1.0])  # from axes of which z is down, as of fr
 SAME = 1e-9
 ARROWS = 5  # of a load along a body
 FAR = 3.0  # lengths of a track beside it
+SEEN = 1.0  # lengths of its body beside it at which axles of a train are shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +73,7 @@ class Standing(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A scene in space; positions: of all carriages, m along their tracks; contacts: of carriages with a body."""
+    """A scene in space; positions: of the carriages shown, m along their tracks; contacts: of those with a body."""
 
     model: SceneModel
     bodies: Mapping[str, Placed]
@@ -83,8 +85,10 @@ class Layout:
         return self.bodies[self.model.study.carriage[carriage].on].along(self.positions[carriage])
 
     def read(self, sensor: Sensor) -> Array | None:
-        """(3,) where a sensor reads; None where that is unknown."""
+        """(3,) where a sensor reads; None where that is unknown, or not shown."""
         if sensor.rides is not None:
+            if sensor.rides not in self.positions:
+                return None
             at_contact = [c.below for c in self.contacts.get(sensor.rides, ()) if c.name == sensor.contact]
             return at_contact[0] if at_contact else self.touched(sensor.rides)
         body = self.bodies[str(sensor.body)]
@@ -159,16 +163,41 @@ def starts(model: SceneModel) -> dict[str, float]:
 
 
 def in_a_row(model: SceneModel) -> dict[str, float]:
-    """The same, but what passes and sets off later stands behind by as much as it trails, unless that is far."""
-    found = starts(model)
-    for name, carriage in model.study.carriage.items():
-        motion = carriage.motion
-        if motion.passes:
-            forward = np.sign(float(motion.path(motion.duration).S) - found[name])
-            found[name] -= forward * motion.max_speed / motion.time_scale * carriage.start_time
-    lengths = {tie.name: model.bodies[tie.body].modal.length for tie in model.carriages}
-    near = all(-FAR * length <= found[name] <= (1.0 + FAR) * length for name, length in lengths.items())
-    return found if near else starts(model)
+    """The same, but what passes and sets off later stands behind by as much as it trails, unless that is far. With a
+    train, what passes stands as the first one has come onto its body; axles that are far off theirs are left out."""
+    found, instant = starts(model), _instant(model)
+    row, off = dict(found), dict[str, float]()
+    for tie in model.carriages:
+        carriage, length = model.study.carriage[tie.name], model.bodies[tie.body].modal.length
+        if carriage.motion.passes:
+            start, end = _ends(carriage.motion)
+            row[tie.name] += float(np.sign(end - start)) * _speed(carriage.motion) * (instant - carriage.start_time)
+        off[tie.name] = max(-row[tie.name], row[tie.name] - length) / length
+    others = found.keys() - model.study.axles.keys()
+    if any(off[name] > FAR for name in others):
+        row |= {name: found[name] for name in others}
+    return {name: place for name, place in row.items() if name in others or off[name] <= SEEN}
+
+
+def _instant(model: SceneModel) -> float:
+    """s after which the first train has run onto its body as a whole, or to the end of it; 0 without a train."""
+    for first, name in model.study.axles.items():
+        motion = model.study.carriage[first].motion
+        length = next(model.bodies[tie.body].modal.length for tie in model.carriages if tie.name == first)
+        start, end = _ends(motion)
+        on = np.clip([start, end], 0.0, length)
+        return float(abs(on[0] - start) + min(model.study.train[name].length, abs(on[1] - on[0]))) / _speed(motion)
+    return 0.0
+
+
+def _ends(motion: Motion) -> Array:
+    """(2,) where a motion begins and ends, m."""
+    return motion.path([0.0, motion.duration]).S
+
+
+def _speed(motion: Motion) -> float:
+    """Its top speed, m/s."""
+    return motion.max_speed / motion.time_scale
 
 
 def layout(model: SceneModel, positions: Mapping[str, float]) -> Layout:

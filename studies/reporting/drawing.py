@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.station_path import frozen
 from engine.scene.study import Study
 from engine.scene.sweep import expand
+from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_modes
 from results_schema.arrays import Array
@@ -33,7 +35,7 @@ from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, star
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
 from studies.results.findings_common import told_trains
-from studies.results.formatting import counted, number, percent, quantity
+from studies.results.formatting import counted, number, percent, quantity, spanned, swept_quantity, typed_speed
 
 PAGE = "drawing.html"
 SHOWN = 6  # modes
@@ -96,7 +98,9 @@ def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
         figures=drawn,
         shapes=[*(_of_body(model, body) for body in scene.bodies.values()), *_of_whole(model)],
         tables=[
-            table for table in (_bodies(scene), _supports(scene), _carriages(scene), _sensors(scene)) if table.rows
+            table
+            for table in (_bodies(scene), _supports(scene), _trains(study), _carriages(scene, study), _sensors(scene))
+            if table.rows
         ],
         study_text=study.source.text,
     )
@@ -224,16 +228,50 @@ def _place(point: Array) -> str:
     return ", ".join(number(float(part), 4) for part in np.round(point, 9) + 0.0) + " m"
 
 
-def _carriages(scene: Layout) -> Table:
+def _trains(study: Study) -> Table:
+    rows = []
+    for name, train in study.train.items():
+        low, high = train.motion.range()
+        rows.append(
+            (
+                name,
+                train.on,
+                train.kind,
+                str(train.count),
+                quantity(train.length, "m", 4),
+                spanned(train.axle_loads, partial(quantity, units=train.units, digits=4)),
+                quantity(train.load, train.units, 4),
+                f"{number(low, 4)} to {number(high, 4)} m",
+                _speeds(study, axle_name(name, 0)),
+            )
+        )
+    headings = ("train", "on", "kind", "axles", "length", "load per axle", "in all", "way", "speed")
+    return Table("Trains", headings, rows)
+
+
+def _speeds(study: Study, carriage: str) -> str:
+    """The top speed of a carriage, or those of the slowest and the fastest variant where the sweep changes them."""
+    here, cases = f"carriage.{carriage}.motion.", expand(study)
+    axes = [axis for axis in cases.axes if any(path.startswith(here) for path in axis.paths)]
+    ends = [(axis.dim, int(pick(axis.values))) for axis in axes for pick in (np.argmin, np.argmax)]
+    places = [[end if dim == own else 0 for dim in cases.dims] for own, end in ends]
+    variants = [cases.study_of(study, int(np.ravel_multi_index(place, cases.shape))) for place in places]
+    motions = [one.carriage[carriage].motion for one in variants or [study]]
+    words = partial(swept_quantity, units="m s-1", typed=typed_speed(study, carriage))
+    return spanned([motion.max_speed / motion.time_scale for motion in motions], words)
+
+
+def _carriages(scene: Layout, study: Study) -> Table:
     model, rows = scene.model, []
     values = VariantValues(model.study, {}, 1)
     for index, tie in enumerate(model.carriages):
+        if tie.name in study.axles:
+            continue
         carriage, modal = model.study.carriage[tie.name], model.bodies[tie.body].modal
         force, (low, high) = float(weight(model, values, index)[0]), carriage.motion.range()
         s = np.linspace(max(low, 0.0), min(high, modal.length), PROBED)
         sag = "" if modal.rigid_modes else quantity(float(np.abs(modal.influence_at(s, s)).max()) * abs(force), "m")
         way = f"{number(low, 4)} to {number(high, 4)} m, {carriage.motion.kind}"
-        speed = quantity(carriage.motion.max_speed / carriage.motion.time_scale, "m s-1")
         mass = float(moving_mass(model, values, index)[0])
         rows.append(
             (
@@ -244,7 +282,7 @@ def _carriages(scene: Layout) -> Table:
                 quantity(force, "N"),
                 sag,
                 way,
-                speed,
+                _speeds(study, tie.name),
             )
         )
     headings = ("carriage", "on", "kind", "mass", "weight", "largest static deflection under it", "way", "top speed")

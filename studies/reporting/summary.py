@@ -174,15 +174,19 @@ def _end_as_json(end: Extreme) -> dict[str, Any]:
     return {"value": end.value, "error": end.error, "at": dict(end.variant)}
 
 
+def shown(study_results: Results) -> list[Range]:
+    """The ranges that people read: without contact forces of plain forces, which press as they are written."""
+    carriages = study_results.study.carriage.items()
+    plain = {f"{name}_contact_force_{end}" for name, one in carriages if not one.inertial for end in ("max", "min")}
+    return [one for one in ranges(study_results) if one.name not in plain]
+
+
 def asked(study_results: Results) -> list[Range]:
     """The ranges that answer: what has a limit, the results of the kind of study, extremes and contact forces, last the
     times of these; without means of squares, estimated errors and work."""
     beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
-    for name, carriage in study_results.study.carriage.items():  # a force presses as it is written
-        if not carriage.inertial:
-            beside |= {f"{name}_contact_force_max", f"{name}_contact_force_min"}
     first = tuple(f"{name}_" for name in _limited(study_results))
-    found = [one for one in ranges(study_results) if one.name not in beside]
+    found = [one for one in shown(study_results) if one.name not in beside]
     return sorted(
         found,
         key=lambda one: (

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
-
 import numpy as np
 
 from engine.scene.carriages import Carriage
 from engine.scene.study import Study
-from engine.scene.trains import Train
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity, scientific
@@ -42,37 +38,6 @@ def told_trains(study: Study) -> list[tuple[str, str]]:
         )
         for name, train in study.train.items()
     ]
-
-
-#: Wavelengths that are looked at between the lowest and the highest speed, and the part of a train's load that has to
-#: push in step to be told: a bogie of two axles does so far from any resonance of the whole train.
-WAVES, TOLD_IN_STEP = 4096, 0.3
-MOST_IN_STEP = 4  # speeds that are told, and first frequencies that are looked at
-
-
-class InStep(NamedTuple):
-    """A speed (m/s) at which a part of a train's load pushes in step with a frequency (Hz): where axles are
-    speed/frequency m apart, one comes in every period."""
-
-    speed: float
-    frequency: float
-    part: float
-
-    @property
-    def way(self) -> float:
-        """m in a period."""
-        return self.speed / self.frequency
-
-
-def speeds_in_step(train: Train, frequencies: Iterable[float], between: tuple[float, float]) -> list[InStep]:
-    """Where most of a train's load pushes in step with one of some frequencies (Hz), the highest speed first: at most
-    four, those with most load on the longest ways, as pushes on short ones cancel each other along a span."""
-    found, speeds = [], np.geomspace(*between, WAVES)
-    for frequency in frequencies:
-        share = train.in_step(speeds / frequency)
-        inside = (share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= TOLD_IN_STEP)
-        found += [InStep(float(speeds[k]), frequency, float(share[k])) for k in 1 + np.flatnonzero(inside)]
-    return sorted(sorted(found, key=lambda one: one.part * one.way)[-MOST_IN_STEP:], reverse=True)
 
 
 def in_words(results: Results, index: Index) -> str:

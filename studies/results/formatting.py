@@ -176,3 +176,10 @@ def typed_unit(study: Study, axis: str) -> Scale | None:
         return None
     name, size = unit.written(text)
     return Scale(1.0 / size, name)
+
+
+def typed_speed(study: Study, carriage: str) -> Scale | None:
+    """The unit in which a study file has the swept speeds of a carriage; None without one, or without such a sweep."""
+    key = f"carriage.{carriage}.motion.speed"
+    axes = (name for name, axis in study.sweep.axes.items() if any(key in study.targets(path) for path in axis.of))
+    return next((typed_unit(study, name) for name in axes), None)

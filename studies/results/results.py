@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from studies.results.places import Index
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
     from engine.scene.study import Study
+
+LETTERS = 26  # of a line beside a panel: as many are as high as one of four panels of a figure
 
 
 def _check_whole(dataset: xr.Dataset, study: Study) -> None:
@@ -134,10 +137,14 @@ class Results:
 
     def noun(self, sensor: str) -> str:
         """What a sensor measures, in words."""
+        return " ".join(self._words(sensor)).strip()
+
+    def _words(self, sensor: str) -> tuple[str, str]:
+        """Its quantity, and of which modes where it says so."""
         own = self.study.sensor[sensor]
         swept = any(f"sensor.{sensor}.frequency_limit" in axis.paths for axis in self.axes)
-        counted = f" of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
-        return f"{own.quantity.replace('_', ' ')}{counted}"
+        counted = f"of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
+        return own.quantity.replace("_", " "), counted
 
     def place(self, sensor: str) -> str:
         """Where a sensor reads, in words."""
@@ -154,9 +161,10 @@ class Results:
         return self.sensors[sensor] == "m" and self.study.sensor[sensor].direction is None
 
     def label(self, sensor: str, unit: str, of: str = "") -> str:
-        """Quantity, place and unit of a sensor as on a figure's axis."""
-        words = f"{of} {self.noun(sensor)}".strip()
-        return f"{words}\n{self.place(sensor)}{f' ({unit})' if unit else ''}"
+        """Quantity, place and unit of a sensor as on a figure's axis, in lines that fit beside a panel."""
+        words, counted = self._words(sensor)
+        parts = (f"{of} {words}".strip(), counted, f"{self.place(sensor)}{f' ({unit})' if unit else ''}")
+        return "\n".join(line for part in parts for line in wrap(part, LETTERS))
 
     @property
     def carriage(self) -> Carriage:

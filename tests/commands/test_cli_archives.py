@@ -15,6 +15,7 @@ import studies
 from results_schema.store.archive import open_archive
 from studies.commands import catalogue
 from studies.commands.cli import main
+from studies.reporting import summary
 from studies.reporting.comparison import compare
 from studies.results.formatting import quantity
 from studies.results.results import Results
@@ -45,6 +46,23 @@ def test_screens_fit_80_columns_and_speak_the_units_of_the_file(here: Path, caps
     screens = [shown, *(output(capsys, *command) for command in (["info", "small.nc"], ["list"]))]
     assert all(len(line) <= 80 for screen in screens for line in screen.splitlines())
     assert "1.8 to 36 km/h" in output(capsys, "check", "small.toml")
+
+
+def test_forces_that_press_as_they_are_written_stand_in_no_table(here: Path, capsys: Captured) -> None:
+    """But in the archive; what is the same everywhere has one line."""
+    train = "[train.tram]\non = 'beam'\nkind = 'force'\nforce = 2.0\nspacing = [0.2]\n"
+    motion = "motion = { kind = 'cruise', start = 0.0, end = 0.5, speed = 1.0 }\n\n"
+    fixed = SMALL.replace('steps = "auto"\naudit = 2', "steps = 400\naudit = 0\ntolerance = 0.1")
+    write(here, fixed.replace("[carriage.trolley]", f"{train}{motion}[carriage.trolley]", 1))
+    told = output(capsys, "run", "small.toml", "-v")
+    assert "trolley_contact_force_max" in told and "tram_1" not in told and "tram_2" not in told
+    assert main(["report", "small.nc", "-o", "page"]) == 0
+    results = results_of(open_archive("small.nc"))
+    assert not [one.name for one in summary.in_tables(results) if one.name.startswith("tram")]
+    assert float(results.dataset["tram_2_contact_force_max"].max()) == 2.0
+    names = [one.name for one in summary.shown(results) if one.is_constant]
+    details = told.partition("Smallest and largest of results")[2]
+    assert names and all(len(re.findall(rf"^{name} ", details, re.MULTILINE)) == 1 for name in names)
 
 
 def test_statuses_that_a_study_expects_end_with_0(here: Path, capsys: Captured) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,14 +18,16 @@ from engine.scene.study import Study
 from results_schema.errors import BadInput
 from studies.commands import catalogue
 from studies.commands.preview import FREQUENCIES_SHOWN
+from studies.pictures.common.figures import MUTED
 from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
+from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, in_a_row, layout, starts
 from studies.reporting.drawing import PAGE, page_of, write_drawing
 from studies.results.formatting import number
 from tests.bodies import models
 from tests.bodies.frames import straight
 from tests.engine import gantries
-from tests.engine.build import Table, beam, cruise, mass, study
+from tests.engine.build import Table, beam, cruise, force, mass, shuttle, study, under
 from tests.floating.scenes import ARM, history, steps
 from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
 from tests.robots.scenes import marched, scene
@@ -193,6 +196,77 @@ def test_what_follows_stands_behind() -> None:
     model = base_scene(study(beam(), axles))
     assert in_a_row(model) == pytest.approx({"a": 0.0, "b": -0.5, "c": 1.5})
     assert in_a_row(base_scene(study(beam(), axles | {"d": CAR | {"delay": 9.0}})))["b"] == 0.0
+
+
+SWEPT = {"speed": {"of": "train.tram.motion.speed", "values": ["9 km/h", "18 km/h", "14.4 km/h"]}}
+
+
+def hauled(own: Table, **changes: Any) -> Study:
+    """A train of five axles at 0, 0.5, 0.75, 1.5 and 2.5 m over a body of 1 m, to which it has half a metre to go."""
+    table = force(2.0, cruise(-0.5, 1.0, 4.0)) | {"spacing": [0.5, 0.25, 0.75, 1.0]} | own
+    return study(beam(), {}, **({"train": {"tram": table}, "sensor": {"under": under("tram_5")}} | changes))
+
+
+@pytest.mark.parametrize(
+    ("own", "places"),
+    [
+        ({}, [1.0, 0.5, 0.25, -0.5]),
+        ({"spacing_scale": 0.2}, [0.5, 0.4, 0.35, 0.2, 0.0]),
+        ({"motion": cruise(1.0, 0.0, 4.0)}, [0.0, 0.5, 0.75, 1.5]),
+    ],
+)
+def test_a_train_stands_on_its_body_as_far_as_it_goes(own: Table, places: list[float]) -> None:
+    """Its first axle at the end, or where the last one has just come on; axles that are far off are left out."""
+    row = in_a_row(base_scene(hauled(own)))
+    assert row == pytest.approx({f"tram_{axle}": place for axle, place in enumerate(places, 1)})
+
+
+def test_with_a_train_what_passes_stands_where_it_is_then() -> None:
+    """After 1.5 m at 4 m/s; what stays on its body is where it starts."""
+    riding = {
+        "quick": force(1.0, cruise(0.0, 1.0, 8.0)),
+        "late": force(1.0, cruise(1.0, 0.0, 4.0), delay=0.25),
+        "stays": force(1.0, shuttle(0.25, 0.75, 1.0, 0.1, 1)),
+    }
+    row = in_a_row(base_scene(hauled({}, carriage=riding)))
+    assert {name: row[name] for name in riding} == pytest.approx({"quick": 3.0, "late": 0.5, "stays": 0.25})
+    far = in_a_row(base_scene(hauled({}, carriage=riding | {"far": force(1.0, cruise(0.0, 1.0, 80.0))})))
+    assert {name: far[name] for name in riding} == {"quick": 0.0, "late": 1.0, "stays": 0.25}
+    assert far["tram_1"] == row["tram_1"]
+
+
+def test_a_train_is_one_row_with_the_speeds_of_its_sweep() -> None:
+    """And no carriage; what a sensor reads under an axle that is left out is not shown."""
+    found = hauled({"force": [3e3, 1e3, 2e3, 2e3, 2e3]}, sweep=SWEPT)
+    page = page_of(found, ())
+    tables = {table.title: table for table in page.tables}
+    assert "Carriages" not in tables
+    row = dict(zip(tables["Trains"].headings, *tables["Trains"].rows, strict=True))
+    assert [row[key] for key in ("axles", "length", "load per axle")] == ["5", "2.5 m", "1 kN to 3 kN"]
+    assert (row["in all"], row["speed"]) == ("10 kN", "9 km/h to 18 km/h")
+    assert "stand as tram_1 has come to 1 m, 1 axle further off left out;" in page.figures[0].caption
+
+
+def test_axles_are_drawn_with_their_loads_and_the_way_to_those_behind() -> None:
+    """A line goes on beyond the end of the body, to the last axle that is shown."""
+    model = base_scene(hauled({"force": [3e3, 1e3, 2e3, 2e3, 2e3]}))
+    axes = pictures(layout(model, in_a_row(model)))[0].drawing.axes[0]
+    names = {text.get_text() for text in axes.texts}
+    assert {"tram_1 (3 kN)", "tram_4 (2 kN)"} <= names and not any("tram_5" in name for name in names)
+    ends = [
+        np.asarray(line.get_xdata(), dtype=float).tolist() for line in axes.get_lines() if line.get_color() == MUTED
+    ]
+    assert any(one == pytest.approx([0.0, -0.5]) for one in ends if len(one) == 2)
+
+
+def test_top_speeds_are_those_of_the_sweep() -> None:
+    """Of the slowest and the fastest variant, whatever else is swept."""
+    sweep = {
+        "far": {"of": "carriage.car.motion.end", "values": [0.5, 1.0]},
+        "speed": {"of": "carriage.car.motion.speed", "values": [2.0, 3.0, 1.0]},
+    }
+    (table,) = (table for table in page_of(study(beam(), CAR, sweep=sweep), ()).tables if table.title == "Carriages")
+    assert table.rows[0][-1] == "1 m/s to 3 m/s"
 
 
 def test_bodies_that_nothing_uses_are_told() -> None:

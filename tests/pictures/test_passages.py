@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 
+from studies.findings.in_step import speeds_in_step
 from studies.pictures.common.figures import VERMILION, Figure
 from studies.reporting import answers
 from studies.reporting.report import MOST_OPEN
 from studies.results.results import Results
+from studies.runs import datasets
+from studies.runs.archived import results_of
 from tests.studies import scenes
 
 PLACES = (1.0, 2.0, 3.0, 4.0, 6.0)
 SENSORS = "\n".join(f'[sensor.place_{at:g}]\nbody = "bed"\nat = {at}' for at in PLACES)
 SHAKEN = '[sensor.shaken]\nbody = "bed"\nat = 5.0\nquantity = "acceleration"'
+LIMITED = 'quantity = "acceleration"\nfrequency_limit = "30 Hz"'
 MASS = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
 
 
@@ -71,6 +77,21 @@ def test_what_has_a_limit_comes_first_with_its_limit_as_a_line_and_in_words() ->
     assert "shaken" in told and results.sensors["shaken"] == "m s-2"
 
 
+def test_labels_of_panels_are_whole_and_apart() -> None:
+    """Of four stacked panels, beside which what is read takes three lines."""
+    places = "\n".join(f"[sensor.up_{at}]\nbody = 'bed'\nat = {at}.5\n{LIMITED}" for at in (2, 4, 6, 7))
+    found = figures(scenes.run("passage", scenes.pace("passage"), extra=places))
+    for name in ("largest-acceleration-of-modes-up-to-30-hz", "response"):
+        found[name].drawing.draw_without_rendering()
+        labels = [axes.yaxis.label for axes in panels(found[name]).values()]
+        boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.y0)
+        whole = found[name].drawing.bbox
+        assert len(boxes) == 4 and boxes[0].y0 >= whole.y0 and boxes[-1].y1 <= whole.y1
+        assert all(lower.y1 < upper.y0 for lower, upper in pairwise(boxes))
+        assert all(box.x0 >= whole.x0 for box in boxes)
+    assert any("\nof modes up to 30 Hz\n" in label.get_text() for label in labels)
+
+
 def test_a_limit_far_off_is_told_and_does_not_flatten_the_curves() -> None:
     found = figures(run("[question]\ndisplacement = 2.0"))
     for name in ("largest-displacement", "response"):
@@ -91,3 +112,36 @@ def test_limited_quantities_stand_unfolded() -> None:
     found = list(figures(run('[question]\nbending_moment = "1 kN m"\nacceleration = 1.0')))
     assert {"largest-bending-moment", "largest-acceleration"} <= set(found[:2])
     assert set(found[:2]) <= set(found[:MOST_OPEN])
+
+
+TRAIN = """\
+[train.tram]
+on = "bed"
+kind = "force"
+force = 500.0
+axles = 6
+spacing = 3.0
+motion = { kind = "cruise", start = 0.0, end = 10.0, speed = "30 km/h" }
+
+[sensor.quarter]
+body = "bed"
+at = 2.5
+"""
+SPEED = 'speed = { of = "train.tram.motion.speed", from = "6 km/h", to = "144 km/h", count = 5 }'
+
+
+def test_speeds_at_which_axles_push_in_step_are_marked() -> None:
+    """The four strongest of those that `check` tells, in every panel, in the unit of the sweep, with one entry."""
+    archive = datasets.archive_of(scenes.run("passage", SPEED, extra=TRAIN), "tram.nc")
+    results = results_of(archive)
+    readers = [results.study.sensor[name] for name in ("midspan", "quarter")]
+    told = speeds_in_step(results.study, "tram", archive.groups["/model/bed"], (6.0 / 3.6, 40.0), readers)
+    strongest = sorted(told, key=lambda one: one.swing)[-4:]
+    assert len(told) > 4
+    (figure,) = (one for one in answers.figures_of(results) if one.name == "largest-displacement")
+    for axes in figure.drawing.axes[:4]:
+        marks = [float(np.asarray(line.get_xdata())[0]) for line in axes.get_lines() if line.get_linestyle() == ":"]
+        assert marks == pytest.approx([3.6 * one.speed for one in strongest])
+    (legend,) = figure.drawing.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["axles in step with a frequency"]
+    assert not [one for one in figures(run("")).values() if one.drawing.legends and one.name != "response"]

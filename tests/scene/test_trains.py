@@ -16,7 +16,7 @@ from studies.commands.preview import preview
 from studies.protocol.study import kind_of
 from studies.reporting.drawing import page_of
 from studies.reporting.summary import in_tables
-from studies.results.findings_common import speeds_in_step, told_trains
+from studies.results.findings_common import told_trains
 from studies.results.formatting import number
 from studies.results.results import Results
 from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
@@ -231,31 +231,18 @@ def test_forces_press_as_they_are_written() -> None:
     assert not contacts_that_react(grid.scene)
 
 
-def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:
-    """At f d/k, by all of their load; five of them have no other maxima above 0.3 but near 0.25."""
-    regular = train(force(2.0, WAY) | {"axles": 5, "spacing": 3.0}).train["tram"]
-    found = speeds_in_step(regular, [2.0], (1.4, 7.0))
-    assert [one.speed for one in found] == pytest.approx([6.0, 3.0, 2.0, 1.5], rel=1e-3)
-    assert [one.part for one in found] == pytest.approx([1.0] * 4, abs=1e-3)
-
-
-def test_of_several_frequencies_the_longest_ways_are_told() -> None:
-    """3 m and 1.5 m: not what is fastest, a fifth of the spacing at 50 Hz."""
-    regular = train(force(2.0, WAY) | {"axles": 5, "spacing": 3.0}).train["tram"]
-    found = speeds_in_step(regular, [2.0, 5.0, 50.0], (1.4, 40.0))
-    assert [one.speed for one in found] == pytest.approx([15.0, 7.5, 6.0, 3.0], rel=2e-3)
-    assert [one.frequency for one in found] == [5.0, 5.0, 2.0, 2.0]
-
-
 def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
-    """f_k d of the four first frequencies k^2 pi/2 sqrt(E I/(rho A))/L^2, in the unit of the sweep."""
-    whole = load(TEXT.replace("[5, 10]", '["5 km/h", "130 km/h"]'))
+    """f d of the first frequency pi/2 sqrt(E I/(rho A))/L^2, in the unit of the sweep, the strongest marked, and beside
+    it; the second mode does not move the middle, and others hardly."""
+    whole = load(TEXT.replace("[5, 10]", '["7 km/h", "130 km/h"]').replace("spacing = 2.0", "spacing = 4.0"))
     tables = preview(kind_of(whole).parts(whole), 1).tables
     (table,) = [table for table in tables if "in step" in table.title]
-    assert table.headings == ("speed", "frequency", "way in a period", "part of its load")
+    assert table.headings == ("speed", "frequency", "way in a period", "part of its load", "swing of its mode")
     first = np.pi / 2.0 * np.sqrt(210e9 * 8.33e-6 / (7850.0 * 0.01)) / 15.0**2
-    frequencies = [k**2 * first for k in (4, 3, 2, 1)]
-    assert table.rows == [(f"{number(7.2 * f)} km/h", f"{number(f)} Hz", "2 m", "100 %") for f in frequencies]
+    at = [(f"{number(14.4 * n * first)} km/h", f"{number(first)} Hz") for n in (2.0, 1.0, 2.0 / 3.0)]
+    assert [row[:2] for row in table.rows] == at
+    assert [row[2:4] for row in table.rows] == [("8 m", "33 %"), ("4 m", "100 %"), ("2.67 m", "33 %")]
+    assert [row[4].endswith(" mm, the strongest") for row in table.rows] == [False, True, False]
 
 
 def test_equal_trains_push_in_step_at_equal_speeds() -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes
-from studies.pictures.common.figures import Figure, draw, limit_far, limit_line
+from studies.findings.in_step import speeds_in_step
+from studies.pictures.common.figures import INK, Figure, draw, limit_far, limit_line
 from studies.pictures.common.sweep_view import Curve, View, along_axis, draw_curves, one_legend, ratio_above
 from studies.results.findings_common import LOOSE, in_words
 from studies.results.formatting import counted, listed, percent, quantity, scale_for
@@ -18,6 +20,8 @@ from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_SENSORS = 4  # of one quantity
+MOST_MARKED = 4  # speeds of a train
+DOTTED: Any = {"color": INK, "linewidth": 0.9, "linestyle": ":", "zorder": 1.6}
 FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves would be flat under it
 
 
@@ -113,6 +117,26 @@ def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, dra
     for axes in grid[0]:
         speed_ratio(axes, seen)
     drawing.align_ylabels()
+    marked = _in_step(seen, sensors)
+    lines = [axes.axvline(x, **DOTTED) for x in marked for axes in grid.flat]
+    if lines:
+        drawing.legend(lines[:1], ["axles in step with a frequency"], loc="outside lower right")
+
+
+def _in_step(seen: View, sensors: list[str]) -> list[float]:
+    """Speeds, as along the horizontal axis, at which axles of trains push in step, the strongest of each train; none
+    where the archive's bodies are not at hand."""
+    results, axis, found = seen.results, seen.x, list[float]()
+    assert axis is not None
+    for name, train in results.study.train.items():
+        factor = axis.targets.get(f"carriage.{axle_name(name, 0)}.motion.speed")
+        if factor is not None and train.on in results.models:
+            between = factor * float(axis.values.min()), factor * float(axis.values.max())
+            readers = [results.study.sensor[sensor] for sensor in sensors]
+            told = speeds_in_step(results.study, name, results.models[train.on], between, readers)
+            strongest = sorted(told, key=lambda one: one.swing)[-MOST_MARKED:]
+            found += [one.speed / factor * axis.factor for one in strongest]
+    return found
 
 
 def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:

@@ -1,0 +1,97 @@
+"""Speeds at which the axles of a train push in step with a frequency of the body that they cross, and how strongly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from engine.model.scene_model import UNFELT
+from engine.scene.sensors import Envelope, Sensor
+from engine.scene.study import Study
+from engine.scene.trains import Train
+from results_schema.arrays import Array, Counts
+from results_schema.lazy_imports import xr
+from results_schema.quantities import QUANTITIES
+
+#: Speeds that are looked at between the lowest and the highest, and the part of a train's load that has to push in
+#: step to be told: a bogie of two axles does so far from any resonance of the whole train.
+LOOKED_AT, TOLD_IN_STEP = 4096, 0.3
+MODES, MOST = 4, 8  # that are looked at, the lowest that move the track; speeds that are told
+LEAST = 0.05  # of the largest swing: what is less builds up to nothing
+ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
+
+
+class InStep(NamedTuple):
+    """A speed (m/s) at which a part of a train's load pushes in step with a frequency (Hz): where axles are
+    speed/frequency m apart, one comes in every period. swing: to which that mode alone builds up, an acceleration or a
+    displacement in `units`."""
+
+    speed: float
+    frequency: float
+    part: float
+    swing: float
+    units: str
+
+    @property
+    def way(self) -> float:
+        """m in a period."""
+        return self.speed / self.frequency
+
+
+def speeds_in_step(
+    study: Study, name: str, body: xr.Dataset, between: tuple[float, float], readers: Iterable[Sensor | Envelope]
+) -> list[InStep]:
+    """Where much of a train's load pushes in step with one of the first frequencies of its body, the highest speed
+    first: at most eight, at which that mode swings most. body: as its archive tells it. readers: where some read
+    accelerations of that body these count, of modes up to their frequency limits, else displacements."""
+    train, found, speeds = study.train[name], list[InStep](), np.geomspace(*between, LOOKED_AT)
+    of_body = [one for one in readers if one.body == train.on]
+    read = [one for one in of_body if QUANTITIES[one.quantity].rate == ACCELERATION]
+    units, newtons = "m s-2" if read else "m", train.load * (1.0 if train.units == "N" else study.gravity)
+    seen = read or [one for one in of_body if one.quantity == "displacement"]
+    for mode in _modes(body, max((one.frequency_limit or np.inf for one in read), default=np.inf)):
+        own = body.isel(mode=mode)
+        frequency = float(own["frequency"])
+        share = train.in_step(speeds / frequency)
+        inside = (share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= TOLD_IN_STEP)
+        at = 1 + np.flatnonzero(inside)
+        swings = newtons * share[at] * _per_newton(train, own, speeds[at]) * _moved(own, seen)
+        swings = swings if read else swings / (2.0 * np.pi * frequency) ** 2
+        numbers = zip(speeds[at].tolist(), share[at].tolist(), swings.tolist(), strict=True)
+        found += [InStep(speed, frequency, part, swing, units) for speed, part, swing in numbers]
+    strongest = sorted(found, key=lambda one: one.swing)[-MOST:]
+    return sorted((one for one in strongest if one.swing >= LEAST * strongest[-1].swing), reverse=True)
+
+
+def _moved(mode: xr.Dataset, readers: Sequence[Sensor | Envelope]) -> float:
+    """By how much a mode moves the places that are read, at most, or its track where one reads something else."""
+    shape = np.abs(mode["mode_shape"].values)
+    places = [one.at for one in readers if isinstance(one, Sensor) and one.spot is None and one.at is not None]
+    if not places or len(places) < len(readers):
+        return float(shape.max())
+    return float(np.interp(places, mode["position"].values, shape).max())
+
+
+def _modes(body: xr.Dataset, highest: float) -> Counts:
+    """The lowest modes that move the track, up to a frequency (Hz)."""
+    size, frequencies = np.abs(body["mode_shape"].values).max(axis=1), body["frequency"].values
+    return np.flatnonzero((size > UNFELT * size.max()) & (frequencies > 0.0) & (frequencies <= highest))[:MODES]
+
+
+def _per_newton(train: Train, mode: xr.Dataset, speeds: Array) -> Array:
+    """The acceleration of a mode's coordinate per newton that pushes in step with it.
+
+    After a force F at a speed v it rings with F omega/v |integral of its shape times exp(i omega x/v) dx|, after a
+    train with that of the sum of its forces in step, of which damping leaves the mean over the time in which they come.
+    """
+    omega, x, shape = 2.0 * np.pi * float(mode["frequency"]), mode["position"].values, mode["mode_shape"].values
+    low, high = np.clip(train.motion.range(), x[0], x[-1])
+    crossed, wave = np.linspace(low, high, x.size), omega / speeds
+    phi = np.interp(crossed, x, shape)
+    turned = np.exp(1j * wave[:, None] * crossed)
+    ends = (turned[:, -1] * phi[-1] - turned[:, 0] * phi[0]) / (1j * wave)  # by parts, as the shape bends little
+    integral = ends + np.diff(turned, axis=1) @ (np.diff(phi) / np.diff(crossed)) / wave**2  # between two places
+    decay = np.maximum(float(mode["damping_ratio"]) * wave * train.length, NO_DECAY)
+    return np.asarray(np.abs(integral) * wave * -np.expm1(-decay) / decay)

@@ -1,0 +1,149 @@
+"""Speeds at which axles push in step: where their distances say, as strongly as what rings on after the train."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import engine
+from engine.batch.dataset import model_groups
+from engine.model.distinct_models import base_scene
+from engine.scene.study import Study
+from results_schema.arrays import Array
+from results_schema.lazy_imports import xr
+from studies.findings.in_step import InStep, speeds_in_step
+from tests.engine.build import Table, beam, cruise, fixed, force, mass, study
+
+REGULAR = {"axles": 5, "spacing": 3.0}
+ELASTIC = [{"at": 0.0, "stiffness": 1.5e9}, {"at": 20.0, "stiffness": 1e12}, {"at": 40.0, "stiffness": 1.5e9}]
+BRIDGE: Table = {
+    **{"kind": "beam", "length": 40.0, "area": 1.0, "second_moment": 1.0, "youngs_modulus": 3.2e10, "density": 9000.0},
+    **{"supports": ELASTIC, "damping_ratio": 0.01},
+}
+ARTICULATED = [3.0, 11.0, 3.0, 3.525, 3.0, *([18.0, 3.0] * 12)]
+
+
+def hauled(bed: Table, **own: Any) -> Study:
+    """A train over a body, whose middle is read; sensor: of it."""
+    sensor = {"middle": fixed(0.5 * bed["length"], "acceleration") | own.pop("sensor", {})}
+    table = force(2.0, cruise(0.0, bed["length"], 1.0)) | own
+    return study(bed, {}, train={"tram": table}, sensor=sensor)
+
+
+def bodies(given: Study) -> xr.Dataset:
+    """The body as its archive tells it."""
+    return model_groups(base_scene(given))["/model/bed"]
+
+
+def found(given: Study, low: float, high: float) -> list[InStep]:
+    return speeds_in_step(given, "tram", bodies(given), (low, high), given.sensor.values())
+
+
+def with_frequencies(*hertz: float) -> tuple[Study, xr.Dataset]:
+    """A train over a body with some frequencies and the shapes of a pinned beam."""
+    given = hauled(beam(modes=len(hertz)), **REGULAR)
+    return given, bodies(given).assign(frequency=("mode", list(hertz)))
+
+
+def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:
+    """At f d/k, by all of their load; five of them have no other maxima above 0.3 but near 0.25."""
+    given, body = with_frequencies(2.0)
+    speeds = speeds_in_step(given, "tram", body, (1.4, 7.0), ())
+    assert [one.speed for one in speeds] == pytest.approx([6.0, 3.0, 2.0, 1.5], rel=1e-3)
+    assert [one.part for one in speeds] == pytest.approx([1.0] * 4, abs=1e-3)
+
+
+def test_of_many_the_strongest_are_told() -> None:
+    """Eight at most, the highest speed first, of four frequencies."""
+    given, body = with_frequencies(2.0, 5.0, 9.0, 30.0, 50.0)
+    body["mode_shape"] *= np.array([1.0, 1.0, 1.0, 3.0, 9.0])[:, None]
+    every = [
+        one
+        for mode in range(4)
+        for low in np.geomspace(1.4, 40.0, 13)[:-1]
+        for one in speeds_in_step(given, "tram", body.isel(mode=[mode]), (low, low * 1.324), given.sensor.values())
+    ]
+    told = speeds_in_step(given, "tram", body, (1.4, 40.0), given.sensor.values())
+    assert len(every) > 8 == len(told) and {one.frequency for one in told} <= {2.0, 5.0, 9.0, 30.0}
+    least = min(one.swing for one in told)
+    assert sum(one.swing > 1.01 * least for one in every) <= 8
+    assert told == sorted(told, reverse=True)
+
+
+def swing_of(given: Study, one: InStep, mode: int, places: Array) -> float:
+    """That of a mode of the bridge at some places, each of its parts by itself: the sum of F exp(-i w t) over axles,
+    |integral phi exp(i w x/v) dx| along what is crossed, and the mean that damping leaves while the axles come."""
+    modal, train = base_scene(given).bodies[0].modal, given.train["tram"]
+    omega, time, pushed = float(modal.omega[mode]), 0.0, 0j
+    for axle, way in enumerate((0.0, *ARTICULATED)):
+        time += way / one.speed
+        pushed += train.own("force")[axle] * np.exp(-1j * omega * time)
+    assert one.part == pytest.approx(abs(pushed) / train.load, rel=1e-9)
+
+    def along(kind: str) -> float:
+        shape, wave = (lambda x: float(modal.shape([x])[0, mode])), omega / one.speed
+        return float(quad(shape, *sorted((train.motion.start, train.motion.end)), weight=kind, wvar=wave, limit=200)[0])
+
+    left = quad(lambda t: np.exp(-0.01 * omega * t) / time, 0.0, time)[0]
+    moved = float(np.abs(modal.shape(places)[:, mode]).max())
+    return float(abs(pushed) * np.hypot(along("cos"), along("sin")) * omega / one.speed * moved * left)
+
+
+@pytest.mark.parametrize("quantity", ["acceleration", "displacement"])
+@pytest.mark.parametrize("ends", [(0.0, 40.0), (33.0, 7.0)])
+def test_swings_are_sums_over_axles_and_along_the_track(ends: tuple[float, float], quantity: str) -> None:
+    given = hauled(
+        BRIDGE,
+        spacing=ARTICULATED,
+        force=[19e4, *([17e4] * 29)],
+        motion=cruise(*ends, 50.0),
+        sensor={"quantity": quantity, "at": 33.0},
+    )
+    told, omega = found(given, 28.0, 97.0), base_scene(given).bodies[0].modal.omega
+    assert len(told) > 5
+    for one in told:
+        mode = int(np.argmin(np.abs(omega / (2.0 * np.pi) - one.frequency)))
+        order = {"acceleration": 1.0, "displacement": float(omega[mode]) ** 2}[quantity]
+        assert one.swing == pytest.approx(swing_of(given, one, mode, np.array([33.0])) / order, rel=2e-3)
+
+
+def test_what_rings_on_after_a_train_is_as_large() -> None:
+    """On an undamped beam of one mode, which is read where that moves most, by the march itself."""
+    bed = beam(modes=1, damping_ratio=0.0)
+    train = {"spacing": [0.4, 0.7, 0.4], "force": [1.0, 2.0, 2.0, 1.0]}
+    told = found(hauled(bed, **train), 0.3, 1.5)
+    assert len(told) > 1
+    for one in told:
+        motion = cruise(0.0, 1.0, one.speed, after=3.0)
+        changes: Any = {"output": {"residual": True, "histories": "none"}, "solver": {"steps": 4000}}
+        given = hauled(bed, **train, motion=motion).with_values(changes)
+        assert float(engine.run(given)["middle_residual"]) == pytest.approx(one.swing, rel=1e-3)
+
+
+def test_weights_of_masses_push() -> None:
+    """As forces do, by gravity."""
+    as_force = found(hauled(beam(), **REGULAR, sensor={"quantity": "displacement"}), 0.2, 1.0)
+    masses = study(beam(), {}, train={"tram": mass(2.0 / 9.81, cruise(0.0, 1.0, 1.0)) | REGULAR})
+    assert [one.swing for one in found(masses, 0.2, 1.0)] == pytest.approx([o.swing for o in as_force])
+
+
+def test_the_worst_speeds_of_a_railway_bridge_are_told() -> None:
+    """At which the march finds the largest accelerations of modes up to 30 Hz: 285, 250 and 220 km/h."""
+    given = hauled(BRIDGE, spacing=ARTICULATED, force=19e4, sensor={"frequency_limit": 30.0, "at": 4.0})
+    told = found(given, 100.0 / 3.6, 350.0 / 3.6)
+    by_strength = sorted(told, key=lambda one: -one.swing)
+    assert [3.6 * one.speed for one in by_strength[:3]] == pytest.approx([284.0, 248.0, 221.0], abs=1.0)
+    assert max(one.frequency for one in told) < 30.0
+    every = found(hauled(BRIDGE, spacing=ARTICULATED, sensor={"at": 4.0}), 28.0, 97.0)
+    assert max(one.frequency for one in every) > 30.0
+
+
+def test_what_builds_up_to_next_to_nothing_is_not_told() -> None:
+    """Of pushes 2/3 and 2/9 of the length apart, which cancel each other along the half-wave of the first mode, of the
+    second one, which is still in the middle, and of higher ones, which hardly swing."""
+    spread = hauled(beam(), axles=5, spacing=2.0 / 3.0, sensor={"quantity": "displacement"})
+    first = float(base_scene(spread).bodies[0].modal.omega[0]) / (2.0 * np.pi)
+    assert [one.way for one in found(spread, 0.2 * first, 0.9 * first)] == pytest.approx([1.0 / 3.0], rel=1e-3)
