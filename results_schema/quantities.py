@@ -55,6 +55,12 @@ class Quantity:
         return self.of_section or self.derivative > 1
 
 
+    @property
+    def order(self) -> int:
+        """Of the derivative by the place by which it converges with modes: what supports carry is as a shear force."""
+        return 3 if self.of_support else self.derivative
+
+
 def _bending(section: UniformSection) -> float:
     return -section.bending_stiffness  # M = -E I w'', V = dM/ds
 

@@ -23,6 +23,7 @@ from results_schema.statuses import lost
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome
     from engine.model.scene_model import SceneModel
+    from engine.scene.sensors import Sensor
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
@@ -109,13 +110,26 @@ Entry = tuple[Result, Callable[[Pair], Array]]  # and how far it is apart
 
 def _of_sensors(asked: Asked) -> Iterator[Entry]:
     for j, (name, sensor) in enumerate(asked.study.sensor.items()):
-        held = _held(asked.study, sensor.quantity, sensor.tolerance)
+        extreme, history = (_held_of(asked, sensor, most) for most in MOST_ORDERS)
         for own in (f"{name}_{end}" for end in EXTREMES + RESIDUAL * asked.study.output.residual):
-            yield Result(own, name, *held), partial(Pair.reading, name=own, sensor=j)
+            yield Result(own, name, *extreme), partial(Pair.reading, name=own, sensor=j)
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)
         if asked.keeps_histories:
-            yield Result(name, name, *held), partial(Pair.history, sensor=j)
+            yield Result(name, name, *history), partial(Pair.history, sensor=j)
+
+
+#: Orders of derivatives of which extremes, and histories, converge well with modes where a load comes at an instant
+#: onto a place that gives way, as it strikes every mode. Of 96 variants on springs the estimated errors of moments with
+#: 64 modes were 9 times the true ones (of extremes 1e-8 to 3e-5), of reactions 10 to 1,000 times.
+MOST_ORDERS = (2, 1)
+
+
+def _held_of(asked: Asked, sensor: Sensor, most: int) -> tuple[float, bool]:
+    """The tolerance of a sensor's readings, and whether it is the study's; none where they hardly converge."""
+    if asked.at_once and sensor.tolerance is None and QUANTITIES[sensor.quantity].order > most:
+        return np.nan, False
+    return _held(asked.study, sensor.quantity, sensor.tolerance)
 
 
 def _of_accelerations(asked: Asked) -> Iterator[Entry]:

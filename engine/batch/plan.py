@@ -256,7 +256,8 @@ def make_plan(
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"
     accelerated = "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
-    asked = Asked(study, reduction, window, accelerated)
+    base = base_scene(study)
+    asked = Asked(study, reduction, window, accelerated, base.loaded_at_once)
     check_memory(study, cases.size, min(IN_MEMORY, 8 * cases.size * numbers_per_variant(asked)))
     grids, members = [], []
     for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):
@@ -264,7 +265,7 @@ def make_plan(
             grids.append(grid)
             members.append(own)
     check_places(study, (grid.scene for grid in grids))
-    plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base_scene(study), results)
+    plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base, results)
     check_memory(study, plan.size, plan.gathered_bytes)
     return plan
 

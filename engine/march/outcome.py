@@ -37,12 +37,14 @@ Flat = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations."""
+    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations. at_once:
+    whether a load comes onto a body at an instant, where that gives way."""
 
     study: Study
     reduction: Reduction | None
     window: Window
     accelerated: bool = False
+    at_once: bool = False
 
     @property
     def keeps_histories(self) -> bool:

@@ -19,7 +19,7 @@ from results_schema.status import Fidelity, Status
 from results_schema.store.rows import Collector
 from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import OPEN, only_grid, passages
-from tests.engine.build import beam, cruise, fixed, mass, under
+from tests.engine.build import Table, beam, cruise, fixed, mass, study, swing, under
 
 HARD = mass(1.0, cruise(0.0, 1.0, 3.0))  # of which moments are far from 1e-6 with any modes
 TIGHT = {"tolerance": 1e-6}
@@ -243,3 +243,36 @@ def test_what_has_diverged_is_infinitely_far_or_unknown() -> None:
     bad = replace(one, status=status)
     assert np.all(np.isinf(differences(grid.asked, grid.scene, grid.values, bad, one)[:, 1]))
     assert np.all(np.isnan(differences(grid.asked, grid.scene, grid.values, one, bad)[:, 1]))
+
+
+SOFT = [{"at": 0.0, "stiffness": 500.0}, {"at": 1.0, "stiffness": 500.0}]
+READ = {
+    "place": fixed(0.4),
+    "moment": fixed(0.4, "bending_moment"),
+    "reaction": fixed(0.0, "support_reaction"),
+    "asked": fixed(0.4, "bending_moment") | {"tolerance": 1e-2},
+}
+
+
+@pytest.mark.parametrize(
+    ("supports", "motion", "more", "at_once"),
+    [
+        ("pinned-pinned", cruise(0.0, 1.0, 1.0), {}, False),
+        ("pinned-pinned", cruise(-0.2, 1.2, 1.0), {}, False),
+        ("pinned-pinned", cruise(0.3, 1.0, 1.0), {}, True),
+        ("clamped-free", cruise(0.0, 1.0, 1.0), {}, False),
+        ("clamped-free", cruise(1.0, 0.0, 1.0), {}, True),
+        (SOFT, cruise(0.0, 1.0, 1.0), {}, True),
+        (SOFT, swing(0.5, 0.2, 0.5, 1), {}, False),
+        (SOFT, swing(0.5, 0.2, 0.5, 1), {"initial": "rest"}, True),
+    ],
+)
+def test_what_loads_strike_at_once_is_told_where_it_hardly_converges(
+    supports: Any, motion: Table, more: Table, at_once: bool
+) -> None:
+    """Reactions, and histories of moments, unless their sensor has a tolerance of its own."""
+    given = study(beam(supports=supports), mass(0.1, motion), sensor=READ, output={"histories": "all"}, **more)
+    plan = make_plan(given)
+    told = {result.name for result in results_of(plan.asked) if np.isnan(result.tolerance)}
+    struck = {"reaction", "reaction_max", "reaction_min", "reaction_rms", "moment"}
+    assert told & {*struck, "place", "moment_max", "asked", "asked_max"} == (struck if at_once else set())
