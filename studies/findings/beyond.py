@@ -1,5 +1,6 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated
 
@@ -44,26 +45,38 @@ class AskedOfPassages(Limits):
 
 
 def ranked(results: Results, limits: Limits) -> list[str]:
-    """Sensors by what they say: those with a limit, what is the largest part of it first; then the first of every other
-    quantity, the second of every one, and so on."""
-    parts: dict[str, float] = {}
-    turns: dict[str, tuple[int, int]] = {}
-    seen: list[str] = []
-    for place, (name, sensor) in enumerate(results.study.sensor.items()):
-        if (limit := limits.limit(sensor.quantity)) is not None:
-            values = sizes(results, name)
-            top = largest(results, values)
-            parts[name] = 0.0 if top is None else float(values[top]) / limit
-        turns[name] = (seen.count(sensor.quantity), place)
-        seen.append(sensor.quantity)
-    rest = [name for name in sorted(turns, key=turns.__getitem__) if name not in parts]
-    return [*sorted(parts, key=lambda name: -parts[name]), *rest]
+    """Sensors by what they say, as `in_turns` has them, by their largest absolute values."""
+    return in_turns(results, limits, {name: _size(results, name) for name in results.sensors})
+
+
+def in_turns(results: Results, limits: Limits, size: Mapping[str, float]) -> list[str]:
+    """Sensors by how large they get: the largest of every quantity, first those with a limit, by the part of it that
+    they reach; then all others with a limit, then the second largest of every other quantity, and so on.
+
+    A carriage's own sprung mass is not compared with bodies under it.
+    """
+    alike: dict[tuple[str, bool], list[str]] = {}
+    for name, sensor in results.study.sensor.items():
+        alike.setdefault((sensor.quantity, sensor.carriage is None), []).append(name)
+    order: dict[str, tuple[bool, bool, int, float, int]] = {}
+    for place, ((quantity, _), names) in enumerate(alike.items()):
+        limit = limits.limit(quantity)
+        for turn, name in enumerate(sorted(names, key=lambda name: -size[name])):
+            free, part = limit is None, 0.0 if limit is None else size[name] / limit
+            order[name] = (turn > 0, free, turn if free else 0, -part, place)
+    return sorted(order, key=order.__getitem__)
+
+
+def _size(results: Results, sensor: str) -> float:
+    """The largest absolute value of a sensor; negative where it has none."""
+    values = sizes(results, sensor)
+    top = largest(results, values)
+    return -1.0 if top is None else float(values[top])
 
 
 def of_every_quantity(results: Results, most: int) -> list[str]:
-    """So many sensors in the order of the file: the first of every quantity, then the second, and so on."""
-    first = ranked(results, Limits())[:most]
-    return [name for name in results.sensors if name in first]
+    """So many sensors: the largest of every quantity, in the order of the file, then the second largest, and so on."""
+    return ranked(results, Limits())[:most]
 
 
 def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:

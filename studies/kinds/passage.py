@@ -22,7 +22,7 @@ from studies.results.formatting import counted, listed, number, quantity
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
-MOST_SENSORS = 4
+MOST_SENSORS = 6
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
 
@@ -48,14 +48,14 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        told = (_largest, _amplified, _limited)
-        said = ["".join(tell(results, sensor) for tell in told) for sensor in _told(results)]
+        told, sensors = (_largest, _amplified, _limited), _told(results)
+        said = ["".join(tell(results, sensor) for tell in told) for sensor in sensors]
+        said[0] += _effects(results, sensors[0])
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
         residual = residuals(results, question_of(results.study, AskedOfPassages).residual)
-        first = [*residual[:1], *said[:1], *lifted, *_effects(results)]
-        return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
+        return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variants with the largest value and the largest amplification, and those
@@ -85,7 +85,9 @@ def _largest(results: Results, sensor: str) -> str:
         return f"{sensor}: no variant has values."
     opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
     shown = "" if results.held[results.kept.values].all() else opened
-    said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
+    said = (
+        f"{sensor}: {shown}the largest {results.noun(sensor)} {results.place(sensor)} is {_value(results, sensor, top)}"
+    )
     if same := unchanged(results, sizes(results, sensor)):
         return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
@@ -103,11 +105,10 @@ def _largest(results: Results, sensor: str) -> str:
     )
 
 
-def _effects(results: Results) -> list[str]:
-    """What every swept number does to the first sensor, where there are several."""
-    sensor = _told(results)[0]
+def _effects(results: Results, sensor: str) -> str:
+    """What every swept number does to a sensor, where there are several; "" else."""
     said = told_effects(results, sizes(results, sensor), f"the largest {results.noun(sensor)}")
-    return [f"{sensor}: {said}"] if said else []
+    return f" {said}" if said else ""
 
 
 def _amplified(results: Results, sensor: str) -> str:
