@@ -1,18 +1,20 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
-from studies.results.axes import VARIANT, Axis
-from studies.results.formatting import counted, listed
+from studies.protocol.study import kind_named, question_of
+from studies.results.axes import PACES, VARIANT, Axis
+from studies.results.formatting import counted, listed, quantity
 from studies.results.results import Results
 
 MOST_PARTS = 3  # of a sweep that are told one by one
@@ -44,30 +46,43 @@ class AskedOfPassages(Limits):
     residual: Limits = Limits()
 
 
-def ranked(results: Results, limits: Limits) -> list[str]:
+def limits_of(study: Study) -> Limits:
+    """The limits that a study's table [question] names; none where its kind knows none of readings."""
+    settings = kind_named(study.kind).settings
+    return question_of(study, settings) if settings is not None and issubclass(settings, Limits) else Limits()
+
+
+def told_limit(results: Results, values: Array, limit: float, units: str) -> str:
+    """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another."""
+    said = where_beyond(results, values, limit, results.axis(*PACES))
+    return f" Its absolute value exceeds {quantity(limit, units)} {said}."
+
+
+def ranked(results: Results, limits: Limits, told: Collection[str] = ()) -> list[str]:
     """Sensors by what they say, as `in_turns` has them, by their largest absolute values."""
-    return in_turns(results, limits, {name: _size(results, name) for name in results.sensors})
+    return in_turns(results, limits, {name: largest_size(results, name) for name in results.sensors}, told)
 
 
-def in_turns(results: Results, limits: Limits, size: Mapping[str, float]) -> list[str]:
+def in_turns(results: Results, limits: Limits, size: Mapping[str, float], told: Collection[str] = ()) -> list[str]:
     """Sensors by how large they get: the largest of every quantity, first those with a limit, by the part of it that
     they reach; then all others with a limit, then the second largest of every other quantity, and so on.
 
-    A carriage's own sprung mass is not compared with bodies under it.
+    told: quantities of which something larger is told before. A carriage's own sprung mass is not compared with bodies
+    under it.
     """
     alike: dict[tuple[str, bool], list[str]] = {}
     for name, sensor in results.study.sensor.items():
         alike.setdefault((sensor.quantity, sensor.carriage is None), []).append(name)
     order: dict[str, tuple[bool, bool, int, float, int]] = {}
-    for place, ((quantity, _), names) in enumerate(alike.items()):
-        limit = limits.limit(quantity)
-        for turn, name in enumerate(sorted(names, key=lambda name: -size[name])):
+    for place, ((read, of_body), names) in enumerate(alike.items()):
+        limit, first = limits.limit(read), int(of_body and read in told)
+        for turn, name in enumerate(sorted(names, key=lambda name: -size[name]), first):
             free, part = limit is None, 0.0 if limit is None else size[name] / limit
             order[name] = (turn > 0, free, turn if free else 0, -part, place)
     return sorted(order, key=order.__getitem__)
 
 
-def _size(results: Results, sensor: str) -> float:
+def largest_size(results: Results, sensor: str) -> float:
     """The largest absolute value of a sensor; negative where it has none."""
     values = sizes(results, sensor)
     top = largest(results, values)

@@ -13,7 +13,7 @@ from engine.scene.trains import Train
 from results_schema.arrays import Array
 from results_schema.status import Status
 from studies.results.formatting import counted, percent, quantity, scientific
-from studies.results.places import Index, extreme
+from studies.results.places import Index
 from studies.results.results import Results, statuses
 
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
@@ -111,29 +111,6 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
     if lowest == axis.values.min():
         return f"exceeds {percent(threshold)} already at {axis.in_words(lowest)}"
     return f"first exceeds {percent(threshold)} at {axis.in_words(lowest)}"
-
-
-def told_envelopes(results: Results) -> list[str]:
-    """The value of largest size anywhere along a body, of every envelope."""
-    said = []
-    for name, envelope in results.study.envelope.items():
-        ends = [results.envelope(name, end) for end in ("max", "min")]
-        upper = np.abs(ends[0]) >= np.abs(ends[1])
-        values = np.where(upper, *ends)
-        place = extreme(np.where(results.with_values[..., None], np.abs(values), np.nan))
-        if place is None:
-            said.append(f"{name}: no variant has values.")
-            continue
-        result = f"{name}_envelope_{'max' if upper[place] else 'min'}"
-        value = f"{quantity(float(values[place]), results.envelopes[name])}{uncertainty(results, result, place[:-1])}"
-        at = quantity(float(results.dataset[f"{name}_place"].values[place[-1]]), "m")
-        held = "while the contact holds, " if not results.held.all() and results.held.any() else ""
-        words = envelope.quantity.replace("_", " ")
-        said.append(
-            f"{name}: {held}the largest {words} along {envelope.body} is {value}, at {at} of its track"
-            f"{f' ({which})' if (which := results.at(place[:-1])) else ''}."
-        )
-    return said
 
 
 def missed_most(results: Results) -> str:

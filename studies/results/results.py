@@ -20,6 +20,7 @@ from studies.results.places import Index
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
+    from engine.scene.sensors import Envelope, Sensor
     from engine.scene.study import Study
 
 
@@ -134,8 +135,14 @@ class Results:
 
     def noun(self, sensor: str) -> str:
         """What a sensor measures, in words."""
-        own = self.study.sensor[sensor]
-        swept = any(f"sensor.{sensor}.frequency_limit" in axis.paths for axis in self.axes)
+        return self._noun(f"sensor.{sensor}", self.study.sensor[sensor])
+
+    def noun_along(self, envelope: str) -> str:
+        """What an envelope is of, in words."""
+        return self._noun(f"envelope.{envelope}", self.study.envelope[envelope])
+
+    def _noun(self, here: str, own: Sensor | Envelope) -> str:
+        swept = any(f"{here}.frequency_limit" in axis.paths for axis in self.axes)
         counted = f" of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
         return f"{own.quantity.replace('_', ' ')}{counted}"
 
