@@ -20,6 +20,7 @@ from studies.results.results import Results
 MOST_PARTS = 3  # of a sweep that are told one by one
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
+LIMIT = " Its absolute value exceeds "
 LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
 
 
@@ -55,7 +56,7 @@ def limits_of(study: Study) -> Limits:
 def told_limit(results: Results, values: Array, limit: float, units: str) -> str:
     """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another."""
     said = where_beyond(results, values, limit, results.axis(*PACES))
-    return f" Its absolute value exceeds {quantity(limit, units)} {said}."
+    return f"{LIMIT}{quantity(limit, units)} {said}."
 
 
 def ranked(results: Results, limits: Limits, told: Collection[str] = ()) -> list[str]:

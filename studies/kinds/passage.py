@@ -12,7 +12,8 @@ from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification, with_own_weight
-from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
+from studies.findings.between_speeds import told_between_speeds
+from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
 from studies.findings.effects import told_effects, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -52,6 +53,7 @@ class Passage(Kind):
         told, (envelopes, sensors) = (_largest, _amplified, _limited), _told(results)
         said = [told_along(results, name) for name in envelopes]
         said += ["".join(tell(results, sensor) for tell in told) for sensor in sensors]
+        said = _with_remark(said, told_between_speeds(results))
         said[0] += _effects(results, envelopes, sensors)
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
@@ -139,6 +141,12 @@ def _limited(results: Results, sensor: str) -> str:
     """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
     limit = question_of(results.study, AskedOfPassages).limit(results.study.sensor[sensor].quantity)
     return "" if limit is None else told_limit(results, sizes(results, sensor), limit, results.sensors[sensor])
+
+
+def _with_remark(said: list[str], remark: str) -> list[str]:
+    """Sentences with a remark behind the first that says of a limit that it is exceeded nowhere."""
+    unbroken = [place for place, text in enumerate(said) if "nowhere" in text.partition(LIMIT)[2]]
+    return [text + remark if place in unbroken[:1] else text for place, text in enumerate(said)]
 
 
 def _at_the_end(results: Results, place: Index) -> str:
