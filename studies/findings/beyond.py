@@ -17,7 +17,8 @@ from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.formatting import counted, listed, quantity
 from studies.results.results import Results
 
-MOST_PARTS = 3  # of a sweep that are told one by one
+MOST_PARTS = 8  # of a sweep that are told one by one
+MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
 LIMIT = " Its absolute value exceeds "
@@ -127,14 +128,39 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
     bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
     parts = [places[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
-    told = [f"at {replace(axis, values=part).span}" for part in parts]
-    if over[-1] and parts[-1].size > 1:
-        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(places[-1])}"
-    if among is None:
-        told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
-    if len(told) <= MOST_PARTS:
-        return listed(told)
-    return f"in {len(told)} parts of the sweep, first {told[0]}, last {told[-1]}"
+    beside = [_common(results, axis, beyond & np.isin(along, part)) if among is None else "" for part in parts]
+    end = float(places[-1])
+    if len(set(beside)) > 1 and len(parts) <= MOST_APART:
+        return listed([f"{_at(axis, [part], end)}{own}" for part, own in zip(parts, beside, strict=True)])
+    whole = _common(results, axis, beyond) if among is None else ""
+    if len(parts) <= MOST_PARTS:
+        return f"{_at(axis, parts, end)}{whole}"
+    first, last = (_at(axis, [part], end) for part in (parts[0], parts[-1]))
+    return f"in {len(parts)} parts of the sweep, first {first}, last {last}{whole}"
+
+
+def _at(axis: Axis, parts: list[Array], end: float) -> str:
+    """Parts of a swept number in few words; one of several values that reaches the end of the sweep stays open.
+
+    >>> speed = Axis("speed", "speed", {}, np.arange(1.0, 10.0), "m s-1")
+    >>> _at(speed, [speed.values[:1], speed.values[2:4], speed.values[8:]], 9.0)
+    'at 1, 3 to 4 and 9 m/s'
+    >>> _at(speed, [speed.values[:1], speed.values[2:4], speed.values[6:]], 9.0)
+    'at 1 and 3 to 4 m/s, and from 7 m/s to the end of the sweep, 9 m/s'
+    """
+    closed = [part for part in parts if part.size == 1 or part[-1] != end]
+    told = [f"at {_in_one_unit(axis, closed)}"] if closed else []
+    if len(closed) < len(parts):
+        told.append(f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(end)}")
+    return (", and " if len(closed) > 1 else " and ").join(told)
+
+
+def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
+    """Parts with their unit behind the last alone, where it is that of all."""
+    ends = [[axis.in_words(float(part[place])) for place in (0, -1)] for part in parts]
+    units = {word.partition(" ")[2] for words in ends for word in words}
+    unit = f" {units.pop()}" if units != {""} and len(units) == 1 else ""
+    return listed([" to ".join(dict.fromkeys(word.removesuffix(unit) for word in words)) for words in ends]) + unit
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:

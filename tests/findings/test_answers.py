@@ -178,7 +178,7 @@ def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> N
         (
             [1.0, 1.2, 1.2, 1.0, 1.0, 1.2],
             [1.0] * 5 + [1.2],
-            "at 2 m/s to 3 m/s and at 6 m/s (zeta 0.01); at 6 m/s (zeta 0.05).",
+            "at 2 to 3 and 6 m/s (zeta 0.01); at 6 m/s (zeta 0.05).",
         ),
         (
             [np.nan, 1.2, 1.0, 1.2, 1.2, 1.2],
@@ -202,14 +202,7 @@ def test_between_speeds_that_lie_far_apart_nothing_is_said() -> None:
     pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 20, 21] }'
     dataset = scenes.run("passage", pace)
     dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = 1.3
-    wanted = "exceeds 1.1 at 1 m/s to 3 m/s and from 20 m/s to the end of the sweep, 21 m/s."
-    assert wanted in answers.answer(dataset)[0]
-
-
-def test_many_parts_of_a_sweep_are_counted() -> None:
-    dataset = scenes.run("passage", 'pace = { of = "carriage.table.motion.speed", from = 1, to = 9, count = 9 }')
-    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [1.3, 1.0, 1.3, 1.0, 1.3, 1.3, 1.0, 1.0, 1.3]
-    wanted = "exceeds 1.1 in 4 parts of the sweep, first at 1 m/s, last at 9 m/s."
+    wanted = "exceeds 1.1 at 1 to 3 m/s and from 20 m/s to the end of the sweep, 21 m/s."
     assert wanted in answers.answer(dataset)[0]
 
 

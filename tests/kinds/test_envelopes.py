@@ -115,7 +115,7 @@ def shaken(size: float, at_sensor: float = 1.0) -> xr.Dataset:
 def test_an_envelope_with_a_limit_is_judged_before_sensors_that_say_less() -> None:
     said = answers.answer(shaken(3.0))
     pace = scenes.run("passage", scenes.pace("passage")).pace.values
-    beyond = f"exceeds 2 m/s² at {pace[1]:.3g} m/s to {pace[2]:.3g} m/s."
+    beyond = f"exceeds 2 m/s² at {pace[1]:.3g} to {pace[2]:.3g} m/s."
     where = f"along bed is -3 m/s², at 3 m of its track (pace {pace[2]:.3g} m/s)"
     assert said[0] == f"shaking: the largest acceleration {where}. Its absolute value {beyond}"
     subjects = [text.partition(":")[0] for text in said]
