@@ -11,11 +11,12 @@ from engine.scene.carriages import Carriage
 from engine.scene.study import Study
 from engine.scene.trains import Train
 from results_schema.arrays import Array
-from results_schema.status import Status
-from studies.results.formatting import counted, percent, quantity, scientific
+from results_schema.status import Status, label
+from studies.results.formatting import counted, listed, percent, quantity, scientific
 from studies.results.places import Index
 from studies.results.results import Results, statuses
 
+MOST_MISSED = 3  # sensors that are named where tolerances are missed
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
 
 
@@ -115,17 +116,38 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
 
 def missed_most(results: Results) -> str:
     """Which result misses its tolerance by most among the variants that say so, as the end of a sentence."""
+    for name, (error, asked) in _missed(results).items():
+        return f" (most of all for {name}: {scientific(error)} where {scientific(asked)} was asked)"
+    return ""
+
+
+def _missed(results: Results) -> dict[str, tuple[float, float]]:
+    """Results that miss their tolerance among the variants that say so, by how much: their largest error, and that."""
+    found = dict[str, tuple[float, float]]()
     if "tolerance" not in results.dataset or not results.study.output.keeps_variants:
-        return ""
+        return found
     missed = results.dataset["status"].values == int(Status.TOLERANCE_MISSED)
-    worst, said = 1.0, ""
     for name, asked in zip(results.dataset["result"].values, results.dataset["tolerance"].values, strict=True):
         if np.isfinite(asked):  # one result after another: there may be millions of variants
             error = float(np.fmax.reduce(results.estimated_error(str(name))[missed], initial=0.0))
-            if error > worst * asked:
-                worst = error / float(asked)
-                said = f" (most of all for {name}: {scientific(error)} where {scientific(float(asked))} was asked)"
-    return said
+            found |= {str(name): (error, float(asked))} if error > asked else {}
+    return dict(sorted(found.items(), key=lambda one: -one[1][0] / one[1][1]))
+
+
+def remedy(results: Results) -> str:
+    """What helps variants that miss a tolerance, as a sentence behind another; "" where none does, or the study expects
+    it."""
+    if Status.TOLERANCE_MISSED not in results.status_counts or label(Status.TOLERANCE_MISSED) in results.study.expected:
+        return ""
+    missed = [name.rpartition(" ")[2] for name in _missed(results)]
+    read = {end: name for name in results.sensors for end in (name, f"{name}_max", f"{name}_min", f"{name}_residual")}
+    sensors = list(dict.fromkeys(read[name] for name in missed if name in read))
+    if missed and not sensors:
+        return " What helps: a larger `solver.tolerance`."
+    more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
+    names = listed([*sensors[:MOST_MISSED], *more])
+    where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
+    return f' What helps: `tolerance = "told"` on {where}, so that errors are told and not held, or a larger tolerance.'
 
 
 def told_statuses(results: Results) -> list[str]:
@@ -133,4 +155,5 @@ def told_statuses(results: Results) -> list[str]:
     others = sum(count for status, count in results.status_counts.items() if status != Status.OK)
     if not others:
         return []
-    return [f"Of {counted(results.variants, 'variant')}, {others:,} carry a status: {statuses(results.status_counts)}."]
+    carried = f"{others:,} carry a status: {statuses(results.status_counts)}"
+    return [f"Of {counted(results.variants, 'variant')}, {carried}.{remedy(results)}"]

@@ -17,7 +17,7 @@ from results_schema.status import Status
 from studies.findings import theory
 from studies.kinds.asymmetry import AsymmetryReduction
 from studies.reporting import answers
-from studies.results.findings_common import missed_most
+from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, force, oscillator, shuttle, study, under
@@ -144,6 +144,25 @@ def test_a_missed_tolerance_names_its_result() -> None:
     error[:, results.index("midspan_max")] = [np.nan, 0.03, 0.0, 0.5]
     error[:, results.index("moment_min")] = [0.02, 0.0, 0.9, 0.9]
     assert missed_most(Results.of(dataset)) == " (most of all for midspan_max: 3e-2 where 1e-3 was asked)"
+    helps = "on the sensors midspan and moment, so that errors are told and not held, or a larger tolerance."
+    assert answers.answer(dataset)[-3].endswith(
+        f'2 tolerance-missed (values kept). What helps: `tolerance = "told"` {helps}'
+    )
+
+
+def test_what_helps_where_a_tolerance_is_missed_names_what_misses_it() -> None:
+    dataset = scenes.run("passage", scenes.pace("passage"))
+    assert remedy(Results.of(dataset)) == ""
+    dataset["status"].values[:2] = Status.TOLERANCE_MISSED
+    results, error = list(dataset["result"].values), dataset["estimated_error"].values
+    error[:, results.index("dynamic_amplification moment")] = 0.5
+    assert "on the sensor moment, so that" in remedy(Results.of(dataset))
+    error[...] = 0.0
+    error[:, results.index("table_contact_force_min")] = 0.5
+    dataset["tolerance"].values[results.index("table_contact_force_min")] = 1e-3
+    assert remedy(Results.of(dataset)) == " What helps: a larger `solver.tolerance`."
+    dataset.attrs["study"] = f'expected = ["tolerance-missed"]\n{dataset.attrs["study"]}'
+    assert remedy(Results.of(dataset)) == ""
 
 
 @pytest.mark.parametrize("part", [{"pace": 0}, {"pace": slice(0, 2)}])
