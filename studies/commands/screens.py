@@ -11,7 +11,7 @@ from studies.commands.console import blank, heading, paragraphs, say, table
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
 from studies.reporting.answers import answer_of
-from studies.results.findings_common import missed_most
+from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy, told_audit
@@ -229,8 +229,9 @@ def _about_statuses(results: Results) -> Iterator[str]:
             continue
         if (count := counts.get(label(status), 0)) and status != Status.OK:
             part = "as the study expects, " if label(status) in expected else ""
-            most = missed_most(results) if status is Status.TOLERANCE_MISSED else ""
-            yield f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}: {part}{status.message}{most}."
+            most, helps = (missed_most(results), remedy(results)) if status is Status.TOLERANCE_MISSED else ("", "")
+            many = f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}"
+            yield f"{many}: {part}{status.message}{most}.{helps}"
 
 
 def _about_work(outcome: Outcome) -> str:

@@ -1,22 +1,27 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
-from studies.results.axes import VARIANT, Axis
-from studies.results.formatting import counted, listed
+from studies.protocol.study import kind_named, question_of
+from studies.results.axes import PACES, VARIANT, Axis
+from studies.results.formatting import counted, listed, quantity
 from studies.results.results import Results
 
-MOST_PARTS = 3  # of a sweep that are told one by one
+MOST_PARTS = 8  # of a sweep that are told one by one
+MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
+LIMIT = " Its absolute value exceeds "
 LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
 
 
@@ -43,27 +48,52 @@ class AskedOfPassages(Limits):
     residual: Limits = Limits()
 
 
-def ranked(results: Results, limits: Limits) -> list[str]:
-    """Sensors by what they say: those with a limit, what is the largest part of it first; then the first of every other
-    quantity, the second of every one, and so on."""
-    parts: dict[str, float] = {}
-    turns: dict[str, tuple[int, int]] = {}
-    seen: list[str] = []
-    for place, (name, sensor) in enumerate(results.study.sensor.items()):
-        if (limit := limits.limit(sensor.quantity)) is not None:
-            values = sizes(results, name)
-            top = largest(results, values)
-            parts[name] = 0.0 if top is None else float(values[top]) / limit
-        turns[name] = (seen.count(sensor.quantity), place)
-        seen.append(sensor.quantity)
-    rest = [name for name in sorted(turns, key=turns.__getitem__) if name not in parts]
-    return [*sorted(parts, key=lambda name: -parts[name]), *rest]
+def limits_of(study: Study) -> Limits:
+    """The limits that a study's table [question] names; none where its kind knows none of readings."""
+    settings = kind_named(study.kind).settings
+    return question_of(study, settings) if settings is not None and issubclass(settings, Limits) else Limits()
+
+
+def told_limit(results: Results, values: Array, limit: float, units: str) -> str:
+    """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another."""
+    said = where_beyond(results, values, limit, results.axis(*PACES))
+    return f"{LIMIT}{quantity(limit, units)} {said}."
+
+
+def ranked(results: Results, limits: Limits, told: Collection[str] = ()) -> list[str]:
+    """Sensors by what they say, as `in_turns` has them, by their largest absolute values."""
+    return in_turns(results, limits, {name: largest_size(results, name) for name in results.sensors}, told)
+
+
+def in_turns(results: Results, limits: Limits, size: Mapping[str, float], told: Collection[str] = ()) -> list[str]:
+    """Sensors by how large they get: the largest of every quantity, first those with a limit, by the part of it that
+    they reach; then all others with a limit, then the second largest of every other quantity, and so on.
+
+    told: quantities of which something larger is told before. A carriage's own sprung mass is not compared with bodies
+    under it.
+    """
+    alike: dict[tuple[str, bool], list[str]] = {}
+    for name, sensor in results.study.sensor.items():
+        alike.setdefault((sensor.quantity, sensor.carriage is None), []).append(name)
+    order: dict[str, tuple[bool, bool, int, float, int]] = {}
+    for place, ((read, of_body), names) in enumerate(alike.items()):
+        limit, first = limits.limit(read), int(of_body and read in told)
+        for turn, name in enumerate(sorted(names, key=lambda name: -size[name]), first):
+            free, part = limit is None, 0.0 if limit is None else size[name] / limit
+            order[name] = (turn > 0, free, turn if free else 0, -part, place)
+    return sorted(order, key=order.__getitem__)
+
+
+def largest_size(results: Results, sensor: str) -> float:
+    """The largest absolute value of a sensor; negative where it has none."""
+    values = sizes(results, sensor)
+    top = largest(results, values)
+    return -1.0 if top is None else float(values[top])
 
 
 def of_every_quantity(results: Results, most: int) -> list[str]:
-    """So many sensors in the order of the file: the first of every quantity, then the second, and so on."""
-    first = ranked(results, Limits())[:most]
-    return [name for name in results.sensors if name in first]
+    """So many sensors: the largest of every quantity, in the order of the file, then the second largest, and so on."""
+    return ranked(results, Limits())[:most]
 
 
 def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
@@ -98,14 +128,39 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
     bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
     parts = [places[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
-    told = [f"at {replace(axis, values=part).span}" for part in parts]
-    if over[-1] and parts[-1].size > 1:
-        told[-1] = f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(places[-1])}"
-    if among is None:
-        told = [told[i] + _common(results, axis, beyond & np.isin(along, parts[i])) for i in range(len(parts))]
-    if len(told) <= MOST_PARTS:
-        return listed(told)
-    return f"in {len(told)} parts of the sweep, first {told[0]}, last {told[-1]}"
+    beside = [_common(results, axis, beyond & np.isin(along, part)) if among is None else "" for part in parts]
+    end = float(places[-1])
+    if len(set(beside)) > 1 and len(parts) <= MOST_APART:
+        return listed([f"{_at(axis, [part], end)}{own}" for part, own in zip(parts, beside, strict=True)])
+    whole = _common(results, axis, beyond) if among is None else ""
+    if len(parts) <= MOST_PARTS:
+        return f"{_at(axis, parts, end)}{whole}"
+    first, last = (_at(axis, [part], end) for part in (parts[0], parts[-1]))
+    return f"in {len(parts)} parts of the sweep, first {first}, last {last}{whole}"
+
+
+def _at(axis: Axis, parts: list[Array], end: float) -> str:
+    """Parts of a swept number in few words; one of several values that reaches the end of the sweep stays open.
+
+    >>> speed = Axis("speed", "speed", {}, np.arange(1.0, 10.0), "m s-1")
+    >>> _at(speed, [speed.values[:1], speed.values[2:4], speed.values[8:]], 9.0)
+    'at 1, 3 to 4 and 9 m/s'
+    >>> _at(speed, [speed.values[:1], speed.values[2:4], speed.values[6:]], 9.0)
+    'at 1 and 3 to 4 m/s, and from 7 m/s to the end of the sweep, 9 m/s'
+    """
+    closed = [part for part in parts if part.size == 1 or part[-1] != end]
+    told = [f"at {_in_one_unit(axis, closed)}"] if closed else []
+    if len(closed) < len(parts):
+        told.append(f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(end)}")
+    return (", and " if len(closed) > 1 else " and ").join(told)
+
+
+def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
+    """Parts with their unit behind the last alone, where it is that of all."""
+    ends = [[axis.in_words(float(part[place])) for place in (0, -1)] for part in parts]
+    units = {word.partition(" ")[2] for words in ends for word in words}
+    unit = f" {units.pop()}" if units != {""} and len(units) == 1 else ""
+    return listed([" to ".join(dict.fromkeys(word.removesuffix(unit) for word in words)) for words in ends]) + unit
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:

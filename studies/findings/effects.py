@@ -1,4 +1,4 @@
-"""What each of several swept numbers does to a result by itself, in one sentence."""
+"""What each of several swept numbers does to the largest of a result over all others, in one sentence."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from studies.results.results import Results
 MOST_AXES = 4
 HARDLY = 0.005  # of the smallest value: what no figure shows
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
+HALVED = 2.0  # the same of what falls
 
 
 def unchanged(results: Results, values: Array) -> str:
@@ -38,22 +39,21 @@ def by_effect(results: Results, values: Array) -> list[Axis]:
 
 
 def told_effects(results: Results, values: Array, what: str) -> str:
-    """How positive values (in the sweep's shape) change along each swept number while the others are in the middle of
-    theirs; "" without several numbers on a grid, or where none has values along its whole line."""
+    """How the largest of positive values (in the sweep's shape) over all other swept numbers changes along each; ""
+    without several numbers on a grid, or where any variant does not count: what is largest is not known then."""
     axes = [axis for axis in results.axes if len(axis.values) > 1]
-    if not 2 <= len(axes) <= MOST_AXES or VARIANT in results.dims:
+    known = np.where(results.with_values, values, np.nan)
+    if not 2 <= len(axes) <= MOST_AXES or VARIANT in results.dims or not np.isfinite(known).all():
         return ""
-    told = [_effect(axis, line) for axis in axes if (line := _line(results, axis, values)) is not None]
-    return f"With all other numbers in the middle of their sweeps {what} {listed(told)}." if told else ""
+    worst = {axis: _worst(results, axis, known) for axis in axes}
+    told = [_effect(axis, line) for axis, line in worst.items() if (line > 0.0).all()]
+    return f"Over all else that is swept, {what} {listed(told)}." if told else ""
 
 
-def _line(results: Results, axis: Axis, values: Array) -> Array | None:
-    """Values along an axis, ascending; None where some do not count, or are zero."""
-    place = tuple(
-        slice(None) if dim == axis.dim else size // 2 for dim, size in zip(results.dims, results.shape, strict=True)
-    )
-    line = np.where(results.with_values, values, np.nan)[place][np.argsort(axis.values)]
-    return line if (line > 0.0).all() else None
+def _worst(results: Results, axis: Axis, values: Array) -> Array:
+    """The largest of values for every value of an axis, ascending."""
+    others = tuple(place for place, dim in enumerate(results.dims) if dim != axis.dim)
+    return np.asarray(values.max(axis=others)[np.argsort(axis.values)])
 
 
 def _effect(axis: Axis, line: Array) -> str:
@@ -66,6 +66,8 @@ def _effect(axis: Axis, line: Array) -> str:
     'changes by up to 10 % over speed 1 m/s to 4 m/s (largest at 1 m/s)'
     >>> _effect(speed, np.array([1.0, 0.9, 0.8])), _effect(speed, np.ones(3))
     ('falls by 20 % over speed 1 m/s to 4 m/s', 'stays the same over speed 1 m/s to 4 m/s')
+    >>> _effect(speed, np.array([5.0, 4.0, 3.2])), _effect(speed, np.array([5.0, 4.0, 2.0]))
+    ('falls by 36 % over speed 1 m/s to 4 m/s', 'falls to 1/2.5 over speed 1 m/s to 4 m/s')
     >>> _effect(speed, np.array([1.0, 1.0004, 1.0003]))
     'hardly changes over speed 1 m/s to 4 m/s'
     """
@@ -78,7 +80,7 @@ def _effect(axis: Axis, line: Array) -> str:
     if (steps >= 0.0).all():
         return f"grows {'' if ratio >= TIMES else 'by '}{_times(ratio)} {over}"
     if (steps <= 0.0).all():
-        return f"falls {f'to 1/{number(ratio, 2)}' if ratio >= TIMES else f'by {percent(1.0 - 1.0 / ratio)}'} {over}"
+        return f"falls {f'to 1/{number(ratio, 2)}' if ratio > HALVED else f'by {percent(1.0 - 1.0 / ratio)}'} {over}"
     top = axis.in_words(float(np.sort(axis.values)[int(np.argmax(line))]))
     return f"changes {'up to' if ratio >= TIMES else 'by up to'} {_times(ratio)} {over} (largest at {top})"
 

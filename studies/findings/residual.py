@@ -6,7 +6,7 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
-from studies.findings.beyond import LIMITED, Limits, where_beyond
+from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
 from studies.findings.effects import by_effect
 from studies.results.findings_common import in_words
 from studies.results.formatting import quantity
@@ -37,12 +37,12 @@ def residual_of(results: Results, sensor: str) -> Array:
 
 
 def ringing(results: Results, limits: Limits) -> list[str]:
-    """Sensors whose residual vibration is told: what is the largest part of its limit first, then those without one;
-    none where the study does not tell it."""
-    told = list(results.sensors) if results.study.output.residual else []
-    named = {sensor: limits.limit(results.study.sensor[sensor].quantity) for sensor in told}
-    part = {s: np.nanmax(residual_of(results, s), initial=0.0) / limit for s, limit in named.items() if limit}
-    return sorted(told, key=lambda sensor: -part.get(sensor, -np.inf))
+    """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it."""
+    if not results.study.output.residual:
+        return []
+    return in_turns(
+        results, limits, {name: np.nanmax(residual_of(results, name), initial=0.0) for name in results.sensors}
+    )
 
 
 def residuals(results: Results, limits: Limits) -> list[str]:

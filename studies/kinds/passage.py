@@ -12,8 +12,10 @@ from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification, with_own_weight
-from studies.findings.beyond import MOST_TOLD, AskedOfPassages, ranked, where_beyond
+from studies.findings.between_speeds import told_between_speeds
+from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
 from studies.findings.effects import told_effects, unchanged
+from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT, Axis
@@ -22,7 +24,7 @@ from studies.results.formatting import counted, listed, number, quantity
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
-MOST_SENSORS = 4
+MOST_SENSORS = 6
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
 
@@ -48,28 +50,34 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        told = (_largest, _amplified, _limited)
-        said = ["".join(tell(results, sensor) for tell in told) for sensor in _told(results)]
+        told, (envelopes, sensors) = (_largest, _amplified, _limited), _told(results)
+        said = [told_along(results, name) for name in envelopes]
+        said += ["".join(tell(results, sensor) for tell in told) for sensor in sensors]
+        said = _with_remark(said, told_between_speeds(results))
+        said[0] += _effects(results, envelopes, sensors)
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
         residual = residuals(results, question_of(results.study, AskedOfPassages).residual)
-        first = [*residual[:1], *said[:1], *lifted, *_effects(results)]
-        return [*first, *residual[1:], *said[1:], *kept, *told_statuses(results)]
+        return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variants with the largest value and the largest amplification, and those
-        that swing on most."""
-        places = (place for sensor in _told(results) for place in _extremes(results, sensor))
+        that swing on most; those of envelopes that it begins with."""
+        envelopes, sensors = _told(results)
+        places = [largest(results, sizes_along(results, name)) for name in envelopes]
+        places += [place for sensor in sensors for place in _extremes(results, sensor)]
         return [*(place for place in places if place is not None), *most_ringing(results)]
 
 
 KIND = Passage()
 
 
-def _told(results: Results) -> list[str]:
-    """The sensors that the answer is about."""
-    return ranked(results, question_of(results.study, AskedOfPassages))[:MOST_SENSORS]
+def _told(results: Results) -> tuple[list[str], list[str]]:
+    """The envelopes with a limit that say more than sensors do, and the sensors that the answer is about."""
+    limits, envelopes = question_of(results.study, AskedOfPassages), beyond_sensors(results)
+    told = {results.study.envelope[name].quantity for name in envelopes}
+    return envelopes, ranked(results, limits, told)[:MOST_SENSORS]
 
 
 def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
@@ -85,7 +93,9 @@ def _largest(results: Results, sensor: str) -> str:
         return f"{sensor}: no variant has values."
     opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
     shown = "" if results.held[results.kept.values].all() else opened
-    said = f"{sensor}: {shown}the largest {results.noun(sensor)} is {_value(results, sensor, top)}"
+    said = (
+        f"{sensor}: {shown}the largest {results.noun(sensor)} {results.place(sensor)} is {_value(results, sensor, top)}"
+    )
     if same := unchanged(results, sizes(results, sensor)):
         return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
@@ -103,11 +113,18 @@ def _largest(results: Results, sensor: str) -> str:
     )
 
 
-def _effects(results: Results) -> list[str]:
-    """What every swept number does to the first sensor, where there are several."""
-    sensor = _told(results)[0]
-    said = told_effects(results, sizes(results, sensor), f"the largest {results.noun(sensor)}")
-    return [f"{sensor}: {said}"] if said else []
+def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
+    """What every swept number does to what the answer begins with, where there are several; "" else."""
+    if envelopes:
+        name = envelopes[0]
+        what, values = (
+            f"{results.noun_along(name)} along {results.study.envelope[name].body}",
+            sizes_along(results, name),
+        )
+    else:
+        what, values = results.noun(sensors[0]), sizes(results, sensors[0])
+    said = told_effects(results, values, f"the largest {what}")
+    return f" {said}" if said else ""
 
 
 def _amplified(results: Results, sensor: str) -> str:
@@ -123,10 +140,13 @@ def _amplified(results: Results, sensor: str) -> str:
 def _limited(results: Results, sensor: str) -> str:
     """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
     limit = question_of(results.study, AskedOfPassages).limit(results.study.sensor[sensor].quantity)
-    if limit is None:
-        return ""
-    said, values = quantity(limit, results.sensors[sensor]), sizes(results, sensor)
-    return f" Its absolute value exceeds {said} {where_beyond(results, values, limit, results.axis(*PACES))}."
+    return "" if limit is None else told_limit(results, sizes(results, sensor), limit, results.sensors[sensor])
+
+
+def _with_remark(said: list[str], remark: str) -> list[str]:
+    """Sentences with a remark behind the first that says of a limit that it is exceeded nowhere."""
+    unbroken = [place for place, text in enumerate(said) if "nowhere" in text.partition(LIMIT)[2]]
+    return [text + remark if place in unbroken[:1] else text for place, text in enumerate(said)]
 
 
 def _at_the_end(results: Results, place: Index) -> str:

@@ -47,7 +47,8 @@ def pictures(results: Results) -> list[Figure]:
 
 def _over_sweep(results: Results) -> Iterator[Figure]:
     """The largest values of sensors over the sweep, one figure for each quantity that changes."""
-    sensors = [name for name in results.sensors if np.isfinite(sizes(results, name)).any()]
+    ordered = of_every_quantity(results, len(results.sensors))
+    sensors = [name for name in ordered if np.isfinite(sizes(results, name)).any()]
     for noun in dict.fromkeys(map(results.noun, sensors)):
         own = [name for name in sensors if results.noun(name) == noun]
         top = largest(results, sizes(results, own[0]))

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 from results_schema.lazy_imports import xr
 from studies.findings.cells import findings_of_cells
+from studies.findings.envelopes import beyond_sensors, told_envelopes
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
-from studies.results.findings_common import told_envelopes, told_statuses
+from studies.results.findings_common import told_statuses
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -40,8 +41,9 @@ def findings_of(results: Results) -> list[str]:
 
 
 def found_of(results: Results) -> list[str]:
-    """What the kind of study finds, then what the envelopes say."""
-    return [*_findings(results), *told_envelopes(results)]
+    """What the kind of study finds, then what those envelopes say of which it says nothing."""
+    found = _findings(results)
+    return [*found, *(text for text in told_envelopes(results) if not any(one.startswith(text) for one in found))]
 
 
 def _findings(results: Results) -> list[str]:
@@ -58,6 +60,8 @@ def figures_of(results: Results) -> list[Figure]:
 
     if not results.study.output.keeps_variants:
         return cells.pictures(results)
-    found = [*kind_named(results.study.kind).figures(results), *envelopes.pictures(results)]
+    found = kind_named(results.study.kind).figures(results)
+    along = envelopes.pictures(results)
+    found = [*along, *found] if beyond_sensors(results) else [*found, *along]
     found.sort(key=lambda figure: figure.on_method)
     return [*found, *choice.pictures(results), *estimates.pictures(results)]

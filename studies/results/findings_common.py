@@ -7,11 +7,12 @@ import numpy as np
 from engine.scene.carriages import Carriage
 from engine.scene.study import Study
 from results_schema.arrays import Array
-from results_schema.status import Status
-from studies.results.formatting import counted, percent, quantity, scientific
-from studies.results.places import Index, extreme
+from results_schema.status import Status, label
+from studies.results.formatting import counted, listed, percent, quantity, scientific
+from studies.results.places import Index
 from studies.results.results import Results, statuses
 
+MOST_MISSED = 3  # sensors that are named where tolerances are missed
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
 
 
@@ -78,42 +79,40 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
     return f"first exceeds {percent(threshold)} at {axis.in_words(lowest)}"
 
 
-def told_envelopes(results: Results) -> list[str]:
-    """The value of largest size anywhere along a body, of every envelope."""
-    said = []
-    for name, envelope in results.study.envelope.items():
-        ends = [results.envelope(name, end) for end in ("max", "min")]
-        upper = np.abs(ends[0]) >= np.abs(ends[1])
-        values = np.where(upper, *ends)
-        place = extreme(np.where(results.with_values[..., None], np.abs(values), np.nan))
-        if place is None:
-            said.append(f"{name}: no variant has values.")
-            continue
-        result = f"{name}_envelope_{'max' if upper[place] else 'min'}"
-        value = f"{quantity(float(values[place]), results.envelopes[name])}{uncertainty(results, result, place[:-1])}"
-        at = quantity(float(results.dataset[f"{name}_place"].values[place[-1]]), "m")
-        held = "while the contact holds, " if not results.held.all() and results.held.any() else ""
-        words = envelope.quantity.replace("_", " ")
-        said.append(
-            f"{name}: {held}the largest {words} along {envelope.body} is {value}, at {at} of its track"
-            f"{f' ({which})' if (which := results.at(place[:-1])) else ''}."
-        )
-    return said
-
-
 def missed_most(results: Results) -> str:
     """Which result misses its tolerance by most among the variants that say so, as the end of a sentence."""
+    for name, (error, asked) in _missed(results).items():
+        return f" (most of all for {name}: {scientific(error)} where {scientific(asked)} was asked)"
+    return ""
+
+
+def _missed(results: Results) -> dict[str, tuple[float, float]]:
+    """Results that miss their tolerance among the variants that say so, by how much: their largest error, and that."""
+    found = dict[str, tuple[float, float]]()
     if "tolerance" not in results.dataset or not results.study.output.keeps_variants:
-        return ""
+        return found
     missed = results.dataset["status"].values == int(Status.TOLERANCE_MISSED)
-    worst, said = 1.0, ""
     for name, asked in zip(results.dataset["result"].values, results.dataset["tolerance"].values, strict=True):
         if np.isfinite(asked):  # one result after another: there may be millions of variants
             error = float(np.fmax.reduce(results.estimated_error(str(name))[missed], initial=0.0))
-            if error > worst * asked:
-                worst = error / float(asked)
-                said = f" (most of all for {name}: {scientific(error)} where {scientific(float(asked))} was asked)"
-    return said
+            found |= {str(name): (error, float(asked))} if error > asked else {}
+    return dict(sorted(found.items(), key=lambda one: -one[1][0] / one[1][1]))
+
+
+def remedy(results: Results) -> str:
+    """What helps variants that miss a tolerance, as a sentence behind another; "" where none does, or the study expects
+    it."""
+    if Status.TOLERANCE_MISSED not in results.status_counts or label(Status.TOLERANCE_MISSED) in results.study.expected:
+        return ""
+    missed = [name.rpartition(" ")[2] for name in _missed(results)]
+    read = {end: name for name in results.sensors for end in (name, f"{name}_max", f"{name}_min", f"{name}_residual")}
+    sensors = list(dict.fromkeys(read[name] for name in missed if name in read))
+    if missed and not sensors:
+        return " What helps: a larger `solver.tolerance`."
+    more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
+    names = listed([*sensors[:MOST_MISSED], *more])
+    where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
+    return f' What helps: `tolerance = "told"` on {where}, so that errors are told and not held, or a larger tolerance.'
 
 
 def told_statuses(results: Results) -> list[str]:
@@ -121,4 +120,5 @@ def told_statuses(results: Results) -> list[str]:
     others = sum(count for status, count in results.status_counts.items() if status != Status.OK)
     if not others:
         return []
-    return [f"Of {counted(results.variants, 'variant')}, {others:,} carry a status: {statuses(results.status_counts)}."]
+    carried = f"{others:,} carry a status: {statuses(results.status_counts)}"
+    return [f"Of {counted(results.variants, 'variant')}, {carried}.{remedy(results)}"]

@@ -21,6 +21,7 @@ from studies.results.places import Index
 
 if TYPE_CHECKING:
     from engine.scene.carriages import Carriage
+    from engine.scene.sensors import Envelope, Sensor
     from engine.scene.study import Study
 
 LETTERS = 26  # of a line beside a panel: as many are as high as one of four panels of a figure
@@ -137,12 +138,15 @@ class Results:
 
     def noun(self, sensor: str) -> str:
         """What a sensor measures, in words."""
-        return " ".join(self._words(sensor)).strip()
+        return " ".join(self._words(f"sensor.{sensor}", self.study.sensor[sensor])).strip()
 
-    def _words(self, sensor: str) -> tuple[str, str]:
-        """Its quantity, and of which modes where it says so."""
-        own = self.study.sensor[sensor]
-        swept = any(f"sensor.{sensor}.frequency_limit" in axis.paths for axis in self.axes)
+    def noun_along(self, envelope: str) -> str:
+        """What an envelope is of, in words."""
+        return " ".join(self._words(f"envelope.{envelope}", self.study.envelope[envelope])).strip()
+
+    def _words(self, here: str, own: Sensor | Envelope) -> tuple[str, str]:
+        """The quantity of what has its table ``here``, and of which modes where it says so."""
+        swept = any(f"{here}.frequency_limit" in axis.paths for axis in self.axes)
         counted = f"of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
         return own.quantity.replace("_", " "), counted
 
@@ -162,7 +166,7 @@ class Results:
 
     def label(self, sensor: str, unit: str, of: str = "") -> str:
         """Quantity, place and unit of a sensor as on a figure's axis, in lines that fit beside a panel."""
-        words, counted = self._words(sensor)
+        words, counted = self._words(f"sensor.{sensor}", self.study.sensor[sensor])
         parts = (f"{of} {words}".strip(), counted, f"{self.place(sensor)}{f' ({unit})' if unit else ''}")
         return "\n".join(line for part in parts for line in wrap(part, LETTERS))
 

@@ -245,7 +245,8 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
     if not tolerances.size or (group is None and not estimates.size):
         return ""
-    found = f"estimated errors at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"
+    errors = "estimated errors" if fine.all() else "estimated errors of those that are ok"
+    found = f"{errors} at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"
     said = f"{found} where {_span(tolerances)} was asked"
     return f"{said}; {'no variant was audited.' if group is None else _compared(group, results)}"
 

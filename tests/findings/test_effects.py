@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import studies
 from engine.scene.study import Study
+from results_schema.status import Status
 from studies.findings.amplification import sizes
 from studies.findings.effects import told_effects, unchanged
 from studies.reporting import answers
@@ -14,6 +16,7 @@ from tests.studies import scenes
 
 MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
 DEAD = 'place = { of = "sensor.dead.at", values = [1.0, 2.0] }'
+IT = "the largest displacement"
 ELSEWHERE = '[sensor.dead]\nbody = "bed"\nat = 1.0'
 
 
@@ -22,15 +25,41 @@ def test_each_number_is_told_by_itself() -> None:
     crawl = 'pace = { of = "carriage.table.motion.speed", from = 0.02, to = 0.04, count = 3 }'
     results = Results.of(scenes.run("passage", f"{crawl}\n{MASS}\n{DEAD}", extra=ELSEWHERE))
     said = told_effects(results, sizes(results, "midspan"), "it")
-    assert said.startswith("With all other numbers in the middle of their sweeps it ")
+    assert said.startswith("Over all else that is swept, it ")
     assert "grows 4 times over mass 50 kg to 200 kg" in said and "stays the same over place 1 m to 2 m" in said
-    assert any(text.startswith("midspan: With all other numbers") for text in answers.answer(results.dataset))
+    assert answers.answer(results.dataset)[0].endswith(told_effects(results, sizes(results, "midspan"), IT))
 
 
-def test_a_line_with_a_contact_that_opens_tells_nothing() -> None:
+def test_the_largest_over_all_others_counts() -> None:
+    """Not what lies in the middle of their sweeps, where more mass looks as if it changed nothing."""
     results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
-    values = np.where(np.arange(12).reshape(4, 3) == 7, np.nan, 1.0)  # at the middle speed and mass
-    assert told_effects(results, values, "it") == ""
+    values = np.ones((4, 3))
+    values[3] = 2.0, 5.0, 4.0  # masses 200, 50 and 100 kg
+    said = told_effects(results, values, "it")
+    assert said == (
+        "Over all else that is swept, it grows 5 times over pace 1 m/s to 8 m/s and "
+        "falls to 1/2.5 over mass 50 kg to 200 kg."
+    )
+    values[0] = 5.0, 0.0, 0.0
+    assert "changes by up to 25 % over mass" in told_effects(results, values, "it")
+
+
+@pytest.mark.parametrize("place", range(12))
+def test_where_a_contact_opens_what_is_largest_is_not_known(place: int) -> None:
+    dataset, values = scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"), np.arange(1.0, 13.0).reshape(4, 3)
+    assert told_effects(Results.of(dataset), values, "it") != ""
+    assert told_effects(Results.of(dataset), np.where(values == place + 1.0, np.nan, values), "it") == ""
+    dataset["status"].values.reshape(-1)[place] = Status.SEPARATED
+    assert told_effects(Results.of(dataset), values, "it") == ""
+
+
+def test_a_number_at_which_all_is_zero_is_not_compared() -> None:
+    results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
+    values = np.outer(np.ones(4), [2.0, 0.0, 1.0])
+    assert (
+        told_effects(results, values, "it")
+        == "Over all else that is swept, it stays the same over pace 1 m/s to 8 m/s."
+    )
 
 
 def test_one_number_or_a_sample_has_no_effects_of_its_own() -> None:

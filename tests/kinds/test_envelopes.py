@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import engine
 from results_schema.errors import ArchiveError, BadInput
@@ -16,6 +17,7 @@ from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.reporting.report import write_report
 from studies.results.results import Results
+from tests.pictures.test_passages import limits
 from tests.pictures.test_report import archive, check_standing_alone
 from tests.studies import scenes
 
@@ -81,6 +83,74 @@ def test_the_figure_draws_the_envelope_over_all_variants() -> None:
     np.testing.assert_allclose(bottom, 1000.0 * dataset.shape_envelope_min.min("mass"), rtol=1e-12, atol=1e-12)
     assert "3 variants" in figure.caption
     assert envelopes.pictures(Results.of(scenes.run("passage", MASSES))) == []
+
+
+SHAKEN = """\
+[envelope.shaking]
+body = "bed"
+quantity = "acceleration"
+places = 11
+
+[sensor.shaken]
+body = "bed"
+at = 5.0
+quantity = "acceleration"
+
+[question]
+acceleration = 2.0
+"""
+
+
+def shaken(size: float, at_sensor: float = 1.0) -> xr.Dataset:
+    """A passage at four speeds whose bed is shaken so far 3 m from its end at the two in the middle."""
+    dataset = scenes.run("passage", scenes.pace("passage"), extra=f"{EXTRA}\n{SHAKEN}")
+    for name in ("shaking_envelope_max", "shaking_envelope_min", "shaken_max", "shaken_min"):
+        dataset[name].values[...] = 0.0
+    dataset["shaking_envelope_min"].values[1:3, 3] = [0.99 * -size, -size]
+    dataset["shaken_max"].values[0] = at_sensor
+    dataset["estimated_error"].values[...] = 1e-4
+    return dataset
+
+
+def test_an_envelope_with_a_limit_is_judged_before_sensors_that_say_less() -> None:
+    said = answers.answer(shaken(3.0))
+    pace = scenes.run("passage", scenes.pace("passage")).pace.values
+    beyond = f"exceeds 2 m/s² at {pace[1]:.3g} to {pace[2]:.3g} m/s."
+    where = f"along bed is -3 m/s², at 3 m of its track (pace {pace[2]:.3g} m/s)"
+    assert said[0] == f"shaking: the largest acceleration {where}. Its absolute value {beyond}"
+    subjects = [text.partition(":")[0] for text in said]
+    assert subjects.count("shaking") == 1  # and each quantity before a sensor of this one
+    assert subjects.index("midspan") < subjects.index("moment") < subjects.index("shaken") < subjects.index("shape")
+    found = {figure.name: figure for figure in answers.figures(shaken(3.0))}
+    assert next(iter(found)) == "envelopes"
+    assert found["envelopes"].title == f"The largest acceleration {where}, beyond the limit of 2 m/s²"
+    assert "Red: limits that the study names." in found["envelopes"].caption
+
+
+def test_what_sensors_say_as_well_stays_with_the_envelopes() -> None:
+    """Its limit is told there; without a limit an envelope tells none."""
+    said = answers.answer(shaken(1.0))
+    assert said[0].startswith("shaken: the largest acceleration at 5 m of bed is 1 m/s²")
+    (last,) = (text for text in said if text.startswith("shaking: "))
+    assert said.index(last) > said.index(next(text for text in said if text.startswith("shape: ")))
+    assert "Its absolute value exceeds 2 m/s² nowhere from 1 m/s to 8 m/s." in last
+    assert not any("exceeds" in text for text in said if text.startswith(("shape: ", "moments: ")))
+
+
+@pytest.mark.parametrize(("size", "lines"), [(3.0, [-2.0]), (1.5, [-2.0]), (0.9, [])])
+def test_a_limit_is_a_line_in_the_figure_where_it_is_near(size: float, lines: list[float]) -> None:
+    (figure,) = envelopes.pictures(Results.of(shaken(size)))
+    first, *others = figure.drawing.axes[:3]
+    assert first.get_ylabel().startswith("shaking")
+    assert limits(first) == lines and not any(map(limits, others))
+    assert ("limit 2 m/s², beyond this panel" in first.get_title("right")) == (not lines)
+    assert (", within the limit of 2 m/s²" in figure.title) == (size < 2.0)
+
+
+def test_the_variant_of_an_envelope_that_the_answer_begins_with_keeps_its_history() -> None:
+    dataset = shaken(3.0)
+    results = Results.of(dataset)
+    assert kind_of(results.study).named(results)[0] == (2,)
 
 
 @pytest.mark.fault(18)

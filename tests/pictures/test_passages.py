@@ -52,7 +52,7 @@ def test_every_quantity_is_drawn_and_the_largest_of_many_sensors() -> None:
     assert next(iter(found)) == "largest-displacement"
     assert {"largest-acceleration", "largest-bending-moment"} <= set(found)
     drawn = panels(found["largest-displacement"])
-    assert list(drawn) == ["midspan", "place 3", "place 4", "place 6"]
+    assert list(drawn) == ["midspan", "place 4", "place 6", "place 3"]
     assert "2 more sensors with smaller values." in found["largest-displacement"].caption
     assert {"midspan", "moment", "shaken"} < set(panels(found["response"]))
     assert not [line for figure in found.values() for axes in panels(figure).values() for line in limits(axes)]
@@ -103,9 +103,9 @@ def test_a_limit_far_off_is_told_and_does_not_flatten_the_curves() -> None:
 def test_a_trajectory_draws_and_tells_every_quantity() -> None:
     dataset = scenes.run("trajectory", extra=f"{SENSORS}\n{SHAKEN}")
     sensors = next(figure for figure in answers.figures(dataset) if figure.name == "sensors")
-    assert list(panels(sensors)) == ["midspan", "moment", "place 1", "shaken"]
+    assert list(panels(sensors)) == ["midspan", "moment", "shaken", "place 4"]
     told = [sentence.partition(":")[0] for sentence in answers.answer(dataset)]
-    assert [name for name in told if name in Results.of(dataset).sensors] == ["midspan", "moment", "place_1", "shaken"]
+    assert [name for name in told if name in Results.of(dataset).sensors] == ["midspan", "moment", "shaken", "place_4"]
 
 
 def test_limited_quantities_stand_unfolded() -> None:

@@ -1,6 +1,7 @@
 """Audits of runs: what they find, their group in the archive, what is told of them, going on after an interruption."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from results_schema.store.archive import open_archive
 from results_schema.validate import validate
 from results_schema.variables import expand
 from studies.commands.cli import main
+from studies.commands.screens import show_outcome
 from studies.protocol.parts import Work
 from studies.reporting.summary import exit_code
 from studies.results.formatting import number
@@ -168,6 +170,19 @@ def test_what_the_archive_marks_itself_is_told_apart() -> None:
     none = dataset.assign(status=xr.full_like(status, Status.TOLERANCE_MISSED))
     assert told_accuracy(marked, Results.of(none)) == f"no status is ok where 1e-9 was asked; {told_alone}."
     assert np.isnan(Verdict.of(marked).worst) and as_json(marked, Results.of(dataset))["marked"] == 6
+
+
+def test_the_lines_at_the_end_say_which_variants_they_are_of(fine: Outcome, capsys: pytest.CaptureFixture[str]) -> None:
+    """An error below the tolerance beside a variant that misses it is that of the others."""
+    results = fine.results.copy(deep=True)
+    assert told_accuracy(fine.audit, Results.of(results)).startswith("estimated errors at most ")
+    error, missed = results["estimated_error"].values, list(results["result"].values).index("midspan_max")
+    results["status"].values[0, 0], error[0, 0, missed] = Status.TOLERANCE_MISSED, 0.9
+    assert told_accuracy(fine.audit, Results.of(results)).startswith("estimated errors of those that are ok at most ")
+    show_outcome(replace(fine, results=results))
+    told = " ".join(capsys.readouterr().out.split())
+    helps = 'What helps: `tolerance = "told"` on the sensor midspan, so that errors are told and not held, or a larger'
+    assert "most of all for midspan_max: 9e-1 where" in told and f"was asked). {helps} tolerance. Accuracy: " in told
 
 
 def test_the_command_says_it_and_ends_with_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

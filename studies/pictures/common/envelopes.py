@@ -8,10 +8,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from studies.pictures.common.figures import HAIR, INK, Figure, draw, legend_of_all, shades, zero_line
-from studies.results.findings_common import told_envelopes
-from studies.results.formatting import counted, scale_for
-from studies.results.places import Index, chosen, spread
+from studies.findings.beyond import limits_of
+from studies.findings.envelopes import largest_along, nearest_to_limits, sizes_along
+from studies.pictures.common.figures import (
+    HAIR,
+    INK,
+    Figure,
+    draw,
+    legend_of_all,
+    limit_far,
+    limit_line,
+    shades,
+    zero_line,
+)
+from studies.pictures.common.sizes import FAR
+from studies.results.formatting import Scale, counted, quantity, scale_for
+from studies.results.places import Index, spread
 from studies.results.results import Results
 
 MOST_ENVELOPES = 4
@@ -19,15 +31,28 @@ MOST_CURVES = 4
 
 
 def pictures(results: Results) -> list[Figure]:
-    """All envelopes, one below the other; none where the study has none, or no variant has values."""
-    names = [name for name in results.envelopes if np.isfinite(results.envelope(name, "max")).any()]
+    """Envelopes, one below the other, those nearest to their limits first; none where the study has none, or no variant
+    has values."""
+    names = [name for name in nearest_to_limits(results) if np.isfinite(results.envelope(name, "max")).any()]
     if not names:
         return []
-    shown = list(chosen(names, MOST_ENVELOPES))
+    shown = names[:MOST_ENVELOPES]
     height = 0.8 + 2.1 * len(shown)
-    title = told_envelopes(results)[list(results.envelopes).index(names[0])].partition(": ")[2].rstrip(".")
+    title = f"{largest_along(results, names[0])}{_against(results, names[0])}"
     title = f"{title[0].upper()}{title[1:]}"
     return [draw("envelopes", title, _caption(results, names, shown), height, partial(_draw, results, shown))]
+
+
+def _limit(results: Results, name: str) -> float | None:
+    return limits_of(results.study).limit(results.study.envelope[name].quantity)
+
+
+def _against(results: Results, name: str) -> str:
+    """Whether an envelope is beyond its limit, as the end of a title; "" without one."""
+    if (limit := _limit(results, name)) is None:
+        return ""
+    beyond = bool((sizes_along(results, name)[results.with_values] > limit).any())
+    return f", {'beyond' if beyond else 'within'} the limit of {quantity(limit, results.envelopes[name])}"
 
 
 def _caption(results: Results, names: list[str], shown: list[str]) -> str:
@@ -38,7 +63,8 @@ def _caption(results: Results, names: list[str], shown: list[str]) -> str:
     hang = " Displacements point down, as the body hangs." if "m" in map(results.envelopes.get, shown) else ""
     left_out = len(names) - len(shown)
     more = f" {counted(left_out, 'more envelope')} in the archive." if left_out else ""
-    return f"{lines}{band}.{hang}{more}"
+    limits = " Red: limits that the study names." if any(_limit(results, name) for name in shown) else ""
+    return f"{lines}{band}.{hang}{limits}{more}"
 
 
 def _draw(results: Results, names: list[str], drawing: Drawing) -> None:
@@ -55,8 +81,7 @@ def _draw(results: Results, names: list[str], drawing: Drawing) -> None:
 
 def _picked(results: Results, name: str) -> list[Index]:
     """Variants spread evenly over the sizes of an envelope, the one with the largest value among them."""
-    size = np.maximum(*(np.abs(results.envelope(name, end)).max(axis=-1) for end in ("max", "min")))
-    size = np.where(results.with_values, size, np.nan).reshape(-1)
+    size = np.where(results.with_values, sizes_along(results, name), np.nan).reshape(-1)
     order = np.argsort(size, kind="stable")[: int(np.isfinite(size).sum())]
     return [results.index_of(int(order[-1 - i])) for i in spread(len(order), MOST_CURVES)][::-1]
 
@@ -75,8 +100,21 @@ def _draw_one(axes: Axes, results: Results, name: str, variants: list[Index]) ->
         for values, label in zip(ends, (results.at(index).replace(", ", "\n"), None), strict=True):
             axes.plot(places, values[index] * scale.factor, color=colour, label=label)
     zero_line(axes)
+    _draw_limit(axes, results, name, scale, (float(bottom.min()), float(top.max())))
     axes.set_xlim(places[0], places[-1])
     if results.envelopes[name] == "m":
         axes.invert_yaxis()
     words = f"{name}\n{results.study.envelope[name].quantity}".replace("_", " ")
     axes.set_ylabel(f"{words} ({scale.unit})" if scale.unit else words)
+
+
+def _draw_limit(axes: Axes, results: Results, name: str, scale: Scale, ends: tuple[float, float]) -> None:
+    """The limit of an envelope on the sides on which it comes near, or words on one that is far off."""
+    if (limit := _limit(results, name)) is None:
+        return
+    said = f"limit {quantity(limit, results.envelopes[name])}"
+    sides = [side for side, end in ((-limit, -ends[0]), (limit, ends[1])) if limit <= FAR * end]
+    for side in sides:
+        limit_line(axes, side * scale.factor, said if side == sides[-1] else "", "left")
+    if not sides:
+        limit_far(axes, f"{said}, beyond this panel")

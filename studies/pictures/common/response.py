@@ -24,11 +24,11 @@ DOWN = "Displacements point down, as the body hangs."
 
 
 def response(results: Results, ranked: list[str], limits: Limits, shown: list[Index], top: Index) -> Figure:
-    """Some variants over the way of the first carriage. ranked: sensors, the most telling first, of which the first of
-    every quantity is drawn before others. top: the variant of the answer."""
-    quantities = [results.study.sensor[name].quantity for name in ranked]
-    turns = [quantities[:place].count(quantity) for place, quantity in enumerate(quantities)]
-    sensors = [name for _, name in sorted(zip(turns, ranked, strict=True), key=lambda pair: pair[0])][:MOST_SENSORS]
+    """Some variants over the way of the first carriage.
+
+    ranked: sensors, the most telling first. top: the variant of the answer."""
+    sensors = ranked[:MOST_SENSORS]
+    read = {results.study.sensor[name].quantity for name in sensors}
     first, own = sensors[0], shown[-1]
     way = over_way(results, first, own)
     at = int(np.argmax(np.abs(way.values)))
@@ -43,7 +43,7 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")
         + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
         + hang
-        + (" Red: limits that the study names." if any(limits.limit(name) for name in quantities) else "")
+        + (" Red: limits that the study names." if any(map(limits.limit, read)) else "")
         + "".join(loose)
     )
     height = 0.8 + 1.9 * len(sensors)

@@ -1,0 +1,128 @@
+"""Which sensors an answer names first, and where in a sweep they are beyond a limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from studies.findings.beyond import where_beyond
+from studies.reporting import answers
+from studies.results.results import Results
+from tests.studies import scenes
+
+SENSORS = """\
+[sensor.quarter]
+body = "bed"
+at = 2.5
+[sensor.hogging]
+body = "bed"
+at = 1.0
+quantity = "bending_moment"
+[sensor.shaken]
+body = "bed"
+at = 5.0
+quantity = "acceleration"
+[sensor.shaken_most]
+body = "bed"
+at = 2.5
+quantity = "acceleration"
+[sensor.aboard]
+carriage = "cart"
+quantity = "acceleration"
+
+[carriage.cart]
+on = "bed"
+kind = "oscillator"
+mass = 1.0
+stiffness = 1000.0
+headway = 2.0
+motion = { kind = "cruise", start = 0.0, end = 10.0, speed = 8.0 }
+"""
+LARGEST = {  # the first sensor of a quantity is nowhere the largest
+    "midspan": 1e-3,
+    "moment": 2.0,
+    "quarter": 3e-3,
+    "hogging": -4.0,
+    "shaken": 5.0,
+    "shaken_most": -6.0,
+    "aboard": 7.0,
+}
+
+
+def passage(question: str = "", **largest: float) -> xr.Dataset:
+    """A passage at four speeds whose sensors reach these values at the third."""
+    dataset = scenes.run("passage", scenes.pace("passage"), extra=f"{SENSORS}\n{question}")
+    for name, value in (LARGEST | largest).items():
+        high, low = (dataset[f"{name}_{end}"].values for end in ("max", "min"))
+        high[:], low[:] = np.where(np.isfinite(high), 0.0, high), 0.0
+        (high if value > 0.0 else low)[2] = value
+    return dataset
+
+
+def subjects(dataset: xr.Dataset) -> list[str]:
+    """The sensors of the answer in their order."""
+    named = [text.partition(":")[0] for text in answers.answer(dataset)]
+    return [name for name in named if name in Results.of(dataset).sensors]
+
+
+def test_the_largest_of_every_quantity_is_told_before_a_second_sensor_of_any() -> None:
+    """By absolute values; what a carriage's own mass does is no quantity of the bed."""
+    dataset = passage()
+    assert subjects(dataset) == ["quarter", "hogging", "shaken_most", "aboard", "midspan", "moment"]
+    said = answers.answer_of(Results.of(dataset))
+    assert said[0].startswith("quarter: the largest displacement at 2.5 m of bed is 3 mm")
+    assert said[1].startswith("hogging: the largest bending moment at 1 m of bed is -4 N m")
+    assert said[2].startswith("shaken_most: the largest acceleration at 2.5 m of bed is -6 m/s²")
+    assert [text.partition(":")[0] for text in said] == ["quarter", "hogging", "shaken_most", "aboard"]
+
+
+def test_quantities_with_a_limit_come_first_and_then_their_other_sensors() -> None:
+    dataset = passage("[question]\nacceleration = 10.0\nbending_moment = 5.0", aboard=6.5)
+    assert subjects(dataset) == ["hogging", "aboard", "shaken_most", "quarter", "shaken", "moment"]
+
+
+def test_titles_name_the_largest_of_their_quantity() -> None:
+    titles = {figure.name: figure.title for figure in answers.figures(passage())}
+    assert titles["largest-displacement"].startswith("The largest displacement at 2.5 m of bed is 3 mm, at pace")
+    assert titles["largest-bending-moment"].startswith("The largest bending moment at 1 m of bed is 4 N m, at pace")
+
+
+MASSES = 'mass = { of = "carriage.table.mass", values = [50, 60, 70, 80] }'
+
+
+def beyond(*speeds: int, count: int = 20, masses: tuple[int, ...] = ()) -> str:
+    """Where values exceed a limit that do so at these of so many speeds in km/h, at each for one of four masses."""
+    pace = f'speed = {{ of = "carriage.table.motion.speed", from = "1 km/h", to = "{count} km/h", count = {count} }}'
+    results = Results.of(scenes.run("passage", f"{pace}\n{MASSES}" if masses else pace))
+    values = np.zeros(results.shape)
+    for place, speed in enumerate(speeds):
+        values[(speed - 1, masses[place]) if masses else speed - 1] = 1.0
+    return where_beyond(results, values, 0.5, results.axes[0])
+
+
+@pytest.mark.parametrize(
+    ("speeds", "words"),
+    [
+        ((3,), "at 3 km/h"),
+        ((3, 4), "at 3 to 4 km/h"),
+        ((1, 5, 7, 8, 9, 20), "at 1, 5, 7 to 9 and 20 km/h"),
+        ((1, 3, 5, 7, 9, 11, 13, 14, 17), "at 1, 3, 5, 7, 9, 11, 13 to 14 and 17 km/h"),
+        ((3, 19, 20), "at 3 km/h and from 19 km/h to the end of the sweep, 20 km/h"),
+        ((1, 3, 19, 20), "at 1 and 3 km/h, and from 19 km/h to the end of the sweep, 20 km/h"),
+        ((1, 2, 5, 7, 9, 11, 13, 15, 17), "at 1 to 2, 5, 7, 9, 11, 13, 15 and 17 km/h"),
+        ((1, 3, 5, 7, 9, 11, 13, 15, 17), "in 9 parts of the sweep, first at 1 km/h, last at 17 km/h"),
+        (
+            (1, 2, 4, 6, 8, 10, 12, 14, 16, 19, 20),
+            "in 9 parts of the sweep, first at 1 to 2 km/h, last from 19 km/h to the end of the sweep, 20 km/h",
+        ),
+    ],
+)
+def test_up_to_eight_parts_of_a_sweep_are_listed_with_one_unit(speeds: tuple[int, ...], words: str) -> None:
+    assert beyond(*speeds) == words
+
+
+def test_what_else_is_swept_stands_with_few_parts_or_once_behind_all() -> None:
+    assert beyond(1, 3, masses=(2, 2)) == "at 1 and 3 km/h (mass 70 kg)"
+    assert beyond(1, 3, masses=(2, 3)) == "at 1 km/h (mass 70 kg) and at 3 km/h (mass 80 kg)"
+    assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (mass 60 kg to 70 kg)"
