@@ -277,6 +277,12 @@ CASES = {
     ),
     "critical speed": passing(car=mass(0.1, cruise(0.0, 1.0, 50.0))),
     "times its body": passing(car=mass(5.0, WAY)),
+    "the load of carriage car presses with 0.0004 N, 0.4 % of the weight of bed, 0.1 N: were kilonewtons": passing(
+        car=force(4e-4, WAY)
+    ),
+    "the loads of train tram together press with 0.0004 N, 0.4 % of the weight of bed, 0.1 N: are the units": study(
+        beam(), {}, train={"tram": mass(2e-3, WAY, axles=2, spacing=0.1)}, gravity=0.1
+    ),
     "no structure bends so far": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.0005)),
     "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
     "in a first period": passing(beam(modes=1), solver={"steps": 30}),
@@ -292,6 +298,23 @@ def test_remarked(words: str) -> None:
 def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(passing())) == []
     assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
+
+
+SWEPT_LOAD = {"of": "carriage.car.force"}
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        passing(car=force(0, WAY) | {"force": "0.4 mN"}),
+        passing(car=force(4e-4, WAY), sweep={"load": SWEPT_LOAD | {"values": [4e-4, 0.02]}}),
+        passing(car=force(4e-4, WAY), sweep={"load": SWEPT_LOAD | {"from": "0.1 mN", "to": "0.4 mN", "count": 2}}),
+        study(beam(), mass(1e-6, WAY), gravity=0.0),
+    ],
+    ids=["with its unit", "heavier in another variant", "swept with its unit", "without gravity"],
+)
+def test_light_loads_are_not_always_remarked(light: Study) -> None:
+    assert remarks(make_plan(light)) == []
 
 
 def test_every_remark_has_its_case() -> None:
