@@ -17,6 +17,7 @@ from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
 
 FAST = 3.0  # times the critical speed
+RACING = 150.0  # m/s: trains have run at 160, machines at 10; km/h read as m/s begin with 200
 HEAVY = 2.0  # times the body's mass
 LONG = 100.0  # times the body's length: a way
 DEEP = 0.1  # of the length: a static deflection beyond linear bending
@@ -88,6 +89,22 @@ def _fast(plan: Plan) -> Iterator[str]:
         yield (
             f"some variants run at up to {worst:.3g} times the critical speed omega_1 L/pi, at {fastest:.3g} m/s: "
             "are the units right?"
+        )
+
+
+def _racing(plan: Plan) -> Iterator[str]:
+    """Of the fastest carriage."""
+    tops = {
+        tie.name: max(float((g.scene.carriages[number].rider.top_speed / _time_scale(g)).max()) for g in plan.grids)
+        for number, tie in enumerate(plan.base.carriages)
+    }
+    name, top = max(tops.items(), key=lambda found: found[1])
+    if top > RACING:
+        table = plan.study.source.written(f"carriage.{name}")
+        bare = plan.study.carriage[name].motion.pace == "speed" and not _has_unit(plan.study, f"{table}.motion.speed")
+        yield (
+            f"{table.replace('.', ' ')} runs at speeds up to {top:.4g} m/s ({3.6 * top:,.0f} km/h): "
+            f"{'were km/h meant?' if bare else 'are the units right?'}"
         )
 
 
@@ -192,4 +209,16 @@ def _time_scale(grid: SceneGrid) -> Array:
 
 
 REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
-REMARKS = (_partly_inert, _doubtful, _unsupported, _released, _leaves_between, _fast, _heavy, _light, _deep, _thin)
+REMARKS = (
+    _partly_inert,
+    _doubtful,
+    _unsupported,
+    _released,
+    _leaves_between,
+    _fast,
+    _racing,
+    _heavy,
+    _light,
+    _deep,
+    _thin,
+)
