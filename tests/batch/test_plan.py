@@ -276,7 +276,23 @@ CASES = {
         car=mass(0.1, {"kind": "waypoints", "times": [0.0, 2.0, 5.0], "positions": [0.1, 0.99, 0.99]})
     ),
     "critical speed": passing(car=mass(0.1, cruise(0.0, 1.0, 50.0))),
+    "carriage car runs at speeds up to 350 m/s (1,260 km/h): were km/h meant?": passing(
+        beam(youngs_modulus=1e8),
+        sweep={"speed": {"of": "carriage.car.motion.speed", "from": 100, "to": 350, "count": 2}},
+    ),
+    "runs at speeds up to 1080 m/s (3,888 km/h): are the units right?": passing(
+        beam(youngs_modulus=1e8), car=mass(0.1, cruise(0.0, 1.0, 1.0) | {"speed": "3888 km/h"})
+    ),
+    "up to 200 m/s (720 km/h): are the units right?": passing(
+        beam(youngs_modulus=1e8), car=mass(0.1, {"kind": "waypoints", "times": [0.0, 5e-3], "positions": [0.0, 1.0]})
+    ),
     "times its body": passing(car=mass(5.0, WAY)),
+    "the load of carriage car presses with 0.0004 N, 0.4 % of the weight of bed, 0.1 N: were kilonewtons": passing(
+        car=force(4e-4, WAY)
+    ),
+    "the loads of train tram together press with 0.0004 N, 0.4 % of the weight of bed, 0.1 N: are the units": study(
+        beam(), {}, train={"tram": mass(2e-3, WAY, axles=2, spacing=0.1)}, gravity=0.1
+    ),
     "no structure bends so far": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.0005)),
     "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
     "in a first period": passing(beam(modes=1), solver={"steps": 30}),
@@ -291,7 +307,25 @@ def test_remarked(words: str) -> None:
 
 def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(passing())) == []
+    assert remarks(make_plan(passing(beam(youngs_modulus=1e8), car=mass(0.1, cruise(0.0, 1.0, 145.0))))) == []
     assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
+
+
+SWEPT_LOAD = {"of": "carriage.car.force"}
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        passing(car=force(0, WAY) | {"force": "0.4 mN"}),
+        passing(car=force(4e-4, WAY), sweep={"load": SWEPT_LOAD | {"values": [4e-4, 0.02]}}),
+        passing(car=force(4e-4, WAY), sweep={"load": SWEPT_LOAD | {"from": "0.1 mN", "to": "0.4 mN", "count": 2}}),
+        study(beam(), mass(1e-6, WAY), gravity=0.0),
+    ],
+    ids=["with its unit", "heavier in another variant", "swept with its unit", "without gravity"],
+)
+def test_light_loads_are_not_always_remarked(light: Study) -> None:
+    assert remarks(make_plan(light)) == []
 
 
 def test_every_remark_has_its_case() -> None:

@@ -46,6 +46,7 @@ def test_built_in_studies_are_planned_without_a_complaint(name: str) -> None:
         plan = parts.plan
         assert plan.size >= AT_LEAST.get(name, 3)
         assert plan.seconds < 20.0
+    assert not any("?" in remark for remark in parts.remarks)  # whether something is meant
     assert len(study.title) > 10
     assert catalogue.find_study(name) == BUILT_IN[name]
 
