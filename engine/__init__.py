@@ -33,3 +33,8 @@ def __getattr__(name: str) -> Any:
         globals()[name] = found
         return found
     raise AttributeError(f"module 'engine' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What completion offers: names that are not imported yet, too."""
+    return sorted({*globals(), *__all__})

@@ -36,3 +36,8 @@ def __getattr__(name: str) -> Any:
         globals()[name] = found
         return found
     raise AttributeError(f"module 'studies' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What completion offers: names that are not imported yet, too."""
+    return sorted({*globals(), *__all__})

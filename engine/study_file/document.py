@@ -62,7 +62,7 @@ def what_to_write(line: str, complaint: str) -> str:
     return next((match.expand(remedy) for match, remedy in found if match), "")
 
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 32_000_000  # 500,000 samples of three numbers, which take some seconds to read
 MAX_DEPTH = 32
 MAX_INTEGER = 2**63 - 1
 FLOAT_DIGITS = 1000

@@ -1,4 +1,4 @@
-"""Which variants of an asymmetry have settled, and how far forward and backward differ in these."""
+"""Which variants that go to and fro have settled, and how far forward and backward differ in these."""
 
 from typing import Annotated
 
@@ -10,9 +10,17 @@ from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
 from studies.findings import theory
 from studies.protocol.study import question_of
+from studies.results.formatting import counted, percent
 from studies.results.results import Results
 
 LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
+REMAINDER = "by the damping of the first mode"
+#: Of keys of swept numbers, with the end of their range at which a variant settles last.
+ENDS = (
+    (".motion.speed", np.min, "from {} on"),
+    (".motion.frequency", np.min, "from {} on"),
+    (".damping_ratio", np.max, "up to {}"),
+)
 
 
 class Asked(Spec):
@@ -39,3 +47,33 @@ def odd_parts(results: Results) -> Array:
     odd = np.asarray(results.dataset["odd_rms"].transpose(*results.dims, "sensor").values, dtype=np.float64)
     fine = settled(results)
     return np.where(fine[..., None], odd, np.nan) if fine.any() else odd
+
+
+def where_late(results: Results, late: Mask) -> str:
+    """From which speed on and up to which damping ratio variants have not settled."""
+    said = ""
+    for ending, pick, words in ENDS:
+        axis = results.axis(ending)
+        if axis is not None:
+            value = float(pick(results.everywhere(results.dataset[axis.name])[late]))
+            said += f", {words.format(f'{axis.noun} {axis.in_words(value)}')}"
+    return said
+
+
+def told_unsettled(results: Results) -> list[str]:
+    """How many variants still carry the vibration of the start in their last cycle, and with how many cycles they would
+    not; nothing where none is known to."""
+    left = theory.remainder_of_start(results)
+    late = left > LEFT_OVER
+    if not late.any():
+        return []
+    most, cycles = float(left[late].max()), float(theory.cycles(results).max())
+    enough = 1.0 + (cycles - 1.0) * np.log(LEFT_OVER) / np.log(most) if cycles > 1.0 and most < 1.0 else np.inf
+    advice = (
+        f"{np.ceil(enough):,.0f} cycles would be enough" if np.isfinite(enough) else "more cycles, or damping, help"
+    )
+    told = f"of the start is left in the last cycle, {REMAINDER}{where_late(results, late)}"
+    return [
+        f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(LEFT_OVER)} {told}: what is "
+        f"told holds the start too; {advice}."
+    ]

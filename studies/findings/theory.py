@@ -106,20 +106,35 @@ def cycle_frequency(results: Results) -> Any:
 
 
 def remainder_of_start(results: Results) -> Array:
-    """Part of the vibration of the start that is left in the last cycle of an out-and-back, for every variant.
+    """Part of the vibration of the start that is left in the last cycle of a motion to and fro, for every variant.
 
     exp(-zeta_1 omega_1 T (cycles - 1)) with the cycle's time T; NaN where only dampers damp the body, so that zeta_1
     is not known. Where both do it is an upper bound. The body is
     taken without the carriage, whose mass makes the vibration die out more slowly.
     """
-    key = f"carriage.{results.carriage_name}.motion"
-    start, end, speed, turn, cycles = (
-        results.everywhere(results.parameter(f"{key}.{name}")) for name in ("start", "end", "speed", "turn", "cycles")
-    )
-    time = 2.0 * ((math.pi - 2.0) * turn + 1.0) * np.abs(end - start) / speed
     damping, omega = (results.everywhere(value) for value in (damping_ratio(results), first_omega(results)))
     unknown = (damping == 0.0) & (_support_damping(results) > 0.0)
-    return np.where(unknown, np.nan, np.exp(-damping * omega * time * (cycles - 1.0)))
+    return np.where(unknown, np.nan, np.exp(-damping * omega * _cycle_time(results) * (cycles(results) - 1.0)))
+
+
+def cycles(results: Results) -> Array:
+    """How many cycles every variant runs."""
+    return _of_motion(results, "cycles")[0]
+
+
+def _cycle_time(results: Results) -> Array:
+    """How long a cycle takes, s, for every variant."""
+    if results.study.carriage[results.carriage_name].motion.pace == "frequency":
+        (frequency,) = _of_motion(results, "frequency")
+        return 1.0 / frequency
+    start, end, speed, turn = _of_motion(results, "start", "end", "speed", "turn")
+    return np.asarray(2.0 * ((math.pi - 2.0) * turn + 1.0) * np.abs(end - start) / speed)
+
+
+def _of_motion(results: Results, *names: str) -> list[Array]:
+    """Numbers of the carriage's motion for every variant."""
+    keys = (f"carriage.{results.carriage_name}.motion.{name}" for name in names)
+    return [results.everywhere(results.parameter(key)) for key in keys]
 
 
 def loaded_frequency(results: Results, mass_ratio: Array) -> Array:

@@ -15,7 +15,7 @@ from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.absolute_errors import absolute_errors, told_error
-from studies.findings.settled import LEFT_OVER, Asked, odd_parts, thresholds
+from studies.findings.settled import LEFT_OVER, REMAINDER, Asked, odd_parts, thresholds, where_late
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
@@ -28,7 +28,6 @@ LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
 CLOSE = 0.05
 MOST_SENSORS = 3
-REMAINDER = "by the damping of the first mode"
 
 RESULTS = outputs("""
     lag | sensor | m | nan | lag of the response
@@ -149,24 +148,13 @@ def _start(results: Results, left: Array) -> str:
         most = f"at most {percent(float(left[known].max()))} of the start is left, {REMAINDER}"
         who = "every variant" if known.all() else "every other variant"
         return f"In the last cycle {most}: {who} has settled.{unknown}"
-    where = _where_late(results, late)
+    where = where_late(results, late)
     told = f"more than {percent(LEFT_OVER)} of the start is left in the last cycle, {REMAINDER}{where}"
     if late.all():
         return f"No variant has settled: {told}. What follows holds the start too; run more cycles or with damping."
     count = f"In {int(late.sum()):,} of {counted(results.size, 'variant')}"
     advice = "they have not settled, and the first sentence leaves them out; run more cycles or with damping"
     return f"{count} {told}: {advice}.{unknown}"
-
-
-def _where_late(results: Results, late: Mask) -> str:
-    """From which speed on and up to which damping ratio variants have not settled."""
-    said = ""
-    for ending, pick, words in ((".motion.speed", np.min, "from {} on"), (".damping_ratio", np.max, "up to {}")):
-        axis = results.axis(ending)
-        if axis is not None:
-            value = float(pick(results.everywhere(results.dataset[axis.name])[late]))
-            said += f", {words.format(f'{axis.noun} {axis.in_words(value)}')}"
-    return said
 
 
 def _answer(results: Results) -> str:

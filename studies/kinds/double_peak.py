@@ -19,6 +19,7 @@ from results_schema.variables import AXES, MARCH, axes, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
 from studies.findings.peaks import PEAKS, peaks
+from studies.findings.settled import told_unsettled
 from studies.findings.two_peaks import EXPECTED, first_break, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
@@ -142,7 +143,7 @@ class DoublePeak(Kind):
         for sensor in list(results.sensors)[:MOST_SENSORS]:
             said += [_answer(results, sensor), *_breaks(results, sensor), *_amplified(results, sensor)]
             said += [*_halves(results, sensor), *_end_springs(results, sensor)]
-        return [*said, *told_statuses(results)]
+        return [*said[:1], *told_unsettled(results), *said[1:], *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variant where two peaks end and that with the largest amplification."""

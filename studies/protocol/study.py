@@ -274,6 +274,12 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     from engine.batch.executors import Where, place
 
     started = time.perf_counter()
+    if not hasattr(study, "source"):
+        remedy = "engine.load(path or text), or engine.Study(kind=..., body=..., ...)"
+        raise BadInput("this is no study", where="study", received=type(study).__name__, remedy=remedy)
+    if unknown := sorted(set(options) - {*Where.__annotations__, "progress", "chunk", "stage"}):
+        expected = ", ".join(sorted({*Where.__annotations__, "progress", "chunk"}))
+        raise BadInput("no such option", where="studies.run", expected=expected, received=", ".join(unknown))
     parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}

@@ -70,10 +70,14 @@ class Results:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Results:
-        """The results of a dataset that carries its study's text. Raises BadInput where the text is no study, or the
-        dataset a part of its results."""
+        """The results of a dataset that carries its study's text. Raises BadInput where there is none, the text is no
+        study, or the dataset a part of its results."""
         import engine
 
+        if "study" not in dataset.attrs:
+            what = "this dataset does not say which study gave it"
+            remedy = "take that of studies.run; engine.run gives those of the march alone"
+            raise BadInput(what, where="dataset", expected="an attribute study", remedy=remedy)
         text = str(dataset.attrs["study"])
         study = engine.load(text if "\n" in text else f"{text}\n")
         _check_whole(dataset, study)
