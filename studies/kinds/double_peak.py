@@ -20,7 +20,7 @@ from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
 from studies.findings.peaks import PEAKS, peaks
 from studies.findings.settled import told_unsettled
-from studies.findings.two_peaks import EXPECTED, first_break, slowest
+from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_words, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
@@ -206,8 +206,9 @@ def _answer(results: Results, sensor: str) -> str:
     place = first_break(results, sensor)
     if place is None:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
+    below = f"{peaks_in_words(pattern(results, sensor))} per cycle below {_pace(results, float(ratio[place]))}"
     return (
-        f"{sensor}: two peaks per cycle below {_pace(results, float(ratio[place]))}, whatever else is varied; there "
+        f"{sensor}: {below}, whatever else is varied; there "
         f"the pattern breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: "
         f"{share} of the variants."
     )
@@ -224,34 +225,36 @@ def _pace(results: Results, ratio: float) -> str:
 
 
 def _breaks(results: Results, sensor: str) -> list[str]:
-    """Up to which frequency ratio there are exactly two peaks, for each mass, and which harmonic breaks the pattern."""
+    """Up to which frequency ratio there are as many peaks as of the slowest, for each mass, and which harmonic breaks
+    the pattern."""
     counts, ratio = results.numbers("peaks_per_cycle", sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
-    if np.unique(ratio[known]).size < 2 or not (counts[known] == EXPECTED).any():
+    usual = pattern(results, sensor)
+    if np.unique(ratio[known]).size < 2 or not (counts[known] == usual).any():
         return []
     group = results.deciding_axis("peaks_per_cycle", sensor)
     if group is None:
-        return [f"{sensor}: {_break(results, ratio, counts, known)}."]
+        return [f"{sensor}: {_break(results, usual, counts, known)}."]
     along = results.everywhere(results.dataset[group.name])
     said = []
     for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
         label = group.at(group.values.tolist().index(value))
-        said.append(f"{label}: {_break(results, ratio, counts, known & (along == value))}")
+        said.append(f"{label}: {_break(results, usual, counts, known & (along == value))}")
     return [f"{sensor}: " + "; ".join(said) + "."]
 
 
-def _break(results: Results, ratio: Array, counts: Array, among: Mask) -> str:
-    """Where among some variants the pattern of two peaks breaks, beside the nearest harmonic of the cycle."""
-    other = among & (counts != EXPECTED)
+def _break(results: Results, usual: int, counts: Array, among: Mask) -> str:
+    """Where among some variants the usual number of peaks breaks, beside the nearest harmonic of the cycle."""
+    ratio, other = results.everywhere(theory.frequency_ratio(results)), among & (counts != usual)
     if not other.any():
-        return f"two peaks throughout, up to {_pace(results, float(ratio[among].max()))}"
+        return f"{peaks_in_words(usual)} throughout, up to {_pace(results, float(ratio[among].max()))}"
     first = float(ratio[other].min())
     fine = among & (ratio < first)
     place = tuple(np.argwhere(other & (ratio == first))[0])
     text = f"{counted(int(counts[place]), 'peak')} at {_pace(results, first)}"
     if not fine.any():
         return f"{counted(int(counts[place]), 'peak')} already at the lowest, {_pace(results, first)}"
-    text = f"two peaks up to {_pace(results, float(ratio[fine].max()))}, {text}"
+    text = f"{peaks_in_words(usual)} up to {_pace(results, float(ratio[fine].max()))}, {text}"
     mass = results.dataset.coords.get("mass_ratio")
     if mass is None:
         return text

@@ -29,7 +29,7 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import picked
-from studies.results.formatting import listed, number, scale_for
+from studies.results.formatting import counted, listed, number, scale_for
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -90,7 +90,7 @@ def _peaks_title(seen: View, sensor: str) -> str:
         return f"{name} has {counts.min():.0f} to {counts.max():.0f} peaks per cycle, most often {usual}"
     until = seen.x.in_words(float(seen.along(seen.x)[fine[-1]]) / seen.x.factor)
     others = listed([f"{count:.0f}" for count in np.unique(counts) if count != usual])
-    return f"{name} has {usual} peaks per cycle up to {until}; beyond, also {others}"
+    return f"{name} has {counted(usual, 'peak')} per cycle up to {until}; beyond, also {others}"
 
 
 def _typical(results: Results, sensor: str) -> list[Index]:
@@ -123,7 +123,8 @@ def _cycle(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
     counts = [float(results.of_sensor("peaks_per_cycle", sensors[0]).values[index]) for index in shown]
     told = [f"{count:.0f}" for count in counts if np.isfinite(count)]
     each = listed(told if len(set(told)) > 1 else told[:1]) or "no"
-    title = f"{sensors[0].replace('_', ' ')} has {each} peaks per cycle{', from slow to fast' * (len(set(told)) > 1)}"
+    peaks = "peak" if each == "1" else "peaks"
+    title = f"{sensors[0].replace('_', ' ')} has {each} {peaks} per cycle{', from slow to fast' * (len(set(told)) > 1)}"
     return draw("cycle", title, caption, height, partial(_draw_cycle, results, sensors, shown))
 
 
