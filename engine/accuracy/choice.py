@@ -117,7 +117,7 @@ class Cheapest(NamedTuple):
     def of(self, places: Array, neighbours: Numbers, tighter: Array) -> Numbers:
         """(V,) the rungs of variants at weighted places (V, D)."""
         rung = np.empty(tighter.size, dtype=np.int32)
-        cheapest(self.wanted, (self.slopes, places), self.worth, neighbours, tighter, rung)
+        cheapest(self.wanted, (self.slopes, places), self.worth, neighbours, np.log(tighter), rung)
         return np.asarray(self.ranked[rung])
 
 

@@ -65,16 +65,18 @@ class NeighbourErrors:
     def errors(self, march: Numbers, rung: Numbers, places: Array, neighbours: Numbers) -> Array:
         """(R, V) estimated errors by the marches (columns x cuts, P) of neighbours (V, k) that tell of the rung of a
         variant at its place (V, D); NaN where no estimate exists."""
-        found = np.empty((self.error.shape[1], rung.size))
-        told_errors(self.error, march, rung, (self.told_slopes, places, self.pilots), neighbours, found)
+        found, rises = np.empty((self.error.shape[1], rung.size)), np.zeros(neighbours.shape)
+        for slope, place, pilots in zip(self.told_slopes, places.T, self.pilots, strict=True):
+            rises += slope[rung][:, None] * (place[:, None] - pilots[neighbours])
+        told_errors(self.error, march, rung, np.exp(rises), neighbours, found)
         return found
 
     def worst(self, rung: Numbers, places: Array, neighbours: Numbers, tighter: Array) -> Array:
         """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
         `solver.tolerance` of the variants over the study's."""
         found = np.empty(rung.size)
-        held_errors(self.held, rung, (self.held_slopes, places), neighbours, tighter, found)
-        return found
+        held_errors(self.held, rung, (self.held_slopes, places), neighbours, np.log(tighter), found)
+        return np.exp(found)
 
 
 def neighbour_errors_of(

@@ -4,8 +4,6 @@ The logarithm of an error on a rung is a plane over the places of variants, ``sl
 leaves of it.
 """
 
-import math
-
 import numpy as np
 
 from engine.kernels.jit import kernel, piece
@@ -69,21 +67,21 @@ def plane_at(slopes, rung, place):
 
 
 @kernel
-def cheapest(held, planes, worth, neighbours, tighter, found):
-    """found (V,): the first rung that holds by `worst_but_one` of a variant's neighbours (V, k), what is held to the
-    study's tolerance ``tighter`` (V,) than that; where there is none, the first that is within ALIKE of the least among
-    the first ``worth``. planes: slopes (D, rungs), and places (V, D)."""
+def cheapest(held, planes, worth, neighbours, limit, found):
+    """found (V,): the first rung that holds by `worst_but_one` of a variant's neighbours (V, k) with its ``limit``
+    (V,), a logarithm; where there is none, the first that is within ALIKE of the least among the first ``worth``.
+    planes: slopes (D, rungs), and places (V, D)."""
     slopes, places = planes
     missed, plane = np.empty(AT_ONCE, dtype=np.int64), np.empty(AT_ONCE)
     for v in range(neighbours.shape[0]):
-        found[v], limit = -1, math.log(tighter[v])
+        found[v] = -1
         for first in range(0, held.shape[2], AT_ONCE):
             _planes_at(slopes, first, places[v], plane)
-            found[v] = _first_held(held, plane, first, neighbours[v], limit, missed)
+            found[v] = _first_held(held, plane, first, neighbours[v], limit[v], missed)
             if found[v] >= 0:
                 break
         if found[v] < 0:
-            found[v] = _least_held(held, slopes, places[v], worth, neighbours[v], limit)
+            found[v] = _least_held(held, slopes, places[v], worth, neighbours[v], limit[v])
 
 
 @piece
@@ -117,41 +115,37 @@ def _least_held(held, slopes, place, worth, near, limit):
     for rung in range(worth):
         least = min(least, worst_but_one(held, rung, near, limit) + plane_at(slopes, rung, place))
     for rung in range(worth):
-        if worst_but_one(held, rung, near, limit) + plane_at(slopes, rung, place) <= least + math.log(ALIKE):
+        if worst_but_one(held, rung, near, limit) + plane_at(slopes, rung, place) <= least + ALIKE:
             return rung
     return worth - 1
 
 
 AT_ONCE = 64  # rungs that are looked at together: most variants find theirs among the first
-ALIKE = 1.25  # times the least error: as good as that, where none is small enough
+ALIKE = 0.2231435513142098  # log(1.25): of an error beside the least: as good, where none is small enough
 
 
 @kernel
-def held_errors(held, rung, planes, neighbours, tighter, found):
-    """found (V,): by `worst_but_one` the error of every variant on its own rung (V,); as `cheapest`."""
+def held_errors(held, rung, planes, neighbours, limit, found):
+    """found (V,): by `worst_but_one` the logarithm of the error of a variant on its own rung (V,); as `cheapest`."""
     slopes, places = planes
     for v in range(neighbours.shape[0]):
-        worst = worst_but_one(held, rung[v], neighbours[v], math.log(tighter[v]))
-        found[v] = math.exp(worst + plane_at(slopes, rung[v], places[v]))
+        worst = worst_but_one(held, rung[v], neighbours[v], limit[v])
+        found[v] = worst + plane_at(slopes, rung[v], places[v])
 
 
 @kernel
-def told_errors(error, march, rung, planes, neighbours, found):
+def told_errors(error, march, rung, times, neighbours, found):
     """found (R, V): the largest but one, the only one if k = 1, of the errors (M, R) of the marches (rungs, P) that
-    tell a variant's neighbours (V, k) of its rung (V,), each times what the plane rises by from there; NaN where that
-    is not finite: NaN counts as the largest. planes: slopes (D, rungs), places (V, D), and those of pilots (D, P)."""
-    slopes, places, pilots = planes
+    tell a variant's neighbours (V, k) of its rung (V,), each times what the plane rises by from there (V, k); NaN where
+    that is not finite: NaN counts as the largest."""
     few = neighbours.shape[1] == 1
     worst, second = np.empty(error.shape[1]), np.empty(error.shape[1])
     for v in range(neighbours.shape[0]):
         worst[:] = second[:] = -np.inf
-        for p in neighbours[v]:
-            rises = 0.0
-            for d in range(pilots.shape[0]):
-                rises += slopes[d, rung[v]] * (places[v, d] - pilots[d, p])
-            times, of_march = math.exp(rises), error[march[rung[v], p]]
+        for n in range(neighbours.shape[1]):
+            of_march = error[march[rung[v], neighbours[v, n]]]
             for r in range(worst.size):
-                own = times * of_march[r]
+                own = times[v, n] * of_march[r]
                 own = own if np.isfinite(own) else np.inf
                 second[r] = max(second[r], min(worst[r], own))
                 worst[r] = max(worst[r], own)

@@ -117,6 +117,11 @@ class Sensor(Spec):
         return self
 
     @property
+    def fixed_place(self) -> float | None:
+        """The place of the track, m, at which it reads whatever happens; None where it has no such."""
+        return self.at if self.spot is None else None
+
+    @property
     def reads(self) -> Quantity:
         """What it reads, as the table of quantities has it."""
         return QUANTITIES[self.quantity]
@@ -151,6 +156,11 @@ class Envelope(Spec):
     places: int = Field(default=51, ge=2, le=MOST_PLACES)
     from_: Length | None = Field(default=None, alias="from", ge=0)
     to: Length | None = Field(default=None, gt=0)
+
+    @property
+    def fixed_place(self) -> None:
+        """None: it reads many."""
+        return None
 
     @model_validator(mode="after")
     def _ascending(self) -> Envelope:

@@ -50,8 +50,7 @@ class AskedOfPassages(Limits):
 
 def limits_of(study: Study) -> Limits:
     """The limits that a study's table [question] names; none where its kind knows none of readings."""
-    settings = kind_named(study.kind).settings
-    return question_of(study, settings) if settings is not None and issubclass(settings, Limits) else Limits()
+    return question_of(study, AskedOfPassages) if kind_named(study.kind).names_limits else Limits()
 
 
 def told_limit(results: Results, values: Array, limit: float, units: str) -> str:

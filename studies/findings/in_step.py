@@ -50,7 +50,7 @@ def speeds_in_step(
     of_body = [one for one in readers if one.body == train.on]
     read = [one for one in of_body if QUANTITIES[one.quantity].rate == ACCELERATION]
     units, newtons = "m s-2" if read else "m", train.load * (1.0 if train.units == "N" else study.gravity)
-    seen = read or [one for one in of_body if one.quantity == "displacement"]
+    seen = read or [one for one in of_body if QUANTITIES[one.quantity].unit == "m"]
     for mode in _modes(body, max((one.frequency_limit or np.inf for one in read), default=np.inf)):
         own = body.isel(mode=mode)
         frequency = float(own["frequency"])
@@ -68,7 +68,7 @@ def speeds_in_step(
 def _moved(mode: xr.Dataset, readers: Sequence[Sensor | Envelope]) -> float:
     """By how much a mode moves the places that are read, at most, or its track where one reads something else."""
     shape = np.abs(mode["mode_shape"].values)
-    places = [one.at for one in readers if isinstance(one, Sensor) and one.spot is None and one.at is not None]
+    places = [place for one in readers if (place := one.fixed_place) is not None]
     if not places or len(places) < len(readers):
         return float(shape.max())
     return float(np.interp(places, mode["position"].values, shape).max())

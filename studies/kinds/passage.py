@@ -38,6 +38,7 @@ class Passage(Kind):
     summary = "largest and smallest of every sensor and of the contact force, dynamic amplification"
     question = "How large does the response get, and does the contact hold?"
     settings = AskedOfPassages
+    names_limits = True
     drawn_by = "studies.pictures.passage"
 
     def check(self, study: Study) -> None:

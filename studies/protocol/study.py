@@ -44,7 +44,8 @@ class Kind:
     point.
 
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
-    settings: the class of its table [question], None where it has none. sweeps: whether it takes a [sweep], whose grid
+    settings: the class of its table [question], None where it has none. names_limits: whether that has limits of
+    readings. sweeps: whether it takes a [sweep], whose grid
     is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
     failure of the run. moves_frames: whether frames of bodies may move, and carriages slide by themselves.
     moves_robots: whether robots move. drawn_by: the module whose `pictures` makes its figures of the results. start: a
@@ -55,6 +56,7 @@ class Kind:
     summary: str
     question: str
     settings: type[Spec] | None = None
+    names_limits = False
     sweeps = True
     drawn_by = ""
     moves_frames = False
@@ -274,13 +276,15 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     from engine.batch.executors import Where, place
 
     started = time.perf_counter()
-    if not hasattr(study, "source"):
+    try:
+        kind = kind_of(study)
+    except AttributeError:
         remedy = "engine.load(path or text), or engine.Study(kind=..., body=..., ...)"
-        raise BadInput("this is no study", where="study", received=type(study).__name__, remedy=remedy)
+        raise BadInput("this is no study", where="study", received=type(study).__name__, remedy=remedy) from None
     if unknown := sorted(set(options) - {*Where.__annotations__, "progress", "chunk", "stage"}):
         expected = ", ".join(sorted({*Where.__annotations__, "progress", "chunk"}))
         raise BadInput("no such option", where="studies.run", expected=expected, received=", ".join(unknown))
-    parts, store = kind_of(study).parts(study), Memory()
+    parts, store = kind.parts(study), Memory()
     parts.check_memory()
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
     with place(**where) as here:

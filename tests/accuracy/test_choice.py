@@ -41,7 +41,7 @@ def cheapest_by_numpy(
         worst = np.sort(np.maximum(held[near, 0] / most, held[near, 1]), axis=0)[-2] * np.exp(place @ slopes)
         fits = np.flatnonzero(worst <= 1.0)
         least = worst[:worth].min()
-        alike = np.flatnonzero(worst[:worth] <= ALIKE * least) if np.isfinite(least) else np.array([worth - 1])
+        alike = np.flatnonzero(worst[:worth] <= np.exp(ALIKE) * least) if np.isfinite(least) else np.array([worth - 1])
         found.append((fits if fits.size else alike)[0])
     return np.array(found)
 
@@ -60,7 +60,7 @@ def by_kernels(seed: int) -> tuple[Any, Any]:
     points, pilots, held, limit, slopes = given_numbers(seed)
     neighbours, rung = np.empty((50, 4), dtype=np.int32), np.empty(50, dtype=np.int32)
     nearest(points, np.ascontiguousarray(pilots.T), neighbours)
-    cheapest(np.log(held), (slopes, points), 90, neighbours, limit, rung)
+    cheapest(np.log(held), (slopes, points), 90, neighbours, np.log(limit), rung)
     return neighbours, rung
 
 

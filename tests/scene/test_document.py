@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.scene.study import load
-from engine.study_file.document import document_of, read_document, write_document
+from engine.study_file.document import MAX_BYTES, document_of, read_document, write_document
 from results_schema.errors import BadInput
 from tests.scene.sample import MINIMAL, SAMPLE
 
@@ -36,7 +36,7 @@ def refused(text: str | Path) -> str:
         (b"[body.a]\n[body.b]\n[body.a]\n", ["line 3", "twice"]),
         (b"a = 1\nb =\n", ["line 2", "Invalid value"]),
         (b"a = 'x", ["line 1", "Expected"]),
-        (b"#" * 1_000_001, ["1000000 bytes"]),
+        (b"#" * (MAX_BYTES + 1), [f"{MAX_BYTES} bytes"]),
     ],
 )
 def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
