@@ -44,12 +44,11 @@ class Kind:
     point.
 
     name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
-    settings: the class of its table [question], None where it has none. names_limits: whether that has limits of
-    readings. sweeps: whether it takes a [sweep], whose grid
-    is then that of its results; else it measures, and a method that fails, by blowing up say, is an answer and no
-    failure of the run. moves_frames: whether frames of bodies may move, and carriages slide by themselves.
-    moves_robots: whether robots move. drawn_by: the module whose `pictures` makes its figures of the results. start: a
-    study file to start from, of a kind of another package.
+    settings: the class of its table [question], None where it has none. names_limits: whether that has the limits of
+    passages. sweeps: whether it takes a [sweep], whose grid is then that of its results; else it measures, and a method
+    that fails, by blowing up say, is an answer and no failure of the run. moves_frames: whether frames of bodies may
+    move, and carriages slide by themselves. moves_robots: whether robots move. drawn_by: the module whose `pictures`
+    makes its figures of the results. start: a study file to start from, of a kind of another package.
     """
 
     name: str
@@ -276,21 +275,26 @@ def run(study: Study, **options: Any) -> xr.Dataset:
     from engine.batch.executors import Where, place
 
     started = time.perf_counter()
-    try:
-        kind = kind_of(study)
-    except AttributeError:
-        remedy = "engine.load(path or text), or engine.Study(kind=..., body=..., ...)"
-        raise BadInput("this is no study", where="study", received=type(study).__name__, remedy=remedy) from None
-    if unknown := sorted(set(options) - {*Where.__annotations__, "progress", "chunk", "stage"}):
-        expected = ", ".join(sorted({*Where.__annotations__, "progress", "chunk"}))
-        raise BadInput("no such option", where="studies.run", expected=expected, received=", ".join(unknown))
-    parts, store = kind.parts(study), Memory()
+    known = sorted({*Where.__annotations__, "progress", "chunk"})
+    if unknown := sorted(set(options) - set(known)):
+        raise BadInput("no such option", where="studies.run", expected=", ".join(known), received=", ".join(unknown))
+    _check_study(study)
+    parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
     with place(**where) as here:
         parts.compute(store, Work(place=here, **options))
     found = compared(parts.gather(store), study)
     return found.assign_attrs(run_seconds=round(time.perf_counter() - started, 3))
+
+
+def _check_study(given: Any) -> None:
+    """Refuse the path or the tables of a study in place of one."""
+    try:
+        _ = given.source
+    except AttributeError:
+        remedy = "engine.load(path or text), or engine.Study(kind=..., body=..., ...)"
+        raise BadInput("this is no study", where="study", received=type(given).__name__, remedy=remedy) from None
 
 
 def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -64,5 +64,12 @@ def test_many_samples_of_ones_own_are_read_again() -> None:
     assert engine.load(text).sweep.axes["load"].size == values.size
 
 
+def test_more_samples_than_are_read_again_are_refused_before_they_run() -> None:
+    values = np.random.default_rng(1).uniform(0.1, 0.2, 600_000)
+    sweep = {"load": {"of": "carriage.car.mass", "values": values}}
+    with pytest.raises(BadInput, match=r"the study is too large; expected a text of at most 10000000 bytes.*sobol"):
+        study(beam(), mass(0.2, cruise(0.0, 1.0, 0.5)), sweep=sweep)
+
+
 def test_completion_offers_what_is_imported_late() -> None:
     assert {"run", "load", "Study"} <= set(dir(engine)) and {"run", "write", "report"} <= set(dir(studies))
