@@ -8,6 +8,7 @@ from pydantic import Field, Strict
 from engine.study_file.spec import Spec
 from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
+from results_schema.status import Fidelity
 from studies.findings import theory
 from studies.protocol.study import question_of
 from studies.results.formatting import counted, percent
@@ -61,19 +62,18 @@ def where_late(results: Results, late: Mask) -> str:
 
 
 def told_unsettled(results: Results) -> list[str]:
-    """How many variants still carry the vibration of the start in their last cycle, and with how many cycles they would
-    not; nothing where none is known to."""
-    left = theory.remainder_of_start(results)
-    late = left > LEFT_OVER
+    """How many marched variants still carry more of the vibration of the start in their last cycle than the study's
+    tolerance, and with how many cycles they would not; nothing where none is known to."""
+    left, held = theory.remainder_of_start(results), results.study.solver.tolerance
+    late = (left > held) & (results.dataset["fidelity_used"].values != int(Fidelity.STATIC))
     if not late.any():
         return []
     most, cycles = float(left[late].max()), float(theory.cycles(results).max())
-    enough = 1.0 + (cycles - 1.0) * np.log(LEFT_OVER) / np.log(most) if cycles > 1.0 and most < 1.0 else np.inf
-    advice = (
-        f"{np.ceil(enough):,.0f} cycles would be enough" if np.isfinite(enough) else "more cycles, or damping, help"
-    )
+    enough = 1.0 + (cycles - 1.0) * np.log(held) / np.log(most) if cycles > 1.0 and most < 1.0 else np.inf
+    known = np.isfinite(enough)
+    advice = f"{np.ceil(enough):,.0f} cycles would be enough" if known else "more cycles, or damping, help"
     told = f"of the start is left in the last cycle, {REMAINDER}{where_late(results, late)}"
     return [
-        f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(LEFT_OVER)} {told}: what is "
-        f"told holds the start too; {advice}."
+        f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(held)} {told}: what is told "
+        f"holds the start too, at most {percent(most)} of it; {advice}."
     ]

@@ -6,6 +6,7 @@ import pytest
 import studies
 from studies.findings import theory
 from studies.findings.settled import told_unsettled
+from studies.results.formatting import percent
 from studies.results.results import Results
 from tests.engine.build import Table, beam, fixed, mass, shuttle, study, swing
 
@@ -34,6 +35,7 @@ def test_it_dies_out_by_the_damping_of_the_first_mode(motion: Table, time: float
 
 def test_double_peaks_say_what_the_start_still_holds_and_how_many_cycles_it_takes() -> None:
     (told,) = told_unsettled(results_of(swing(0.5, 0.2, 0.5, 3)))
-    enough = int(np.ceil(1.0 - np.log(0.05) / (ZETA * OMEGA * 2.0)))
-    assert told.startswith("In 1 of 1 variant more than 5 % of the start is left") and f"; {enough} cycles" in told
+    enough = int(np.ceil(1.0 - np.log(1e-3) / (ZETA * OMEGA * 2.0)))
+    assert told.startswith("In 1 of 1 variant more than 0.1 % of the start is left") and f"; {enough} cycles" in told
+    assert f"at most {percent(float(np.exp(-ZETA * OMEGA * 4.0)))} of it" in told
     assert told_unsettled(results_of(swing(0.5, 0.2, 0.5, enough))) == []
