@@ -54,7 +54,6 @@ class Quantity:
         """Whether its influence line has a kink or a jump where it is read."""
         return self.of_section or self.derivative > 1
 
-
     @property
     def order(self) -> int:
         """Of the derivative by the place by which it converges with modes: what supports carry is as a shear force."""
