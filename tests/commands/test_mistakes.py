@@ -82,6 +82,16 @@ def test_a_mistake_in_a_study_file(mistake: str, capsys: pytest.CaptureFixture[s
     assert all(word in message for word in words), message
 
 
+def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("study.toml").write_text(
+        SMALL.replace("= 1000.0", "= 7.85").replace("modes = 4", "modes = 4\nown_weight = true")
+    )
+    message = told(capsys, 0, "check", "study.toml")
+    assert message.startswith("Is this meant?\n- body.beam.density = 7.85 kg/m3")
+    assert message.count("7.85 kg/m3") == 1
+    assert message.index("Worth knowing\n- body beam is released") > message.index("Bodies")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
