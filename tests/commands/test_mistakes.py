@@ -99,6 +99,18 @@ def test_a_mistake_in_a_study_file(mistake: str, capsys: pytest.CaptureFixture[s
     assert all(word in message for word in words), message
 
 
+@pytest.mark.parametrize(("middle", "told"), [(0.5, False), (1.0, True)])
+def test_speeds_over_the_critical_one_on_one_span_alone(
+    middle: float, told: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    springs = ", ".join(f"{{ at = {at}, stiffness = 1e8 }}" for at in (0.0, middle, 1.0))
+    Path("study.toml").write_text(SMALL.replace('"pinned-pinned"', f"[{springs}]"))
+    assert main(["check", "study.toml"]) == 0
+    output = capsys.readouterr().out
+    assert ("top speed over the critical speed omega_1 L/pi" in output) is told
+    assert "mass over the body's mass" in output
+
+
 @pytest.mark.fault(2)
 @pytest.mark.parametrize(("written", "meant"), OTHER_WORDS)
 def test_keys_by_other_words(written: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
