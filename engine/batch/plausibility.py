@@ -93,18 +93,18 @@ def _fast(plan: Plan) -> Iterator[str]:
 
 
 def _racing(plan: Plan) -> Iterator[str]:
-    """Of the fastest carriage."""
-    tops = {
-        tie.name: max(float((g.scene.carriages[number].rider.top_speed / _time_scale(g)).max()) for g in plan.grids)
-        for number, tie in enumerate(plan.base.carriages)
-    }
-    name, top = max(tops.items(), key=lambda found: found[1])
+    """Of the fastest carriage whose speed is written without a unit."""
+    tops = {}
+    for number, tie in enumerate(plan.base.carriages):
+        table = plan.study.source.written(f"carriage.{tie.name}")
+        if not _has_unit(plan.study, f"{table}.motion.speed"):
+            speeds = (g.scene.carriages[number].rider.top_speed / _time_scale(g) for g in plan.grids)
+            tops[table] = max(float(speed.max()) for speed in speeds), plan.study.carriage[tie.name].motion.pace
+    table, (top, pace) = max(tops.items(), key=lambda found: found[1][0], default=("", (0.0, None)))
     if top > RACING:
-        table = plan.study.source.written(f"carriage.{name}")
-        bare = plan.study.carriage[name].motion.pace == "speed" and not _has_unit(plan.study, f"{table}.motion.speed")
         yield (
             f"{table.replace('.', ' ')} runs at speeds up to {top:.4g} m/s ({3.6 * top:,.0f} km/h): "
-            f"{'were km/h meant?' if bare else 'are the units right?'}"
+            f"{'were km/h meant?' if pace == 'speed' else 'are the units right?'}"
         )
 
 

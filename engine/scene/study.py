@@ -170,6 +170,11 @@ class Study(Scene):
         """Name of the carriage whose passage or cycle is the unit of scene time: the first one."""
         return next(iter(self.carriage))
 
+    @property
+    def has_critical_speed(self) -> bool:
+        """Whether omega_1 L/pi says something of the first carriage: not on a body with supports between its ends."""
+        return bool(self.carriage) and self.body[self.carriage[self.clock].on].is_one_span
+
     def body_of(self, sensor: str) -> str:
         """Name of the body that a sensor reads."""
         place = self.sensor[sensor]

@@ -16,51 +16,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from engine.study_file.checks import NOT_MEANT, SIZES, is_meant
+from engine.study_file.slips import what_to_write
 from results_schema.errors import BadInput, printable, shortened
-
-_NUMBER = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
-_LINES = "TOML has lines key = value below headers such as [body.bed]"
-_NOT_JSON = f"this looks like JSON or Python; {_LINES}"
-_QUOTED = "quotation marks around a number with a unit"
-_WHAT_TO_WRITE = tuple(
-    (re.compile(pattern), remedy)
-    for pattern, remedy in (
-        (r"""^[{\[]?\s*(?:\{|"[^"]*"\s*:)|=\s*(?:dict\(|\{\s*["']\w+["']\s*:)""", _NOT_JSON),
-        (r"[\u201c-\u201f\u00ab\u00bb\u2018\u2019]", 'straight quotation marks: "..."'),
-        (r"[^\S \t]|[\u200b\ufeff]", "type the spaces of this line again: one of them is another character"),
-        (r"""^[^"'#]*\s//""", "a comment begins with #"),
-        (r"^[\w.-]+\s*:", "an equals sign; " + _LINES),
-        (r"=\s*True\b", "in small letters: true"),
-        (r"=\s*False\b", "in small letters: false"),
-        (r"=\s*(?:None|null|nil)\b", "leave the key out where it has no value"),
-        (r"=\s*$", 'a value after the "="'),
-        (rf"=\s*({_NUMBER}),(\d+)\s*([^\W\d].*)$", rf'a decimal point, and {_QUOTED}: "\1.\2 \3"'),
-        (r"=\s*([+-]?\d+),(\d{3})\s*$", r"a number without a comma: \1\2, or \1.\2 if a decimal point was meant"),
-        (r"=\s*([+-]?\d+),(\d+)\s*$", r"a decimal point: \1.\2"),
-        (rf"=\s*{_NUMBER}\s*[*/+^-]|=\s*\w+\(", "write the result: a study file does not calculate"),
-        (rf"=\s*({_NUMBER})\s*([^\W\d]\S*)\s*$", rf'{_QUOTED}: "\1 \2"'),
-        (r'^[^"#]*"[^"]*$', "a quotation mark is missing"),
-        (r"=\s*[^\W\d]\w*\s*$", "quotation marks around a word"),
-    )
-)  # fmt: skip
-_TWICE = {
-    "Cannot overwrite a value": "this key stands further up in the same table: keep one of the two",
-    "Cannot declare": "this table is there already, further up: put its keys together",
-}
-
-
-def what_to_write(line: str, complaint: str) -> str:
-    """A remedy for a line of a study file of which the reader of TOML complains, or "".
-
-    >>> what_to_write("length = 25,5 m", "")
-    'a decimal point, and quotation marks around a number with a unit: "25.5 m"'
-    """
-    for words, remedy in _TWICE.items():
-        if complaint.startswith(words):
-            return remedy
-    found = ((pattern.search(line), remedy) for pattern, remedy in _WHAT_TO_WRITE)
-    return next((match.expand(remedy) for match, remedy in found if match), "")
-
 
 #: Of a study's text, 160,000 samples of three numbers: 1.2 MB of such take 0.3 s to read, 20 MB 5 s, and 20 MB of what
 #: is slowest to read 40 s.
@@ -75,7 +32,7 @@ _LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""",
 )
 _AS_TEXT = "save it as UTF-8, as every editor can (Notepad: Save as, encoding UTF-8)"
-_PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
+_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 @dataclass(frozen=True)
@@ -213,9 +170,14 @@ def _parsed(source: Source) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         place, complaint = _PLACE.search(str(error)), _PLACE.sub("", str(error))
         line = int(place[1]) if place and place[1] else source.text.count("\n") + 1
-        written = source.text.split("\n")[line - 1].strip()
-        what, remedy = f"not valid TOML: {complaint}", what_to_write(written, complaint)
-        raise BadInput(what, where=source.where(line=line), received=shortened(written), remedy=remedy) from None
+        written = source.text.split("\n")[line - 1]
+        column = int(place[2]) if place and place[2] else len(written) + 1
+        raise BadInput(
+            f"not valid TOML: {complaint}",
+            where=source.where(line=line),
+            received=shortened(written.strip()),
+            remedy=printable(what_to_write(source.text, line, column, complaint), 200),
+        ) from None
 
 
 def _refuse_nesting(source: Source, line: int | None) -> NoReturn:

@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import ValidationError
 
 from engine.study_file.document import Source
-from engine.study_file.spec import LIST, NUMBER, TABLE, WORD, Hint, KindOf, Noun, Spec, nearest
+from engine.study_file.spec import LIST, NUMBER, TABLE, WORD, Hint, KindOf, Noun, Spec, nearest, synonym
 from engine.study_file.units import Unit
 from results_schema.errors import BadInput, shortened
 from results_schema.registry import ABSENT
@@ -112,7 +112,7 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
         return BadInput(context["what"], where=where, **said, remedy=context["remedy"] or _misplaced(model, data, keys))
     if detail["type"] == "extra_forbidden":
         names = keys_at(model, data, keys[:-1])
-        remedy = _misplaced(model, data, keys) or nearest(keys[-1], names)
+        remedy = synonym(keys[-1], names) or _misplaced(model, data, keys) or nearest(keys[-1], names)
         return BadInput("unknown key", where=where, expected=f"one of {', '.join(names)}", remedy=remedy)
     place = field_at(model, data, keys)
     expected = place.describe() if place else ""

@@ -161,12 +161,47 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return values
 
 
+# what others call a number -> its key; of several the first that is there
+_SYNONYMS: dict[str, tuple[str, ...]] = {
+    other: tuple(keys.split())
+    for keys, others in (
+        ("force mass", "axle_load axle_weight load weight P F"),
+        ("mass", "m"),
+        ("youngs_modulus", "E elastic_modulus young_modulus young youngs modulus"),
+        ("second_moment", "I Iy Iyy Iz inertia moment_of_inertia second_moment_of_area"),
+        ("density", "rho"),
+        ("area", "A cross_section"),
+        ("length", "L span"),
+        ("damping_ratio", "damping zeta xi"),
+        ("damping", "c"),
+        ("stiffness", "k"),
+        ("speed", "v V velocity"),
+        ("gravity", "g"),
+        ("at", "x position place"),
+    )
+    for other in others.split()
+}
+
+
+def synonym(word: object, names: Sequence[str]) -> str:
+    """A hint at the name, or the dotted key, of what is also called so, or "".
+
+    >>> synonym("body.bed.E", ["body.bed.youngs_modulus"])
+    'did you mean "body.bed.youngs_modulus"?'
+    """
+    table, dot, last = str(word)[:100].rpartition(".")
+    meant = _SYNONYMS.get(last) or (_SYNONYMS.get(last.lower(), ()) if len(last) > 1 else ())
+    return next((f'did you mean "{table}{dot}{key}"?' for key in meant if f"{table}{dot}{key}" in names), "")
+
+
 def nearest(word: object, names: Sequence[str]) -> str:
     """A hint at the name that was probably meant, or "".
 
     >>> nearest("lenght", ["length", "area"])
     'did you mean "length"?'
     """
+    if meant := synonym(word, names):
+        return meant
     found = get_close_matches(str(word)[:100], list(names), n=1, cutoff=0.6)
     return f'did you mean "{found[0]}"?' if found else ""
 

@@ -43,6 +43,7 @@ _COMMON = {
     )
     for name, factor in names.items()
 }  # what pint says of them, which takes half a second to import
+_RIGID = ("rigid", "fixed", "infinite", "infinity", "inf")
 _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
 
 
@@ -82,8 +83,9 @@ class Unit:
         number, unit = _split(text, self)
         factor, exponents, angle = _unit_factor(unit)
         if exponents != self.exponents or angle not in ((self.angle,) if self.turns else (0, self.angle)):
-            found = _dimension_name(exponents, angle)
-            raise fault(f"{found} where {self.article} is wanted", expected=self.article, received=shortened(text))
+            what = f"{_dimension_name(exponents, angle)} where {self.article} is wanted"
+            remedy = _meant_here(number, unit, self, exponents)
+            raise fault(what, expected=self.article, received=shortened(text), remedy=remedy)
         if self.per_turn and angle == 1:
             factor /= 2 * _PI
         value = Fraction(number) * factor
@@ -104,7 +106,16 @@ class Unit:
     def article(self) -> str:
         """The dimension in words, as an error names it."""
         noun = f"{'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}"
-        return f"{noun} ({self.symbol})" if self.symbol else noun
+        return f"{noun} ({self.typed})" if self.symbol else noun
+
+    @property
+    def typed(self) -> str:
+        """The SI unit as people type it in a study file.
+
+        >>> Unit("density", "kg m-3", (-3, 1, 0)).typed, Unit("rate", "s-1", (0, 0, -1)).typed
+        ('kg/m3', '1/s')
+        """
+        return _typed(self.symbol)
 
 
 def unit_of(dimension: Any) -> Unit:
@@ -125,9 +136,11 @@ def _split(text: str, wanted: Unit) -> tuple[str, str]:
     if match is not None and (decimals := _COMMA.match(match[2])):
         remedy = f'a point: "{match[1].replace(".", "")}.{decimals[1]}{decimals[2]}"'
         raise fault("a decimal comma", expected=wanted.article, received=shortened(text), remedy=remedy)
-    example = f'a number, or a string such as "1.5 {wanted.symbol or "%"}"'
+    example = f'a number, or a string such as "1.5 {wanted.typed or "%"}"'
     if match is None:
-        raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text))
+        stiff = f'a number large against what it supports, such as "1e12 {wanted.typed}", or a frame with a held node'
+        remedy = stiff if "stiffness" in wanted.noun and text.strip().casefold() in _RIGID else ""
+        raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text), remedy=remedy)
     if not match[2]:
         raise fault("a number in quotes has no unit", expected=example, received=shortened(text))
     return match[1], match[2]
@@ -186,6 +199,20 @@ def _meant(name: str) -> str:
     return f'did you mean "{unit}"?' if unit else ""
 
 
+def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int, int]) -> str:
+    """A remedy for a number with a unit of other exponents than those wanted, or ""."""
+    known = {unit.casefold(): unit for unit in _COMMON} | _RUN_TOGETHER
+    other = re.sub(r"[A-Za-z]+", lambda name: known.get(name[0].casefold(), name[0]), unit)
+    if other != unit and _unit_factor(other)[1] == wanted.exponents:
+        return f'did you mean "{number} {other}"?'
+    if unit == "g" and wanted.noun == "acceleration":
+        return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'
+    if wanted.noun == "density" and exponents == (-1, 1, 0):
+        per_length = float(Fraction(number) * _unit_factor(unit)[0])
+        return f'divide it by the area; a beam may have area = "1 m2" with density = "{per_length:.10g} kg/m3"'
+    return ""
+
+
 @lru_cache(maxsize=1)
 def _registry() -> Any:
     """pint's units with exact factors, so that "210 GPa" is 210e9 to the last bit."""
@@ -198,8 +225,17 @@ def _dimension_name(exponents: tuple[int, int, int], angle: int) -> str:
     for unit in KNOWN:
         if unit.exponents == exponents and angle in (0, unit.angle):
             return unit.article
-    powers = zip(("m", "kg", "s", "rad"), (*exponents, angle), strict=True)
-    return f"a quantity in {' '.join(f'{name}{power}' for name, power in powers if power) or 'no unit'}"
+    along, mass, time = exponents
+    powers = (("kg", mass), ("m", along), ("s", time), ("rad", angle))
+    return f"a quantity in {_typed(' '.join(f'{name}{power}' for name, power in powers if power)) or 'no unit'}"
+
+
+def _typed(symbol: str) -> str:
+    """A unit in UDUNITS text with slashes instead of negative powers."""
+    parts = [re.sub(r"(?<=[a-z])1$", "", part) for part in symbol.split()]
+    over = " ".join(part for part in parts if "-" not in part)
+    under = "".join(f"/{part.replace('-1', '').replace('-', '')}" for part in parts if "-" in part)
+    return (over or "1" * bool(under)) + under
 
 
 Length = Annotated[float, Unit("length", "m", (1, 0, 0))]

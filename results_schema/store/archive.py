@@ -125,6 +125,15 @@ def changed_files(path: Path | str, hashes: Mapping[str, str]) -> list[str]:
     return [name for name in sorted(hashes) if files_text({name: hashes[name]}) not in known]
 
 
+def study_text(path: Path | str) -> str:
+    """The text of the study file of which an archive is. Raises ValueError for what is no archive, else as
+    `open_archive`."""
+    if not files.is_hdf5(Path(path)):
+        raise ValueError(f"{path} is no archive")
+    with checked(Path(path)) as dataset:
+        return str(getattr(dataset, "study", ""))
+
+
 def output_state(path: Path | str, study_sha256: str, hashes: Mapping[str, str] = MappingProxyType({})) -> OutputState:
     """What is at the place of the output: nothing, this study's finished archive, or something else.
 

@@ -264,7 +264,8 @@ def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:
     scene, values = grid.scene, grid.values
     rider, time_scale = scene.carriages[0].rider, values.time_scale(name)
     critical = scene.first_omega * scene.leading_body.modal.length / np.pi
-    yield "top speed over the critical speed omega_1 L/pi", rider.top_speed / time_scale / critical
+    if scene.study.has_critical_speed:
+        yield "top speed over the critical speed omega_1 L/pi", rider.top_speed / time_scale / critical
     if rider.motion.period is not None:
         yield "cycles per first period of the body", 2.0 * np.pi / scene.first_omega / time_scale
     if scene.study.carriage[name].inertial:

@@ -32,12 +32,16 @@ MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the scre
 
 
 def show_preview(shown: Preview) -> None:
-    """What `check` found."""
+    """What `check` found: what looks wrong before all numbers that follow from it."""
+    doubts = [remark for remark in shown.remarks if "?" in remark]  # whether something is meant, as remarks ask it
+    if doubts:
+        paragraphs("Is this meant?", *(f"- {remark}" for remark in doubts), "")
     for part in shown.tables:
         table(part.title, part.headings, part.rows)
     say(shown.cost)
-    if shown.remarks:
-        say("", "Worth knowing", *(f"- {remark}" for remark in shown.remarks))
+    others = [remark for remark in shown.remarks if remark not in doubts]
+    if others:
+        say("", "Worth knowing", *(f"- {remark}" for remark in others))
 
 
 def show_studies(

@@ -238,11 +238,11 @@ def _worst(results: Results, carriage: str, opened: Mask) -> str:
 
 
 def _first_speed(results: Results, speed: Axis, opened: Mask) -> str:
-    """The lowest speed at which the contact opens, with its ratio to the critical speed where that is known."""
+    """The lowest speed at which the contact opens, with its ratio to the critical speed where that says something."""
     along = results.everywhere(results.dataset[speed.name])
     first = float(along[opened].min())
     text = f"first at {speed.in_words(first)}"
-    if "speed_ratio" not in results.dataset.coords:
+    if "speed_ratio" not in results.dataset.coords or not results.study.has_critical_speed:
         return text
     ratio = results.everywhere(results.dataset["speed_ratio"])
     return f"{text} ({number(float(ratio[opened & (along == first)].min()), 2)} of the critical speed)"

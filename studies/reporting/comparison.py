@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from engine.study_file.changes import Change, changes
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import xr
@@ -18,14 +18,6 @@ from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results
-
-
-class Change(NamedTuple):
-    """A key of the study file in both; None where one has it not."""
-
-    key: str
-    first: Any
-    second: Any
 
 
 class Difference(NamedTuple):
@@ -85,7 +77,7 @@ def compare(first: Results, second: Results) -> Comparison:
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)
     return Comparison(
-        changes=list(_changes(*(dict(_leaves(tomllib.loads(one.study.source.text))) for one in (first, second)))),
+        changes=changes(first.study.source.text, second.study.source.text),
         variants=both.size,
         only_first=first.size - both.size,
         only_second=second.size - both.size,
@@ -98,21 +90,6 @@ def compare(first: Results, second: Results) -> Comparison:
 def _not_swept(first: Results, second: Results) -> set[str]:
     names = {str(dim) for results in (first, second) for dim in results.dataset.dims}
     return names - set(first.dims)
-
-
-def _leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Every value of nested tables by its dotted key."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
-
-
-def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Change]:
-    for key in dict.fromkeys((*first, *second)):
-        if first.get(key) != second.get(key):
-            yield Change(key, first.get(key), second.get(key))
 
 
 def _shared(first: Results, second: Results) -> tuple[list[tuple[Range, str]], list[str]]:

@@ -18,9 +18,17 @@ from engine.batch.executors import place
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
-from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed
+from engine.study_file.changes import changes
+from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed, shortened
 from results_schema.store import files
-from results_schema.store.archive import OutputState, changed_files, open_archive, output_state, write_archive
+from results_schema.store.archive import (
+    OutputState,
+    changed_files,
+    open_archive,
+    output_state,
+    study_text,
+    write_archive,
+)
 from results_schema.store.parts import PartStore, bytes_so_far
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
@@ -35,6 +43,7 @@ from studies.runs.provenance import attributes
 from studies.runs.unreduced import unreduced_group
 
 Progress = Callable[[int, int], None]
+CHANGES_SHOWN = 3  # of the keys by which an archive's study differs
 AUDITING = "audit: some variants once more with more of everything"
 
 
@@ -211,9 +220,34 @@ def _state(study: Study, archive: Path, options: RunOptions) -> OutputState:
             remedy="choose another place with -o, or compute it again with --overwrite",
         )
     if state == "another study":
-        what, remedy = "there is something else already", "choose another place with -o, or replace it with --overwrite"
-        raise BadInput(what, where=str(archive), expected="no file, or the archive of this very study", remedy=remedy)
+        what, received = _something_else(study, archive)
+        raise BadInput(
+            what,
+            where=str(archive),
+            expected="no file, or the archive of this very study",
+            received=received,
+            remedy="choose another place with -o, or replace it with --overwrite",
+        )
     return state
+
+
+def _something_else(study: Study, archive: Path) -> tuple[str, str]:
+    """What the file at the output's place is, and by which keys its study differs."""
+    try:
+        found = changes(study_text(archive), study.source.text)
+    except ValueError:  # no archive, or one whose text is no study
+        return "there is something else already", ""
+    same = not {"kind", "title"} & {change.key for change in found}
+    shown = [f"{key}: {_written(old)}, now {_written(new)}" for key, old, new in found[:CHANGES_SHOWN]]
+    more = [f"{len(found) - CHANGES_SHOWN} more"] if len(found) > CHANGES_SHOWN else []
+    return (
+        f"the archive there is of {'another state of this' if same else 'another'} study",
+        "; ".join([*shown, *more]) or "the same keys and values, with other comments or in another order",
+    )
+
+
+def _written(value: Any) -> str:
+    return "left out" if value is None else shortened(value)
 
 
 def _as_declared(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -302,3 +302,20 @@ def test_dampers_at_nodes_are_those_of_the_beam() -> None:
         if name == "below_min":  # at the entrance, where the dampers have not yet moved
             continue
         assert np.ptp(one) > 0.01 * np.abs(one).max()
+
+
+@pytest.mark.parametrize(
+    ("changes", "one"),
+    [
+        ({}, True),
+        ({"track": BRIDGE["track"] | {"members": ["right", "left"]}}, True),
+        ({"supports": BRIDGE["supports"] | {"b": ["z"]}}, False),
+        ({"supports": BRIDGE["supports"] | {"b": ["rx"]}}, True),
+        ({"spring": {"pier": {"node": "b", "stiffness": [0.0, 0.0, 1e9]}}}, False),
+        ({"spring": {"pier": {"node": "b", "rotational": [0.0, 1e9, 0.0]}}}, True),
+        ({"spring": {"brace": {"node": "b", "to": "d", "stiffness": [0.0, 0.0, 1e9]}}}, True),
+        ({"node": BRIDGE["node"] | {"d": [6.0, 0.0, -3.0]}}, False),
+    ],
+)
+def test_whether_it_is_one_span(changes: dict[str, Any], one: bool) -> None:
+    assert Frame.model_validate(BRIDGE | changes).is_one_span is one

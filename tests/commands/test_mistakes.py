@@ -64,6 +64,23 @@ MISTAKES = {
 }  # fmt: skip
 
 
+# key that was written instead of another, in the small study
+OTHER_WORDS = [
+    ("E = 1e9", "youngs_modulus = 1e9"),
+    ("I = 1e-6", "second_moment = 1e-6"),
+    ("inertia = 1e-6", "second_moment = 1e-6"),
+    ("rho = 1000.0", "density = 1000.0"),
+    ("damping = 0.02", "damping_ratio = 0.02"),
+    ("L = 1.0", "length = 1.0"),
+    ("load = 1.0", "mass = 1.0"),
+    ("weight = 1.0", "mass = 1.0"),
+    ("Axle_Load = 1.0", "mass = 1.0"),
+    ("velocity = 5.0", "speed = 5.0"),
+    ("v = 5.0", "speed = 5.0"),
+    ("position = 0.5", "at = 0.5"),
+]
+
+
 def told(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> str:
     """What a command that ends with this code says."""
     capsys.readouterr()
@@ -80,6 +97,42 @@ def test_a_mistake_in_a_study_file(mistake: str, capsys: pytest.CaptureFixture[s
     Path("study.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
     message = told(capsys, code, "check", "study.toml")
     assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(("middle", "told"), [(0.5, False), (1.0, True)])
+def test_speeds_over_the_critical_one_on_one_span_alone(
+    middle: float, told: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    springs = ", ".join(f"{{ at = {at}, stiffness = 1e8 }}" for at in (0.0, middle, 1.0))
+    Path("study.toml").write_text(SMALL.replace('"pinned-pinned"', f"[{springs}]"))
+    assert main(["check", "study.toml"]) == 0
+    output = capsys.readouterr().out
+    assert ("top speed over the critical speed omega_1 L/pi" in output) is told
+    assert "mass over the body's mass" in output
+
+
+@pytest.mark.fault(2)
+@pytest.mark.parametrize(("written", "meant"), OTHER_WORDS)
+def test_keys_by_other_words(written: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("study.toml").write_text(SMALL.replace(meant, written, 1))
+    message = told(capsys, 2, "check", "study.toml")
+    assert f"{written.split(maxsplit=1)[0]}: unknown key" in message
+    assert message.endswith(f'remedy: did you mean "{meant.split(maxsplit=1)[0]}"?\n')
+
+
+def test_a_swept_key_by_another_word(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("study.toml").write_text(axis('e = { of = "body.beam.E", values = [1e9] }'))
+    assert 'did you mean "body.beam.youngs_modulus"?' in told(capsys, 2, "check", "study.toml")
+
+
+def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("study.toml").write_text(
+        SMALL.replace("= 1000.0", "= 7.85").replace("modes = 4", "modes = 4\nown_weight = true")
+    )
+    message = told(capsys, 0, "check", "study.toml")
+    assert message.startswith("Is this meant?\n- body.beam.density = 7.85 kg/m3")
+    assert message.count("7.85 kg/m3") == 1
+    assert message.index("Worth knowing\n- body beam is released") > message.index("Bodies")
 
 
 @pytest.mark.parametrize(

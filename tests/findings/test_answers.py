@@ -22,6 +22,7 @@ from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, force, oscillator, shuttle, study, under
 from tests.studies import at_rest, scenes
+from tests.studies.small import SEPARATED
 
 KINDS = tuple(scenes.MOTIONS)
 MASSES = 'mass = { of = "carriage.table.mass", values = [600, 700] }'
@@ -313,3 +314,13 @@ def test_failed_variants_are_left_out_and_counted(kind: str) -> None:
     assert "2 diverged (left out)" in text and "nan" not in text.lower().replace("dominan", "")
     everything = "\n".join(answers.answer(scenes.with_failures(dataset, 1)))
     assert "4 diverged (left out)" in everything and "nan" not in everything.lower()
+
+
+@pytest.mark.parametrize(("middle", "told"), [(1.0, True), (0.5, False)])
+def test_lift_off_is_told_over_the_critical_speed_on_one_span_alone(middle: float, told: bool) -> None:
+    """A spring too soft to matter makes two spans of one."""
+    ends = ", ".join(f"{{ at = {at}, stiffness = 1e8 }}" for at in (0.0, 1.0))
+    text = SEPARATED.replace('"pinned-pinned"', f"[{ends}, {{ at = {middle}, stiffness = 1.0 }}]")
+    (said,) = [one for one in studies.answer(studies.run(engine.load(text))) if "would lift off" in one]
+    assert "first at 10 m/s" in said
+    assert ("of the critical speed" in said) is told

@@ -109,6 +109,16 @@ def test_the_lowest_panel_of_each_column_has_the_speeds() -> None:
     assert not midspan.get_xlabel() and gain is lowest[0] and still is lowest[1]
 
 
+@pytest.mark.parametrize(("middle", "scales"), [(5.0, []), (10.0, ["speed over the critical speed ω₁ L/π"])])
+def test_a_scale_of_the_critical_speed_above_one_span_alone(middle: float, scales: list[str]) -> None:
+    springs = ", ".join(f"{{ at = {at}, stiffness = 1e7 }}" for at in (0.0, middle, 10.0))
+    text = scenes.text_of("passage", scenes.pace("passage")).replace('"pinned-pinned"', f"[{springs}]")
+    dataset = studies.run(engine.load(text))
+    assert dataset["speed_ratio"].dims == ("pace",)
+    above = answers.figures(dataset)[0].drawing.axes[0].child_axes
+    assert [axes.get_xlabel() for axes in above] == scales
+
+
 def test_curves_of_a_moving_force_are_of_damping_and_not_of_what_multiplies_all() -> None:
     force = 'load = { of = "carriage.table.force", values = [1e3, 1.2e3] }'
     text = scenes.text_of("passage", f"{force}\n{scenes.pace('passage')}\n{DAMPING}")

@@ -223,7 +223,7 @@ def test_the_target_is_looked_at_again_under_the_lock(
     monkeypatch.setattr(PartStore, "__enter__", lambda self: (another_archive(), enter(self))[1])
     capsys.readouterr()
     assert main(["run", "small.toml"]) == 2
-    assert "something else already" in capsys.readouterr().err
+    assert "the archive there is of another" in capsys.readouterr().err
     assert Path("small.nc").read_bytes() == Path("other.nc").read_bytes()
     assert not Path("small.nc.parts").exists() and not Path("small.nc.lock").exists()
 
@@ -342,3 +342,26 @@ def test_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.MonkeyPatch
     for path in Path("small.nc.parts").glob("*.nc"):
         with xr.open_dataset(path) as part:
             assert part.attrs["run_key"] == key
+
+
+@pytest.mark.fault(42)
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("mass = 1.0", "mass = 2.0", "of another state of this study; expected no file, or the archive of this very "
+         "study, received carriage.trolley.mass: 1.0, now 2.0; remedy: choose another place with -o"),
+        ("audit = 2", "", "solver.audit: 2, now left out"),
+        ("modes = 4", "modes = 4  # as before", "the same keys and values, with other comments"),
+        ('title = "small"', 'title = "large"', 'of another study; expected no file, or the archive of this very study, '
+         'received title: "small", now "large"'),
+        ("1e-6\nyoungs_modulus = 1e9\ndensity = 1000.0", "2e-6\nyoungs_modulus = 2e9\ndensity = 2e3\nown_weight = true",
+         "density: 1000.0, now 2000.0; 1 more; remedy"),
+    ],
+)  # fmt: skip
+def test_what_was_edited_since_is_told(old: str, new: str, words: str, here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    write(here, SMALL.replace(old, new))
+    capsys.readouterr()
+    assert main(["run", "small.toml"]) == 2
+    assert words in capsys.readouterr().err

@@ -148,3 +148,53 @@ values = st.recursive(
 @settings(max_examples=150, deadline=None)
 def test_written_data_read_back(data: dict[str, Any]) -> None:
     assert tomllib.loads(write_document(data)) == data
+
+
+# text of a study file with one slip -> line that the refusal names, remedy
+SLIPS = {
+    'supports = [\n  { at = 0, k = "1 N/m" }\n  # right\n  { at = 40, k = "1 N/m" },\n]\n': (
+        4,
+        "a comma is missing at the end of the line before, line 2",
+    ),
+    "a = [\n1,\n2\n3\n]\n": (4, "a comma is missing at the end of the line before, line 3"),
+    "a = [{ b = 1 } { b = 2 }]\n": (1, "a comma is missing before { b = 2 }]"),
+    "a = { b = 1 c = 2 }\n": (1, "a comma is missing before c = 2 }"),
+    "a = [1, 2\nb = 3\n": (2, "a ] is missing: a list ends with it"),
+    "a = [{ b = 1 },\n{ b = 2 }\n\n[body.x]\nb = 1\n": (4, "a ] is missing: a list ends with it"),
+    "a = { b = 1, c = 2\nd = 3\n": (1, "what begins with { ends with } in the same line"),
+    "a = [\n  { b = 1, c = 2,\n]\n": (2, "what begins with { ends with } in the same line"),
+    "a = { b = 1, }\n": (1, "no comma before the }"),
+    "a = [\n  { b: 1 },\n]\n": (2, "= instead of the colon"),
+    'a = "1 m\nb = 3\n': (1, "a quotation mark is missing"),
+    'a = ["1 m, "2 m"]\n': (1, "a quotation mark is missing"),
+    "a = '1 m\nb = 3\n": (3, "a quotation mark is missing in line 1"),
+    'a = 1 m"\n': (1, 'quotation marks around a number with a unit: "1 m"'),
+    "a = [1 m, 2 m]\n": (1, 'quotation marks around a number with a unit: "1 m"'),
+    "a = 2 %\n": (1, 'quotation marks around a number with a unit: "2 %"'),
+    "a = { of = carriage.car.mass, values = [1] }\n": (1, 'quotation marks around a word: "carriage.car.mass"'),
+    "length 15\n": (1, "an equals sign between key and value"),
+    "youngs modulus = 1\n": (1, "a key without spaces, such as second_moment"),
+    "a = { b = 1, b = 2 }\n": (1, "this key stands twice between the same braces: keep one of the two"),
+    "a = 1\n[a.b]\nc = 1\n": (2, "what has a value further up cannot be the header of a table as well"),
+    "[a]\nb = 1\n[a]\nc = 1\n": (3, "this table is there already, further up: put its keys together"),
+    "[body.beam\nb = 3\n": (1, "a ] is missing at the end of the header"),
+    "body.beam]\nb = 3\n": (1, "a [ is missing before the header"),
+    "[body.my beam]\nb = 3\n": (1, "a name without spaces, such as main_beam"),
+    "[[sensor.x]\nb = 3\n": (1, "one [ before and one ] behind the header"),
+    "a = [1, 2]]\n": (1, "there is a ] too many"),
+    "a = 1;\n": (1, "no ; at the end of the line"),
+    "a = 1 b = 3\n": (1, "each key on a line of its own"),
+    "a = 1 the length\n": (1, "a comment begins with #"),
+    "a = (1, 2)\n": (1, "a list stands in square brackets: [1, 2]"),
+    "a = .5\n": (1, "a digit before the decimal point: 0."),
+    "a = 5.\n": (1, "a digit after the decimal point: .0"),
+}
+
+
+@pytest.mark.fault(1)
+@pytest.mark.parametrize("text", SLIPS)
+def test_what_to_write_instead(text: str) -> None:
+    line, remedy = SLIPS[text]
+    with pytest.raises(BadInput) as refused:
+        read_document(text)
+    assert (refused.value.where, refused.value.remedy) == (f"line {line}", remedy)

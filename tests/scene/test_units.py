@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from pydantic import Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from engine.study_file import units
 from engine.study_file.spec import Spec
@@ -141,3 +142,41 @@ def test_pint_is_imported_only_for_uncommon_units() -> None:
         "Study(kind='passage', gravity='32.17 ft/s^2'); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# dimension, text -> what the refusal says, its remedy
+CONFUSED = {
+    (Density, "9 t/m"): (
+        "a quantity in kg/m where a density (kg/m3) is wanted",
+        'divide it by the area; a beam may have area = "1 m2" with density = "9000 kg/m3"',
+    ),
+    (Acceleration, "0.35 g"): (
+        "a mass (kg) where an acceleration (m/s2) is wanted",
+        'g is gram; 0.35 g of gravity is "3.43 m/s2"',
+    ),
+    (Force, "190 kn"): ("a speed (m/s) where a force (N) is wanted", 'did you mean "190 kN"?'),
+    (Stiffness, "190 kn/m"): ("a frequency (Hz) where a stiffness (N/m) is wanted", 'did you mean "190 kN/m"?'),
+    (Mass, "3 m"): ("a length (m) where a mass (kg) is wanted", ""),
+    (Stiffness, "rigid"): (
+        "this text is not a stiffness (N/m)",
+        'a number large against what it supports, such as "1e12 N/m", or a frame with a held node',
+    ),
+    (Force, "rigid"): ("this text is not a force (N)", ""),
+}
+
+
+@pytest.mark.parametrize(("unit", "text"), CONFUSED)
+def test_other_quantities_are_refused_in_units_as_people_type_them(unit: Any, text: str) -> None:
+    with pytest.raises(PydanticCustomError) as refused:
+        unit_of(unit).si(text)
+    said = refused.value.context
+    assert said is not None
+    assert (said["what"], said["remedy"]) == CONFUSED[unit, text]
+
+
+@pytest.mark.parametrize(
+    "unit", [unit for unit in KNOWN if unit.symbol and not unit.per_turn], ids=lambda one: one.noun
+)
+def test_units_are_told_as_they_can_be_typed(unit: units.Unit) -> None:
+    assert "-" not in unit.typed
+    assert unit.si(f"3 {unit.typed}") == 3.0

@@ -109,6 +109,10 @@ class Beam(Body):
         return self.supports == "pinned-pinned"
 
     @property
+    def is_one_span(self) -> bool:
+        return not any(0.0 < s.at < self.length and s.stiffness > 0.0 for s in self.springs)
+
+    @property
     def untold(self) -> tuple[str, ...]:
         return ("axial_force",)  # loads act across it
 

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
-from engine.bodies.frame.geometry import DIRECTIONS, TrackLine, member_ends, unit
+from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import Body, Spot, Spots, check_square
 from engine.bodies.modal.modal_body import Array, Direction, ModalBody
@@ -245,6 +245,15 @@ class Frame(Body):
         """The directions in which a node is held."""
         support = self.supports.get(node, ())
         return HELD_AT[support] if isinstance(support, str) else support
+
+    @property
+    def is_one_span(self) -> bool:
+        sprung = {one.node for one in self.spring.values() if one.to is None and any(one.stiffness)}
+        held = sprung | {node for node in self.supports if set(self.holds(node)) & set(DIRECTIONS[:3])}
+        name, turned = self.line.members[0]
+        start = member_ends(self, name)[1 if turned else 0]
+        along = [(np.array(self.place(node)) - start) @ self.line.tangent / self.length for node in held]
+        return not any(SAME_PLACE < part < 1.0 - SAME_PLACE for part in along)
 
     @property
     def still(self) -> tuple[str, ...]:

@@ -176,6 +176,11 @@ class Body(SpecOfKind):
         return False
 
     @property
+    def is_one_span(self) -> bool:
+        """Whether nothing is known to support it between the ends of its track, where omega_1 L/pi says nothing."""
+        return True
+
+    @property
     def springs(self) -> tuple[Any, ...]:
         """The springs on which a uniform beam stands instead, each with `at`, `stiffness` and `rotational`."""
         return ()

@@ -24,7 +24,7 @@ class Doubt(Check):
 
     def amount(self, values: Mapping[str, Any]) -> str:
         """The number in doubt with its unit."""
-        return f"{values[self.needs[0]]:.6g} {self.unit.symbol}".rstrip()
+        return f"{values[self.needs[0]]:.6g} {self.unit.typed}".rstrip()
 
     def meant(self, values: Mapping[str, Any]) -> str:
         """The number with other units that make it likely, as a question, or ""."""

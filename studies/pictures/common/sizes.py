@@ -33,8 +33,9 @@ def gain(results: Results, sensor: str) -> Any:
 
 
 def speed_ratio(axes: Any, seen: View) -> None:
-    """A scale above of the speed over the critical one, where that is known."""
-    ratio_above(axes, seen, seen.results.dataset.coords.get("speed_ratio"), "speed over the critical speed ω₁ L/π")
+    """A scale above of the speed over the critical one, where that is known and says something."""
+    if seen.results.study.has_critical_speed:
+        ratio_above(axes, seen, seen.results.dataset.coords.get("speed_ratio"), "speed over the critical speed ω₁ L/π")
 
 
 def sizes_of(seen: View, sensors: list[str], limit: float | None, top: Index) -> Figure:
