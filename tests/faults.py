@@ -16,7 +16,7 @@ FAULTS = {
         2: "An unknown or misspelt key: 2 with the nearest name",
         3: 'A wrong type (`true` or `"12"` for a number): 2',
         4: "nan, inf, 1e400, integers beyond 64 bits, thousands of digits, anywhere: 2",
-        5: "Nesting 3000 deep, a file beyond 1 MB: 2",
+        5: "Nesting 3000 deep, a file beyond 64 MB: 2",
     },
     "Finite-element files": {
         6: "Empty, binary, truncated, wrongly encoded, nodes missing or twice, including itself: 2 with file, line and "

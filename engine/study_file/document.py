@@ -62,7 +62,7 @@ def what_to_write(line: str, complaint: str) -> str:
     return next((match.expand(remedy) for match, remedy in found if match), "")
 
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 64_000_000  # a million variants listed one by one; such a text is read in a quarter of a minute
 MAX_DEPTH = 32
 MAX_INTEGER = 2**63 - 1
 FLOAT_DIGITS = 1000
@@ -126,7 +126,7 @@ class _Unusable(str):
 def read_document(path_or_text: str | Path) -> Document:
     """Read a TOML file, or TOML text if the argument is a string with a line break.
 
-    Raises BadInput (faults 1, 4, 5) for a file that cannot be read, is larger than 1 MB or is not UTF-8, for TOML
+    Raises BadInput (faults 1, 4, 5) for a file that cannot be read, is larger than 64 MB or is not UTF-8, for TOML
     errors with their line, and with their key for numbers that are not finite, beyond 64 bits or of no size that a
     study may mean.
     """
@@ -142,14 +142,17 @@ def read_document(path_or_text: str | Path) -> Document:
 def document_of(data: Mapping[str, Any], name: str = "") -> Document:
     """The document of data given from Python; its text is the data written as TOML.
 
-    numpy numbers and arrays become plain ones.
+    numpy numbers and arrays become plain ones. Raises BadInput, as for a text that is larger than 64 MB, which could not
+    be read again.
 
     >>> document_of({"gravity": 9.81, "body": {"bed": {"length": np.float64(15)}}}).source.text
     'gravity = 9.81\\n\\n[body.bed]\\nlength = 15.0\\n'
     """
     plain = _plain_table(data, Source(name, "", ""))
     text = write_document(plain)
-    return Document(plain, Source(name, text, hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()))
+    raw = text.encode("utf-8", "replace")
+    _check_size(name, len(raw))
+    return Document(plain, Source(name, text, hashlib.sha256(raw).hexdigest()))
 
 
 def write_document(data: Mapping[str, Any]) -> str:
@@ -169,14 +172,24 @@ def _file_bytes(path: str | Path) -> bytes:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadInput(f"the study file cannot be read: {reason}", where=printable(name, 200)) from None
     if len(raw) > MAX_BYTES:
-        size = f"{Path(path).stat().st_size} bytes"
-        raise BadInput("the file is too large", where=name, expected=f"at most {MAX_BYTES} bytes", received=size)
+        _check_size(name, Path(path).stat().st_size)
     return raw
 
 
+def _check_size(name: str, size: int) -> None:
+    """Refuse a text that nobody wants to wait for; name: of its file. Raises BadInput."""
+    if size > MAX_BYTES:
+        raise BadInput(
+            "the study is too large",
+            where=name,
+            expected=f"a text of at most {MAX_BYTES / 1e6:g} MB",
+            received=f"{size / 1e6:.3g} MB",
+            remedy="an axis as a range (count) or a sample of it (sobol) is short; or several studies of fewer values",
+        )
+
+
 def _text(name: str, raw: bytes) -> str:
-    if len(raw) > MAX_BYTES:
-        raise BadInput("the text is too large", where=name, expected=f"at most {MAX_BYTES} bytes")
+    _check_size(name, len(raw))
     source = Source(name, "", "")
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in raw[:2]:
         raise BadInput("this text is UTF-16", where=source.where(), expected="TOML in UTF-8", remedy=_AS_TEXT)

@@ -36,7 +36,6 @@ def refused(text: str | Path) -> str:
         (b"[body.a]\n[body.b]\n[body.a]\n", ["line 3", "twice"]),
         (b"a = 1\nb =\n", ["line 2", "Invalid value"]),
         (b"a = 'x", ["line 1", "Expected"]),
-        (b"#" * 1_000_001, ["1000000 bytes"]),
     ],
 )
 def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
@@ -45,6 +44,19 @@ def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
     message = refused(file)
     assert "study.toml" in message
     assert all(word in message for word in words), message
+
+
+@pytest.mark.fault(5)
+def test_sizes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "study.toml"
+    with file.open("wb") as place:
+        place.truncate(64_000_001)
+    message = refused(file)
+    assert all(word in message for word in ("study.toml", "at most 64 MB", "received 64 MB", "sobol")), message
+    monkeypatch.setattr("engine.study_file.document.MAX_BYTES", 1000)
+    assert "at most 0.001 MB" in refused("#\n" * 501)
+    with pytest.raises(BadInput, match="too large"):  # from Python, before anything is run
+        document_of({"values": np.linspace(0.0, 1.0, 100)})
 
 
 def test_what_is_no_file(tmp_path: Path) -> None:
