@@ -142,8 +142,8 @@ def read_document(path_or_text: str | Path) -> Document:
 def document_of(data: Mapping[str, Any], name: str = "") -> Document:
     """The document of data given from Python; its text is the data written as TOML.
 
-    numpy numbers and arrays become plain ones. Raises BadInput, as for a text that is larger than 64 MB, which could not
-    be read again.
+    numpy numbers and arrays become plain ones. Raises BadInput, also for a text of more than 64 MB, which could not be
+    read again.
 
     >>> document_of({"gravity": 9.81, "body": {"bed": {"length": np.float64(15)}}}).source.text
     'gravity = 9.81\\n\\n[body.bed]\\nlength = 15.0\\n'

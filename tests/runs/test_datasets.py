@@ -1,0 +1,63 @@
+"""Datasets from Python as archives and answers: those that went through files, and those that are refused."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+
+import engine
+import studies
+from results_schema.errors import BadInput
+from studies.commands.cli import main
+from tests.studies import scenes
+
+PASSAGES = scenes.pace("passage")
+
+
+def refused(call: Any, *arguments: Any) -> str:
+    with pytest.raises(BadInput) as error:
+        call(*arguments)
+    return str(error.value)
+
+
+def test_own_variables_are_refused_by_name(tmp_path: Path) -> None:
+    found = scenes.run("passage", PASSAGES)
+    path = tmp_path / "mine.nc"
+    said = refused(studies.write, found.assign(mine=2.0 * found.midspan_max), path)
+    assert said.startswith("mine: ") and 'drop_vars(["mine"])' in said and "to_netcdf" in said and not path.exists()
+    assert "drop_vars" in refused(studies.report, found.assign(mine=2.0 * found.midspan_max), tmp_path / "page")
+    assert main(["info", str(studies.write(found, path))]) == 0
+
+
+def test_what_info_would_refuse_is_refused_before_it_is_written(tmp_path: Path) -> None:
+    found = scenes.run("passage", PASSAGES)
+    path = tmp_path / "other.nc"
+    assert "pace" in refused(studies.write, found.assign_coords(pace=2.0 * found.pace), path)
+    assert "midspan_max" in refused(studies.write, found.drop_vars("midspan_max"), path)
+    assert not path.exists()
+
+
+def test_datasets_that_went_through_files(tmp_path: Path) -> None:
+    """xarray gives coordinates a fill value of its own when it writes them."""
+    scenes.run("passage", PASSAGES).to_netcdf(tmp_path / "kept.nc")
+    with xr.open_dataset(tmp_path / "kept.nc") as again:
+        assert "_FillValue" in again.pace.encoding
+        assert studies.answer(again) == studies.answer(scenes.run("passage", PASSAGES))
+        assert studies.report(again, tmp_path / "page").exists()
+        archive = studies.write(again, tmp_path / "archive.nc", scenes.study("passage", PASSAGES))
+        assert "_FillValue" in again.pace.encoding, "the user's own dataset is left alone"
+    assert main(["info", str(archive)]) == 0
+
+
+def test_what_is_no_dataset_of_a_study(tmp_path: Path) -> None:
+    study = scenes.study("passage")
+    marched = engine.run(study)
+    for said in (
+        refused(studies.answer, marched),
+        refused(studies.figures, marched),
+        refused(studies.report, marched, tmp_path / "page"),
+        refused(studies.write, marched, tmp_path / "found.nc", study),
+    ):
+        assert "expected a dataset of studies.run" in said and "in place of engine.run" in said
+    assert "received a DataArray" in refused(studies.answer, scenes.run("passage").midspan_max)
