@@ -10,6 +10,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
+from engine.scene.study import doubts
 from engine.scene.sweep import broken
 from engine.statics.directions import told_of
 from results_schema.arrays import Array
@@ -32,7 +33,7 @@ def _partly_inert(plan: Plan) -> Iterator[str]:
 
 
 def _doubtful(plan: Plan) -> Iterator[str]:
-    for doubt in plan.study.doubts():
+    for doubt in doubts(plan.study):
         if found := broken(plan.study, plan.cases, doubt):
             values = found[0]
             said = f"{doubt.where} = {doubt.amount(values)}: {doubt.what}, expected {doubt.expected}"

@@ -165,7 +165,9 @@ def check_most_steps(model: SceneModel, steps: Array | Counts) -> None:
     BadInput."""
     if not steps.size or float(np.max(steps)) <= MOST_STEPS:
         return
-    for doubt in model.study.doubts():
+    from engine.scene.study import doubts
+
+    for doubt in doubts(model.study):
         values = {key: model.study.value(key) for key in doubt.needs}
         if not doubt.met(values):
             raise model.study.source.fault(

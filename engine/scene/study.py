@@ -95,6 +95,8 @@ class Study(Scene):
     _tables: dict[str, Any] = PrivateAttr()
 
     def __init__(self, document: Document | None = None, /, **keywords: Any) -> None:
+        if not isinstance(document, Document | None):
+            raise _no_study(document, "keywords such as kind and body")
         given = document if document is not None else document_of({"schema_version": SCHEMA_VERSION, **keywords})
         whole = with_axles(given)
         try:
@@ -197,13 +199,6 @@ class Study(Scene):
         """Every number of the model by its dotted key, SI, defaults included."""
         return dict(numbers_in(self))
 
-    def doubts(self) -> Iterator[Doubt]:
-        """Conditions that its numbers may break, but are hardly meant to."""
-        for name, body in self.body.items():
-            yield from body.doubts(f"body.{name}")
-            if isinstance(body.damping_ratio, float):
-                yield damping_doubt(f"body.{name}")
-
     def unit(self, path: str) -> Unit | None:
         """Dimension of the number at a dotted key; None for integers such as a number of modes."""
         place = field_at(Scene, self._tables, path.split("."))
@@ -280,6 +275,21 @@ def load(path_or_text: str | Path) -> Study:
     return Study(document)
 
 
+def study_of(given: Study | str | Path) -> Study:
+    """A study as it is, or that of a file, or of its text. Raises BadInput."""
+    if isinstance(given, Study):
+        return given
+    if isinstance(given, str | Path):
+        return load(given)
+    raise _no_study(given, "a study, or the path of a study file")
+
+
+def _no_study(given: object, expected: str) -> BadInput:
+    remedy = "engine.Study(**tables) takes the tables of a dict, engine.load(path) those of a file"
+    received = f"a {type(given).__name__}"
+    return BadInput("this is no study", where="study", expected=expected, received=received, remedy=remedy)
+
+
 def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:
     """The study of an archive from its text: bodies out of files are as recorded, and no file is opened.
 
@@ -336,6 +346,14 @@ def checks(study: Study) -> Iterator[Check]:
         elif sensor.at is not None:
             yield on_body(f"{here}.at", (f"{here}.at", f"{read}.length"), "a sensor off its body")
     yield from _envelope_checks(study)
+
+
+def doubts(study: Study) -> Iterator[Doubt]:
+    """Conditions that numbers of a study may break, but are hardly meant to."""
+    for name, body in study.body.items():
+        yield from body.doubts(f"body.{name}")
+        if isinstance(body.damping_ratio, float):
+            yield damping_doubt(f"body.{name}")
 
 
 def _envelope_checks(study: Study) -> Iterator[Check]:
