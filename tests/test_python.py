@@ -4,7 +4,10 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pint
 import pytest
+import xarray as xr
 
 import engine
 import studies
@@ -58,3 +61,32 @@ def test_public_names_are_completed(package: Any) -> None:
     assert set(package.__all__) <= set(dir(package))
     package.__dict__.pop("run", None)
     assert "run" in dir(package) and "__doc__" in dir(package)
+
+
+def test_quantities_of_pint_are_read_as_their_texts() -> None:
+    unit = pint.UnitRegistry()
+    whole = scenes.study("passage")
+    given = {
+        "carriage.table.mass": 60 * unit.kg,
+        "body.bed.length": np.float64(1000) * unit.cm,
+        "body.bed.density": 7.85 * unit.g / unit.cm**3,
+        "body.bed.damping_ratio": 2 * unit.percent,
+        "carriage.table.motion.speed": unit.Quantity(36, "km/h"),
+        "gravity": 9.81 * unit.meter / unit.second**2,
+    }
+    found = whole.with_values(given)
+    assert [found.value(key) for key in given] == [60.0, 10.0, 7850.0, 0.02, 10.0, 9.81]
+    assert engine.load(found.toml()) == found
+    assert "a length (m) where a mass (kg) is wanted" in refused(whole.with_values, {"carriage.table.mass": 6 * unit.m})
+    sweep = {"mass": {"of": "carriage.table.mass", "values": [0.05, 0.2] * unit.t}}
+    assert studies.run(whole.with_values({"sweep": sweep})).mass.values.tolist() == [50.0, 200.0]
+
+
+def test_values_of_an_axis_are_any_array_of_one_dimension() -> None:
+    whole, mass = scenes.study("passage"), "carriage.table.mass"
+    for values in (xr.DataArray([50.0, 100.0], dims="mass"), xr.DataArray([50.0, 100.0]).to_series(), (50, 100)):
+        found = whole.with_values({"sweep": {"mass": {"of": mass, "values": values}}})
+        assert found.sweep.axes["mass"].values == (50.0, 100.0)
+    for values in (np.ones((2, 2)), np.ones((2, 2)) * pint.UnitRegistry().kg):
+        said = refused(whole.with_values, {"sweep": {"mass": {"of": mass, "values": values}}})
+        assert "sweep.mass.values.0: the values of an axis are one-dimensional" in said and "ravel" in said

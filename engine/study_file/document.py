@@ -142,8 +142,8 @@ def read_document(path_or_text: str | Path) -> Document:
 def document_of(data: Mapping[str, Any], name: str = "") -> Document:
     """The document of data given from Python; its text is the data written as TOML.
 
-    numpy numbers and arrays become plain ones. Raises BadInput, also for a text of more than 64 MB, which could not be
-    read again.
+    Numbers and arrays of numpy, xarray and pint become plain ones. Raises BadInput, also for a text of more than 64 MB,
+    which could not be read again.
 
     >>> document_of({"gravity": 9.81, "body": {"bed": {"length": np.float64(15)}}}).source.text
     'gravity = 9.81\\n\\n[body.bed]\\nlength = 15.0\\n'
@@ -255,8 +255,8 @@ def _plain(value: Any, keys: tuple[str, ...], source: Source) -> Any:
     """
     if len(keys) > MAX_DEPTH:
         _refuse_nesting(source, None)
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
+    if hasattr(value, "__array__") or hasattr(value, "to_base_units"):
+        value = _from_other_packages(value)
     if isinstance(value, Mapping):
         return {key: _plain(item, (*keys, str(key)), source) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):
@@ -266,6 +266,18 @@ def _plain(value: Any, keys: tuple[str, ...], source: Source) -> Any:
     if isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
         _refuse_number(value, "an integer within 64 bits", keys, source)
     return value
+
+
+def _from_other_packages(value: Any) -> Any:
+    """Numbers of numpy, xarray or pandas as Python's own, quantities of pint as the texts that a user would write."""
+    if not hasattr(value, "to_base_units"):
+        return np.asarray(value).tolist()
+    unit, numbers = f"{value.units:~D}".replace(" ** ", "**"), np.asarray(value.magnitude).tolist()
+    return _with_unit(numbers, unit) if unit else numbers
+
+
+def _with_unit(number: Any, unit: str) -> Any:
+    return [_with_unit(item, unit) for item in number] if isinstance(number, list) else f"{number!r} {unit}"
 
 
 def _refuse_number(value: str | float, expected: str, keys: Sequence[str], source: Source) -> NoReturn:
