@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from engine.batch.execution import run
     from engine.batch.plan import Plan, make_plan
     from engine.scene.study import Study, load
+    from results_schema.errors import Remark
 
 _HOMES = {
     "Study": "engine.scene.study",
@@ -22,8 +23,9 @@ _HOMES = {
     "run": "engine.batch.execution",
     "Plan": "engine.batch.plan",
     "make_plan": "engine.batch.plan",
+    "Remark": "results_schema.errors",
 }
-__all__ = ["Plan", "Study", "load", "make_plan", "run"]
+__all__ = ["Plan", "Remark", "Study", "load", "make_plan", "run"]
 
 
 def __getattr__(name: str) -> Any:

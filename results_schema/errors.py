@@ -32,6 +32,10 @@ class WanderlastError(Exception):
         return "; ".join(part for part in (message, found, remedy) if part)
 
 
+class Remark(UserWarning):
+    """What is allowed in a study and yet often a mistake; Python tells it by `warnings`, the commands in a line."""
+
+
 class BadInput(WanderlastError):
     """Bad input or usage: refused before anything is computed or written."""
 

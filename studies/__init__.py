@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from results_schema.errors import Remark
     from studies.protocol.study import Kind, kind_named, kind_names, run
     from studies.reporting.answers import answer, figures
     from studies.reporting.report import report
@@ -25,8 +26,9 @@ _HOMES = {
     "figures": "studies.reporting.answers",
     "write": "studies.runs.datasets",
     "report": "studies.reporting.report",
+    "Remark": "results_schema.errors",
 }
-__all__ = ["Kind", "answer", "figures", "kind_named", "kind_names", "report", "run", "write"]
+__all__ = ["Kind", "Remark", "answer", "figures", "kind_named", "kind_names", "report", "run", "write"]
 
 
 def __getattr__(name: str) -> Any:

@@ -11,6 +11,7 @@ from tests.test_imports import MODULES
 ASKED = {
     "engine.study_file": "what users wrote, in whatever form, and the notes of its types",
     "engine.scene.dotted_keys": "which of nested values are tables",
+    "engine.scene.study": "what users give for a study from Python",
     "engine.bodies.modal.description": "forms of the damping ratio, and what stands beside the table of a body",
     "engine.bodies.reduced": "which bodies can be saved, and errors of libraries",
     "engine.bodies.files": "what versions of foreign packages have",

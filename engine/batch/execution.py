@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Unpack
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job
-from engine.batch.executors import Place, Shared, Threads, Where, cores, place, run_jobs
+from engine.batch.executors import Place, Shared, Threads, Where, check_options, cores, place, run_jobs
 from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
@@ -23,9 +25,9 @@ from engine.march.stepper import Halted as Gone
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, padded
 from engine.observation.cycle_reduction import Reduction
-from engine.scene.study import Study
+from engine.scene.study import Study, study_of
 from results_schema.arrays import Counts
-from results_schema.errors import Interrupted
+from results_schema.errors import Interrupted, Remark
 from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector
 
@@ -35,7 +37,7 @@ Progress = Callable[[int, int], object]
 
 @one_thread()
 def run(
-    study: Study,
+    study: Study | str | Path,
     *,
     chunk: int | None = None,
     reduction: Reduction | None = None,
@@ -43,7 +45,8 @@ def run(
     progress: Progress | None = None,
     **where: Unpack[Where],
 ) -> xr.Dataset:
-    """Run a study in memory and return the march's dataset. Raises BadInput, and WorkersGaveUp.
+    """Run a study, or that of a file, in memory and return the march's dataset. Raises BadInput, and WorkersGaveUp.
+    What is allowed and yet often a mistake is a warning, a `Remark`.
 
     chunk: variants per task, chosen by time and memory otherwise; results do not depend on it, nor on where they are
     computed, bit for bit. reduction, results: as of `make_plan`. threads: default all processors. workers: processes of
@@ -51,9 +54,14 @@ def run(
     algebra keeps to one thread in the whole process.
     """
     from engine.batch.dataset import build
+    from engine.batch.plausibility import remarks
 
+    check_options(where, "chunk", "reduction", "results", "progress")
+    study = study_of(study)
     plan = make_plan(study, reduction=reduction, results=results)
     check_memory(study, plan.size, plan.disk_bytes)
+    for remark in remarks(plan):
+        warnings.warn(remark, Remark, stacklevel=3)  # of who called what `one_thread` wraps
     collector = Collector(plan.size)
     with place(**where) as here:
         execute(plan, collector.add, here, chunk=chunk, progress=progress)

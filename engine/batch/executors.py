@@ -6,7 +6,7 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -98,6 +98,17 @@ def check_place(threads: int | None = None, workers: int = 0, scheduler: str | N
         from engine.batch.addresses import check_address
 
         check_address(scheduler)
+
+
+def check_options(given: Iterable[str], *known: str) -> None:
+    """Refuse options that are neither known nor say where to run. Raises BadInput with the nearest one."""
+    from engine.study_file.spec import nearest
+
+    options = (*known, *Where.__annotations__)
+    for name in given:
+        if name not in options:
+            expected = f"one of {', '.join(options)}"
+            raise BadInput("unknown option", where=name, expected=expected, remedy=nearest(name, options))
 
 
 def cores() -> int:

@@ -125,6 +125,10 @@ def read_amount(value: Any) -> float | int | str:
         return value
     if isinstance(value, float) and isfinite(value):
         return value
+    if isinstance(value, list | tuple):
+        what = "the values of an axis are one-dimensional: a number is wanted here"
+        remedy = "an axis for each dimension, or array.ravel() as the values of one"
+        raise fault(what, expected="no list in a list", received=shortened(value), remedy=remedy)
     raise fault("a number is wanted here", expected='a number, or a string such as "15 m"', received=shortened(value))
 
 

@@ -95,6 +95,8 @@ class Study(Scene):
     _tables: dict[str, Any] = PrivateAttr()
 
     def __init__(self, document: Document | None = None, /, **keywords: Any) -> None:
+        if not isinstance(document, Document | None):
+            raise _no_study(document, "keywords such as kind and body")
         given = document if document is not None else document_of({"schema_version": SCHEMA_VERSION, **keywords})
         whole = with_axles(given)
         try:
@@ -283,6 +285,21 @@ def load(path_or_text: str | Path) -> Study:
     document = read_document(path_or_text)
     _check_version(document)
     return Study(document)
+
+
+def study_of(given: Study | str | Path) -> Study:
+    """A study as it is, or that of a file, or of its text. Raises BadInput."""
+    if isinstance(given, Study):
+        return given
+    if isinstance(given, str | Path):
+        return load(given)
+    raise _no_study(given, "a study, or the path of a study file")
+
+
+def _no_study(given: object, expected: str) -> BadInput:
+    remedy = "engine.Study(**tables) takes the tables of a dict, engine.load(path) those of a file"
+    received = f"a {type(given).__name__}"
+    return BadInput("this is no study", where="study", expected=expected, received=received, remedy=remedy)
 
 
 def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:

@@ -101,18 +101,17 @@ def read_document(path_or_text: str | Path) -> Document:
 def document_of(data: Mapping[str, Any], name: str = "") -> Document:
     """The document of data given from Python; its text is the data written as TOML.
 
-    numpy numbers and arrays become plain ones.
+    Numbers and arrays of numpy, xarray and pint become plain ones. Raises BadInput, also for a text of more than 10 MB,
+    which could not be read again.
 
     >>> document_of({"gravity": 9.81, "body": {"bed": {"length": np.float64(15)}}}).source.text
     'gravity = 9.81\\n\\n[body.bed]\\nlength = 15.0\\n'
     """
     plain = _plain_table(data, Source(name, "", ""))
     text = write_document(plain)
-    if len(text) > MAX_BYTES:  # it could be run, and no command could read what was found
-        what, expected = "the study is too large", f"a text of at most {MAX_BYTES} bytes"
-        remedy = "axes as ranges (count) or samples (sobol), or several studies"
-        raise BadInput(what, where=name or "study", expected=expected, received=f"{len(text)}", remedy=remedy)
-    return Document(plain, Source(name, text, hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()))
+    raw = text.encode("utf-8", "replace")
+    _check_size(name, len(raw))
+    return Document(plain, Source(name, text, hashlib.sha256(raw).hexdigest()))
 
 
 def write_document(data: Mapping[str, Any]) -> str:
@@ -132,14 +131,24 @@ def _file_bytes(path: str | Path) -> bytes:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadInput(f"the study file cannot be read: {reason}", where=printable(name, 200)) from None
     if len(raw) > MAX_BYTES:
-        size = f"{Path(path).stat().st_size} bytes"
-        raise BadInput("the file is too large", where=name, expected=f"at most {MAX_BYTES} bytes", received=size)
+        _check_size(name, Path(path).stat().st_size)
     return raw
 
 
+def _check_size(name: str, size: int) -> None:
+    """Refuse a text that nobody wants to wait for; name: of its file. Raises BadInput."""
+    if size > MAX_BYTES:
+        raise BadInput(
+            "the study is too large",
+            where=name or "study",
+            expected=f"a text of at most {MAX_BYTES / 1e6:g} MB",
+            received=f"{size / 1e6:.3g} MB",
+            remedy="an axis as a range (count) or a sample of it (sobol) is short; or several studies of fewer values",
+        )
+
+
 def _text(name: str, raw: bytes) -> str:
-    if len(raw) > MAX_BYTES:
-        raise BadInput("the text is too large", where=name, expected=f"at most {MAX_BYTES} bytes")
+    _check_size(name, len(raw))
     source = Source(name, "", "")
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in raw[:2]:
         raise BadInput("this text is UTF-16", where=source.where(), expected="TOML in UTF-8", remedy=_AS_TEXT)
@@ -210,17 +219,29 @@ def _plain(value: Any, keys: tuple[str, ...], source: Source) -> Any:
     """
     if len(keys) > MAX_DEPTH:
         _refuse_nesting(source, None)
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
+    if hasattr(value, "__array__") or hasattr(value, "to_base_units"):
+        value = _from_other_packages(value)
     if isinstance(value, Mapping):
         return {key: _plain(item, (*keys, str(key)), source) for key, item in value.items() if item is not None}
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | range):
         return [_plain(item, (*keys, str(index)), source) for index, item in enumerate(value)]
     if isinstance(value, _Unusable) or (isinstance(value, float) and not is_meant(value)):
         _refuse_number(value, f"a finite number, {SIZES}", keys, source)
     if isinstance(value, int) and not -MAX_INTEGER - 1 <= value <= MAX_INTEGER:
         _refuse_number(value, "an integer within 64 bits", keys, source)
     return value
+
+
+def _from_other_packages(value: Any) -> Any:
+    """Numbers of numpy, xarray or pandas as Python's own, quantities of pint as the texts that a user would write."""
+    if not hasattr(value, "to_base_units"):
+        return np.asarray(value).tolist()
+    unit, numbers = f"{value.units:~D}".replace(" ** ", "**"), np.asarray(value.magnitude).tolist()
+    return _with_unit(numbers, unit) if unit else numbers
+
+
+def _with_unit(number: Any, unit: str) -> Any:
+    return [_with_unit(item, unit) for item in number] if isinstance(number, list) else f"{number!r} {unit}"
 
 
 def _refuse_number(value: str | float, expected: str, keys: Sequence[str], source: Source) -> NoReturn:

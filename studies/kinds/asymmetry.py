@@ -89,9 +89,11 @@ class Asymmetry(Kind):
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
         name, carriage = first_carriage(study)
         if carriage.motion.legs is None:
-            what = "forward and backward need a motion that comes back"
-            received = f'"{study.value(f"carriage.{name}.motion.kind")}"'
-            raise study.source.fault(f"carriage.{name}.motion.kind", what, expected='"out-and-back"', received=received)
+            here = f"carriage.{name}.motion.kind"
+            what = "forward and backward are compared between the turns, on a way that comes back at constant speed"
+            remedy = 'kind = "double-peak" asks what a cycle of it does' if carriage.motion.period is not None else ""
+            received = f'"{study.value(here)}"'
+            raise study.source.fault(here, what, expected='"out-and-back"', received=received, remedy=remedy)
         _check_cruise(study, name)
         if not study.sensor:
             raise study.source.fault("sensor", "nothing is measured", expected="at least one sensor")

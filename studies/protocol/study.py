@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 import time
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -12,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, Remark
 from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
@@ -267,34 +268,27 @@ def kind_of(study: Study) -> Kind:
     return kind
 
 
-def run(study: Study, **options: Any) -> xr.Dataset:
-    """Run a study in memory: the dataset of its archive. Raises BadInput.
+def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
+    """Run a study, or that of a file, in memory: the dataset of its archive. Raises BadInput; what is allowed and yet
+    often a mistake is a warning, a `Remark`.
 
     options: progress and chunk, and where to run, as of `engine.run`.
     """
-    from engine.batch.executors import Where, place
+    from engine.batch.executors import Where, check_options, place
+    from engine.scene.study import study_of
 
     started = time.perf_counter()
-    known = sorted({*Where.__annotations__, "progress", "chunk"})
-    if unknown := sorted(set(options) - set(known)):
-        raise BadInput("no such option", where="studies.run", expected=", ".join(known), received=", ".join(unknown))
-    _check_study(study)
+    check_options(options, "progress", "chunk")
+    study = study_of(study)
     parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()
+    for remark in parts.remarks:
+        warnings.warn(remark, Remark, stacklevel=2)
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
     with place(**where) as here:
         parts.compute(store, Work(place=here, **options))
     found = compared(parts.gather(store), study)
     return found.assign_attrs(run_seconds=round(time.perf_counter() - started, 3))
-
-
-def _check_study(given: Any) -> None:
-    """Refuse the path or the tables of a study in place of one."""
-    try:
-        _ = given.source
-    except AttributeError:
-        remedy = "engine.load(path or text), or engine.Study(kind=..., body=..., ...)"
-        raise BadInput("this is no study", where="study", received=type(given).__name__, remedy=remedy) from None
 
 
 def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.lazy_imports import xr
 from results_schema.status import LOST, Status, label
 from studies.results.axes import PACES, VARIANT, Axis
@@ -25,6 +25,25 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 LETTERS = 26  # of a line beside a panel: as many are as high as one of four panels of a figure
+
+
+def _taken(dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset that a user gives, without the fill values that xarray puts on coordinates when it writes files. Raises
+    BadInput for what is no dataset of a study."""
+    known = isinstance(dataset, xr.Dataset)
+    if not known or "study" not in dataset.attrs or "status" not in dataset:
+        raise BadInput(
+            "this does not hold the results of a study",
+            where="dataset",
+            expected="a dataset of studies.run, with its attributes",
+            received=f"a dataset of {shortened(list(dataset.variables))}" if known else f"a {type(dataset).__name__}",
+            remedy="studies.run(study) in place of engine.run(study), whose dataset is of the march alone",
+        )
+    found = dataset.copy()
+    for name in found.coords:
+        for place in (found.variables[name].attrs, found.variables[name].encoding):
+            place.pop("_FillValue", None)
+    return found
 
 
 def _check_whole(dataset: xr.Dataset, study: Study) -> None:
@@ -69,17 +88,15 @@ class Results:
     models: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, dataset: xr.Dataset) -> Results:
-        """The results of a dataset that carries its study's text. Raises BadInput where there is none, the text is no
-        study, or the dataset a part of its results."""
+    def of(cls, dataset: xr.Dataset, study: Study | None = None) -> Results:
+        """The results of a dataset that carries its study's text, which need not be read where the study is at hand.
+        Raises BadInput where the text is no study, or the dataset none of its results, or a part of them."""
         import engine
 
-        if "study" not in dataset.attrs:
-            what = "this dataset does not say which study gave it"
-            remedy = "take that of studies.run; engine.run gives those of the march alone"
-            raise BadInput(what, where="dataset", expected="an attribute study", remedy=remedy)
-        text = str(dataset.attrs["study"])
-        study = engine.load(text if "\n" in text else f"{text}\n")
+        dataset = _taken(dataset)
+        if study is None:
+            text = str(dataset.attrs["study"])
+            study = engine.load(text if "\n" in text else f"{text}\n")
         _check_whole(dataset, study)
         return cls(dataset, study)
 

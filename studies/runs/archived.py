@@ -37,7 +37,7 @@ def results_of(archive: Archive) -> Results:
     models = {path.removeprefix(MODELS): group for path, group in archive.groups.items() if path.startswith(MODELS)}
     try:
         study = _study(archive.root, models)
-        found = list(_findings(archive, study))
+        found = list(findings(archive, study))
     except BadInput as error:
         from studies.runs.identity import PIECES, missing_pieces
 
@@ -84,8 +84,8 @@ def _recorded(group: xr.Dataset) -> Recorded | None:
     return Recorded(length) if np.isfinite(length) and length > 0.0 else None
 
 
-def _findings(archive: Archive, study: Study) -> Iterator[str]:
-    """Every difference between what is said and what is there, the most telling first."""
+def findings(archive: Archive, study: Study) -> Iterator[str]:
+    """Every difference between what an archive says of its study and what is there, the most telling first."""
     root = archive.root
     if root.attrs.get("study_kind") != study.kind:
         yield f"study_kind: expected {study.kind!r}, received {root.attrs.get('study_kind')!r}"

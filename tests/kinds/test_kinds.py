@@ -54,6 +54,12 @@ SPEED_READ = '[sensor.table_speed]\nbody = "bed"\nat = 3.0'
     ("given", "changes", "extra", "words"),
     [
         ("passage", {"kind": "asymmetry"}, "", r'table.motion.kind: .*comes back.*"out-and-back".*"cruise"'),
+        (
+            "double-peak",
+            {"kind": "asymmetry"},
+            "",
+            r'kind: .*between the turns.*constant speed; .*"out-and-back".*"sinusoidal"; remedy: kind = "double-peak"',
+        ),
         ("passage", {"kind": "double-peak"}, "", r'motion.kind: .*repeats.*"cruise"'),
         (
             "asymmetry",

@@ -1,75 +1,63 @@
-"""Datasets in Python, from a run to an archive or a page: what is taken, and what is refused in words."""
+"""Datasets from Python as archives and answers: those that went through files, and those that are refused."""
 
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import xarray as xr
 
 import engine
 import studies
 from results_schema.errors import BadInput
-from tests.engine.build import beam, cruise, fixed, mass, study
+from studies.commands.cli import main
+from tests.studies import scenes
 
-GIVEN = study(beam(), mass(0.2, cruise(0.0, 1.0, 0.5)), kind="passage", sensor={"midspan": fixed(0.5)})
-
-
-def test_a_dataset_that_xarray_has_written_and_read_is_taken(tmp_path: Path) -> None:
-    """Although coordinates of such files carry a fill value."""
-    studies.run(engine.load(GIVEN.toml() + SWEEP)).to_netcdf(tmp_path / "raw.nc")
-    with xr.open_dataset(tmp_path / "raw.nc") as again:
-        assert again["speed"].encoding.get("_FillValue") is not None
-        studies.write(again, tmp_path / "own.nc")
-    with xr.open_dataset(tmp_path / "own.nc") as archived:
-        assert "_FillValue" not in archived["speed"].encoding
+PASSAGES = scenes.pace("passage")
 
 
-SWEEP = """
-[sweep.speed]
-of = "carriage.car.motion.speed"
-values = [0.3, 0.6]
-"""
+def refused(call: Any, *arguments: Any) -> str:
+    with pytest.raises(BadInput) as error:
+        call(*arguments)
+    return str(error.value)
 
 
-def test_variables_of_ones_own_are_refused_before_anything_is_written(tmp_path: Path) -> None:
-    found = studies.run(GIVEN)
-    with pytest.raises(BadInput, match=r"mine: expected a declared name.*drop_vars"):
-        studies.write(found.assign(mine=2.0 * found.midspan_max), tmp_path / "own.nc")
-    assert not (tmp_path / "own.nc").exists()
+def test_own_variables_are_refused_by_name(tmp_path: Path) -> None:
+    found = scenes.run("passage", PASSAGES)
+    path = tmp_path / "mine.nc"
+    said = refused(studies.write, found.assign(mine=2.0 * found.midspan_max), path)
+    assert said.startswith("mine: ") and 'drop_vars(["mine"])' in said and "to_netcdf" in said and not path.exists()
+    assert "drop_vars" in refused(studies.report, found.assign(mine=2.0 * found.midspan_max), tmp_path / "page")
+    assert main(["info", str(studies.write(found, path))]) == 0
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: studies.answer(engine.run(GIVEN)), "does not say which study gave it.*studies.run"),
-        (lambda: studies.run("bridge.toml"), "this is no study; received str; remedy: engine.load"),
-        (lambda: studies.run({"kind": "passage"}), "this is no study; received dict"),
-        (lambda: studies.run(GIVEN, nthreads=2), "no such option; expected .*threads.*received nthreads"),
-    ],
-)
-def test_calls_of_a_slip_are_refused_in_words(call: Any, words: str) -> None:
-    with pytest.raises(BadInput, match=words):
-        call()
+def test_what_info_would_refuse_is_refused_before_it_is_written(tmp_path: Path) -> None:
+    found = scenes.run("passage", PASSAGES)
+    path = tmp_path / "other.nc"
+    assert "pace" in refused(studies.write, found.assign_coords(pace=2.0 * found.pace), path)
+    assert "midspan_max" in refused(studies.write, found.drop_vars("midspan_max"), path)
+    assert not path.exists()
 
 
-def test_many_samples_of_ones_own_are_read_again() -> None:
-    """As the text of a study that a dataset carries."""
-    values = np.random.default_rng(1).uniform(0.1, 0.2, 60_000)
-    swept = study(
-        beam(), mass(0.2, cruise(0.0, 1.0, 0.5)), sweep={"load": {"of": "carriage.car.mass", "values": values}}
-    )
-    text = swept.toml()
-    assert len(text) > 1_000_000
-    assert engine.load(text).sweep.axes["load"].size == values.size
+def test_datasets_that_went_through_files(tmp_path: Path) -> None:
+    """xarray gives coordinates a fill value of its own when it writes them."""
+    scenes.run("passage", PASSAGES).to_netcdf(tmp_path / "kept.nc")
+    with xr.open_dataset(tmp_path / "kept.nc") as again:
+        assert "_FillValue" in again.pace.encoding
+        assert studies.answer(again) == studies.answer(scenes.run("passage", PASSAGES))
+        assert studies.report(again, tmp_path / "page").exists()
+        archive = studies.write(again, tmp_path / "archive.nc", scenes.study("passage", PASSAGES))
+        assert "_FillValue" in again.pace.encoding, "the user's own dataset is left alone"
+    assert main(["info", str(archive)]) == 0
 
 
-def test_more_samples_than_are_read_again_are_refused_before_they_run() -> None:
-    values = np.random.default_rng(1).uniform(0.1, 0.2, 600_000)
-    sweep = {"load": {"of": "carriage.car.mass", "values": values}}
-    with pytest.raises(BadInput, match=r"the study is too large; expected a text of at most 10000000 bytes.*sobol"):
-        study(beam(), mass(0.2, cruise(0.0, 1.0, 0.5)), sweep=sweep)
-
-
-def test_completion_offers_what_is_imported_late() -> None:
-    assert {"run", "load", "Study"} <= set(dir(engine)) and {"run", "write", "report"} <= set(dir(studies))
+def test_what_is_no_dataset_of_a_study(tmp_path: Path) -> None:
+    study = scenes.study("passage")
+    marched = engine.run(study)
+    for said in (
+        refused(studies.answer, marched),
+        refused(studies.figures, marched),
+        refused(studies.report, marched, tmp_path / "page"),
+        refused(studies.write, marched, tmp_path / "found.nc", study),
+    ):
+        assert "expected a dataset of studies.run" in said and "in place of engine.run" in said
+    assert "received a DataArray" in refused(studies.answer, scenes.run("passage").midspan_max)

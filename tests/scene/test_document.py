@@ -36,7 +36,6 @@ def refused(text: str | Path) -> str:
         (b"[body.a]\n[body.b]\n[body.a]\n", ["line 3", "twice"]),
         (b"a = 1\nb =\n", ["line 2", "Invalid value"]),
         (b"a = 'x", ["line 1", "Expected"]),
-        (b"#" * (MAX_BYTES + 1), [f"{MAX_BYTES} bytes"]),
     ],
 )
 def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
@@ -45,6 +44,18 @@ def test_files(tmp_path: Path, raw: bytes, words: list[str]) -> None:
     message = refused(file)
     assert "study.toml" in message
     assert all(word in message for word in words), message
+
+
+@pytest.mark.fault(5)
+def test_sizes(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    with file.open("wb") as place:
+        place.truncate(MAX_BYTES + 1)
+    message = refused(file)
+    assert all(word in message for word in ("study.toml", "at most 10 MB", "received 10 MB", "sobol")), message
+    assert "at most 10 MB" in refused("#\n" * (MAX_BYTES // 2 + 1))
+    with pytest.raises(BadInput, match="study: the study is too large"):  # from Python, before anything is run
+        document_of({"values": np.random.default_rng(1).uniform(0.1, 0.2, 600_000)})
 
 
 def test_what_is_no_file(tmp_path: Path) -> None:

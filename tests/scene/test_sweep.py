@@ -234,3 +234,14 @@ def test_a_grid_is_refused_exactly_if_one_variant_is(ends: list[float], lengths:
         assert not expected
     else:
         assert expected
+
+
+def test_own_samples_are_read_again() -> None:
+    """Of a Monte Carlo study from Python: its text of more than a megabyte goes through archives."""
+    draw, size = np.random.default_rng(0), 20_000
+    axes = {"a": (SPEED, 1.0, 10.0), "b": (MASS, 50.0, 200.0), "c": (RATIO, 0.01, 0.02)}
+    swept = {name: {"of": path, "values": draw.uniform(low, high, size)} for name, (path, low, high) in axes.items()}
+    study = Study(**load(BASE).data | {"sweep": {"zip": True} | swept})
+    assert len(study.toml()) > 1_000_000
+    again = load(study.toml())
+    assert again == study and expand(again).size == size

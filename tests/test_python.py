@@ -1,0 +1,96 @@
+"""The program from Python: what it takes for a study, what it warns of, and what it refuses in words."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pint
+import pytest
+import xarray as xr
+
+import engine
+import studies
+from results_schema.errors import BadInput
+from tests.studies import scenes
+
+RUNS = (engine.run, studies.run)
+GIGAPASCALS = scenes.text_of("passage").replace('"210 GPa"', "70")
+
+
+def refused(call: Any, *arguments: Any, **options: Any) -> str:
+    with pytest.raises(BadInput) as error:
+        call(*arguments, **options)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_a_study_file_is_run_by_its_path(run: Any, tmp_path: Path) -> None:
+    study = scenes.study("passage")
+    path = study.save(tmp_path / "passage.toml")
+    wanted = run(study).midspan_max
+    assert (run(path).midspan_max == wanted).all() and (run(str(path)).midspan_max == wanted).all()
+    assert "cannot be read" in refused(run, tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("call", [*RUNS, engine.Study])
+def test_tables_are_no_study(call: Any) -> None:
+    said = refused(call, {"kind": "passage"})
+    assert said.startswith("study: this is no study; expected ") and "received a dict" in said
+    assert "engine.Study(**tables)" in said
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_unknown_options_are_refused(run: Any) -> None:
+    said = refused(run, scenes.study("passage"), nthreads=2)
+    assert said.startswith("nthreads: unknown option; expected one of ") and 'did you mean "threads"?' in said
+
+
+@pytest.mark.parametrize(("run", "category"), [(engine.run, engine.Remark), (studies.run, studies.Remark)])
+def test_what_is_often_a_mistake_is_a_warning(run: Any, category: type[Warning]) -> None:
+    with pytest.warns(category, match='70 Pa: no beam has this.*did you mean "70 GPa"') as told:
+        run(engine.load(GIGAPASCALS))
+    assert told[0].filename == __file__, "the line of the user"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(scenes.study("passage"))
+
+
+@pytest.mark.parametrize("package", [engine, studies])
+def test_public_names_are_completed(package: Any) -> None:
+    assert set(package.__all__) <= set(dir(package))
+    package.__dict__.pop("run", None)
+    assert "run" in dir(package) and "__doc__" in dir(package)
+
+
+def test_quantities_of_pint_are_read_as_their_texts() -> None:
+    unit = pint.UnitRegistry()
+    whole = scenes.study("passage")
+    given = {
+        "carriage.table.mass": 60 * unit.kg,
+        "body.bed.length": np.float64(1000) * unit.cm,
+        "body.bed.density": 7.85 * unit.g / unit.cm**3,
+        "body.bed.damping_ratio": 2 * unit.percent,
+        "carriage.table.motion.speed": unit.Quantity(36, "km/h"),
+        "gravity": 9.81 * unit.meter / unit.second**2,
+    }
+    found = whole.with_values(given)
+    assert [found.value(key) for key in given] == [60.0, 10.0, 7850.0, 0.02, 10.0, 9.81]
+    assert engine.load(found.toml()) == found
+    assert "a length (m) where a mass (kg) is wanted" in refused(whole.with_values, {"carriage.table.mass": 6 * unit.m})
+    sweep = {"mass": {"of": "carriage.table.mass", "values": [0.05, 0.2] * unit.t}}
+    assert studies.run(whole.with_values({"sweep": sweep})).mass.values.tolist() == [50.0, 200.0]
+
+
+def test_values_of_an_axis_are_any_array_of_one_dimension() -> None:
+    whole, mass = scenes.study("passage"), "carriage.table.mass"
+    for values in (
+        xr.DataArray([50.0, 100.0], dims="mass"),
+        xr.DataArray([50.0, 100.0]).to_series(),
+        range(50, 101, 50),
+    ):
+        found = whole.with_values({"sweep": {"mass": {"of": mass, "values": values}}})
+        assert found.sweep.axes["mass"].values == (50.0, 100.0)
+    for values in (np.ones((2, 2)), np.ones((2, 2)) * pint.UnitRegistry().kg):
+        said = refused(whole.with_values, {"sweep": {"mass": {"of": mass, "values": values}}})
+        assert "sweep.mass.values.0: the values of an axis are one-dimensional" in said and "ravel" in said
