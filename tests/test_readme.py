@@ -116,3 +116,11 @@ def test_every_folder_of_code_is_told_of() -> None:
     assert {
         folder for folder in rooms if not folder.startswith("engine/bodies/") and f"`{folder}/`" not in text
     } == set()
+
+
+def test_results_over_the_static_range_say_what_it_is() -> None:
+    page = (README.parent / "docs" / "results.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if "static range R" in line]
+    assert {line.split("`")[1] for line in rows} == {"loop_area", "odd_rms", "even_excess"}
+    meaning = "the largest minus the smallest static value of the sensor while the carriage is on the cruise part"
+    assert all(meaning in line or "R, as in `loop_area`" in line for line in rows)

@@ -34,11 +34,12 @@ RESULTS = outputs("""
         <odd, dw_s/ds> over <dw_s/ds, dw_s/ds> on the cruise part of the last cycle, derivatives along forward; negative
         when the response trails; NaN where the static response does not vary
     loop_area | sensor | | nan | area between forward and backward
-        signed integral of forward minus backward over the cruise part's length times the static range R
+        signed integral of forward minus backward over the cruise part's length times the static range R, the largest
+        minus the smallest static value of the sensor while the carriage is on the cruise part
     odd_rms | sensor | | nan | odd part of the response
-        rms of half the difference of forward and backward over the static range R
+        rms of half the difference of forward and backward over the static range R, as in `loop_area`
     even_excess | sensor | | nan | dynamic part common to both ways
-        rms of the mean of forward and backward minus the static response over the static range R
+        rms of the mean of forward and backward minus the static response over the static range R, as in `loop_area`
 """)
 declare("asymmetry", *MARCH, *RESULTS)
 

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
+import studies
 from engine.observation.cycle_reduction import Compared
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
@@ -90,3 +92,30 @@ def test_peaks_are_told_no_less_than_half_of_what_histories_differ_by() -> None:
     same = answers(TWO) | {"harmonic": np.zeros((1, 1, 1))}
     compared = Compared(same, same, np.full((1, 1), 2.0), np.full((1, 1), 0.3), VariantValues(scene, {}, 1))
     assert DoublePeakReduction().differences(compared)["peak_value"].tolist() == [[pytest.approx(0.3 / 2.0 / 2.0)]]
+
+
+def test_histories_of_different_steps_stand_on_stations_filled_up_with_nothing() -> None:
+    rates = {"rate": {"of": "carriage.car.motion.frequency", "values": [0.01, 0.35]}}
+    shuttle = mass(0.2, swing(0.5, 0.4, 0.1, 4))
+
+    def found(histories: object, **solver: object) -> xr.Dataset:
+        own = {"audit": 0} | solver
+        output = {"histories": histories}
+        return studies.run(study(beam(), shuttle, kind="double-peak", sweep=rates, output=output, solver=own))
+
+    whole, tenth = found("all"), found({"every": 10})
+    assert whole.midspan.dims == ("rate", "station")
+    few, many = sorted(range(2), key=lambda i: int(np.isfinite(whole.midspan[i]).sum()))
+    kept = np.isfinite(whole.midspan[few].values)
+    assert kept[: kept.sum()].all() and not kept.all() and np.isfinite(whole.midspan[many]).all()
+    np.testing.assert_array_equal(np.isfinite(whole.elapsed[few]), kept)
+    for i in range(2):
+        thinned = whole.midspan[i].values[::10]
+        np.testing.assert_array_equal(tenth.midspan[i].values[: thinned.size], thinned)
+    assert found("auto").midspan.dims == found("all", steps=1600).midspan.dims == ("rate", "phase")
+
+
+def test_a_swing_starts_in_the_centre_at_its_largest_speed() -> None:
+    given = study(beam(), mass(0.2, swing(0.5, 0.4, 0.1, 4)), kind="double-peak")
+    start = given.carriage["car"].motion.path(np.zeros(1))
+    assert (start.S[0], start.dS[0]) == (0.5, pytest.approx(2.0 * np.pi * 0.4))
