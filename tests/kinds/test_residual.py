@@ -100,9 +100,10 @@ def test_it_is_drawn_over_the_time_after_the_stop() -> None:
     assert np.ptp(values) == pytest.approx(2e3 * float(found.midspan_residual), rel=0.01)
 
 
-def test_sensors_nearest_to_their_limits_come_first() -> None:
+@pytest.mark.parametrize("question", [LIMIT, {}])
+def test_sensors_nearest_to_their_limits_or_that_swing_most_come_first(question: dict[str, Any]) -> None:
     sensors = {"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}
-    found = studies.run(stops(sensor=sensors, question=LIMIT))
+    found = studies.run(stops(sensor=sensors, question=question))
     told = [text.partition(":")[0] for text in answers.answer(found) if "at rest" in text]
     assert told == ["midspan", "quarter"]
 
