@@ -15,8 +15,8 @@ from results_schema.arrays import Counts, split
 
 def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
     """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
-    for variants in split(chosen, structure(cases, chosen)):
-        own = cases.study_of(study, int(variants[0])) if structural(cases) else study.without_sweep()
+    for variants in split(chosen, structure(study, cases, chosen)):
+        own = cases.study_of(study, int(variants[0])) if structural(study, cases) else study.without_sweep()
         values = VariantValues.of(own, cases, variants)
         timing = values.timing()
         columns = np.stack([column for pair in timing.values() for column in pair])
@@ -43,10 +43,10 @@ def _timing_of(values: VariantValues, lane: int) -> tuple[dict[str, float], dict
     )
 
 
-def structure(cases: Cases, variants: Counts) -> Counts:
+def structure(study: Study, cases: Cases, variants: Counts) -> Counts:
     """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
     positions = cases.positions(variants)
-    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(structural(cases))}
+    dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(structural(study, cases))}
     code = np.zeros(variants.size, dtype=np.int64)
     for dim, size in zip(cases.dims, cases.shape, strict=True):
         if dim in dims:

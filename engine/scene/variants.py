@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 STEPS, TOLERANCE = "solver.steps", "solver.tolerance"
-#: Keys of numbers that a lane may have to itself.
+#: Keys of numbers that a lane may have to itself; of a motion's that one alone with which all its speeds grow.
 LANE_KEYS = re.compile(
     r"gravity|solver\.(steps|tolerance)"
     r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
@@ -55,9 +55,13 @@ def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"carriage.{name}.{key}" for key in keys)
 
 
-def structural(cases: Cases) -> list[str]:
+def structural(study: Study, cases: Cases) -> list[str]:
     """Swept keys that change the scene itself."""
-    return [path for path in cases.paths if not LANE_KEYS.fullmatch(path)]
+    motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
+    fixed = {
+        f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace
+    }
+    return [path for path in cases.paths if path in fixed or not LANE_KEYS.fullmatch(path)]
 
 
 def axes_of_scene(cases: Cases) -> list[Axis]:

@@ -141,7 +141,7 @@ def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, wo
     """Some variants, in the order of the scenes that they share."""
     cases = expand(study)
     everything = np.arange(cases.size, dtype=np.int64)
-    chosen = everything[np.argsort(structure(cases, everything), kind="stable")][part]
+    chosen = everything[np.argsort(structure(study, cases, everything), kind="stable")][part]
     numbers, found = [], []
     for model, variants in scenes(study, cases, chosen):
         work.check()

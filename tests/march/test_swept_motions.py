@@ -1,0 +1,40 @@
+"""Every number of every motion, swept beside alone: motions whose times do not all go with a speed are other scenes."""
+
+import numpy as np
+import pytest
+
+import engine
+from tests.engine.build import Table, beam, cruise, mass, shuttle, study, swing
+
+MOTIONS: dict[str, Table] = {
+    "cruise": cruise(0.0, 1.0, 0.3, after=0.5),
+    "out-and-back": shuttle(0.2, 0.8, 0.4, 0.1, 2),
+    "sinusoidal": swing(0.5, 0.3, 0.2, 2),
+    "point-to-point": {
+        "kind": "point-to-point",
+        "start": 0.1,
+        "end": 0.9,
+        "speed": 0.4,
+        "acceleration": 0.8,
+        "jerk": 5.0,
+        "dwell": 1.0,
+    },
+    "waypoints": {"kind": "waypoints", "times": [0.0, 2.0, 4.0], "positions": [0.1, 0.8, 0.3]},
+}
+NUMBERS = [(kind, key) for kind, motion in MOTIONS.items() for key, value in motion.items() if isinstance(value, float)]
+NUMBERS += [("waypoints", "times.2"), ("waypoints", "positions.1")]
+CHANGES = 0.01, 0.03  # of a number
+
+
+@pytest.mark.parametrize(("kind", "key"), NUMBERS, ids=[".".join(pair) for pair in NUMBERS])
+def test_swept_numbers_of_motions_do_what_they_do_alone(kind: str, key: str) -> None:
+    carriages = {"car": mass(0.2, MOTIONS[kind]), "other": mass(0.1, cruise(0.0, 1.0, 0.25))}
+    given = study(beam(), carriages, solver={"steps": 1600, "fidelity": "full"})
+    path = f"carriage.car.motion.{key}"
+    values = [given.value(path) + change for change in CHANGES]
+    swept = engine.run(given.with_values({"sweep": {"a": {"of": path, "values": values}}}))
+    for number, value in enumerate(values):
+        alone = engine.run(given.with_values({path: value}))
+        for end in ("max", "min", "rms"):
+            np.testing.assert_allclose(swept[f"midspan_{end}"][number], alone[f"midspan_{end}"], rtol=1e-9)
+    assert swept.midspan_rms[0] != swept.midspan_rms[1]
