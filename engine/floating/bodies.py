@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PROBED = 65  # places along a track at which it is looked for what a mode moves
 UNFELT = 1e-6  # of the largest: a mode that moves its track less along an axis does not bend it that way
 
-BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]] = {
+BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str, Sequence[float]], ElasticBody]] = {
     Beam: elastic_beam,
     Rigid: rigid_body,
     FrameBody: elastic_frame,
@@ -39,9 +39,9 @@ BUILDERS: dict[type[Body], Callable[[Any, Frame, int | None, str], ElasticBody]]
 COUNTED = (FrameBody, Matrices, Ansys, Nastran)  # whose modes count where they bend the track
 
 
-def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> ElasticBody:
+def elastic_body(body: Body, frame: Frame, modes: int | None, where: str, hung: Sequence[float] = ()) -> ElasticBody:
     """A body in its floating frame; modes: of bending along y and along z, as far as there are such, where the study
-    leaves that open. Raises BadInput."""
+    leaves that open; hung: places of its track (m) at which something hangs. Raises BadInput."""
     build = BUILDERS.get(type(body))
     if build is None:
         raise BadInput(
@@ -52,7 +52,7 @@ def elastic_body(body: Body, frame: Frame, modes: int | None, where: str) -> Ela
         )
     if modes is not None and body.modes == "auto" and type(body) in COUNTED:
         modes = enough_modes(_whole(_Content(body.model_dump_json() + body.content, body, frame, where)), modes)
-    return build(body, frame, modes, where)
+    return build(body, frame, modes, where, hung)
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class _Content:
 @lru_cache(maxsize=8)
 def _whole(content: _Content) -> ElasticBody:
     """A body with all the modes that may count."""
-    return BUILDERS[type(content.body)](content.body, content.frame, MAX_MODES, content.where)
+    return BUILDERS[type(content.body)](content.body, content.frame, MAX_MODES, content.where, ())
 
 
 def enough_modes(body: ElasticBody, bending: int) -> int:

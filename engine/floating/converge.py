@@ -1,4 +1,4 @@
-"""Marches with more and more steps, and modes where these are open, until what they report stays where it is."""
+"""Marches with more and more steps, by the modes that pilots found enough, until what they report stays as it is."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
-#: Steps per first elastic period of the coarsest level, and its modes of bending where these are open; both double.
-#: A sliding mass at 1e-3 ends at the third level, 100 steps.
-FIRST_STEPS, FIRST_MODES = 25, 2
-MOST_STEPS, MOST_MODES = 4_000_000, 32
+#: Steps per first elastic period of the coarsest level, which double. A sliding mass at 1e-3 ends at the third.
+FIRST_STEPS, MOST_STEPS = 25, 4_000_000
 LEVELS = 12
+MORE_MODES = 2  # times as many, of what an answer is compared with
 HOPELESS = 32  # times the coarsest steps, at which a march that fails is given up
 STATIONS = 800  # at which histories are compared and kept
 #: Of its limit: joints and masses shift the frequencies of bodies; where too far, measured errors show it.
@@ -65,28 +64,27 @@ class Converged:
     status: NDArray[np.int8]
 
 
-def levels(study: Study, duration: float) -> Iterator[Level]:
-    """Coarse to fine, for a time (s) that the longest of the variants takes."""
-    fixed = study.solver.steps
-    model = build(study, FIRST_MODES)
-    least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
-    first = STATIONS * max(1, int(np.ceil(least / STATIONS)))
-    scheme = scheme_of(study, duration / first * model.highest_omega)
-    coarsest = first if fixed == "auto" else int(fixed)
-    every, factor = int(np.ceil(coarsest / STATIONS)), 1
-    for level in range(LEVELS):
-        modes = FIRST_MODES * 2**level
-        if model.is_open and modes > MOST_MODES:
-            return
-        own = build(study, modes) if model.is_open and level else model
-        # more modes are faster ones: a scheme with a limit needs more than twice the steps for twice as many
-        limit = FAR_WITHIN * scheme.stability_limit if fixed == "auto" else np.inf
-        while coarsest * factor * limit < duration * own.highest_omega:
+def levels(study: Study, duration: float, modes: int) -> Iterator[Level]:
+    """Coarse to fine, for a time (s) that the longest of the variants takes; modes: of bending, where these are
+    open."""
+    fixed, model = study.solver.steps, build(study, modes)
+    coarsest, factor = int(fixed) if fixed != "auto" else usual_steps(model, duration), 1
+    scheme = scheme_of(study, duration / usual_steps(model, duration) * model.highest_omega)
+    every = int(np.ceil(coarsest / STATIONS))
+    if fixed == "auto":
+        while coarsest * factor * FAR_WITHIN * scheme.stability_limit < duration * model.highest_omega:
             factor *= 2
+    for _ in range(LEVELS):
         if coarsest * factor > MOST_STEPS:
             return
-        yield Level(own, coarsest * factor, every * factor, scheme)
+        yield Level(model, coarsest * factor, every * factor, scheme)
         factor *= 2
+
+
+def usual_steps(model: FloatingModel, duration: float) -> int:
+    """Of the coarsest level, a multiple of the stations."""
+    least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
+    return STATIONS * max(1, int(np.ceil(least / STATIONS)))
 
 
 def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:
@@ -126,7 +124,7 @@ def converge(
     V = values.size
     found: Outcome | None = None
     active = np.arange(V)
-    for level in islice(levels(study, longest), LEVELS if study.solver.steps == "auto" else 2):
+    for level in islice(levels(study, longest, rung.modes), LEVELS if study.solver.steps == "auto" else 2):
         if halted():
             raise Halted
         model, own = level.model, values.part(active)
@@ -139,14 +137,18 @@ def converge(
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
         apart = differences(model, found.of(active), now)
-        told = left_over(apart, change[:, active]) + rung.left_out[:, None]
+        by_steps = left_over(apart, change[:, active])
+        told = by_steps + rung.left_out[:, None]
         error[:, active], change[:, active] = told, apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
         held[active] = worst(told, results, own)
         failed = lost(now.status)
         hopeless = failed & (level.steps >= HOPELESS * coarsest)
-        active = active[~(held[active] <= ENOUGH) & ~hopeless]
+        # more steps are of no use where it is the model that misses the tolerance
+        by_model = worst(np.broadcast_to(rung.left_out[:, None], told.shape), results, own)
+        done = worst(by_steps, results, own) <= np.where(by_model > 1.0, by_model, ENOUGH * (1.0 - by_model))
+        active = active[~done & ~hopeless]
         if not active.size:
             break
     assert found is not None
@@ -167,11 +169,11 @@ def observed(
     halted: Callable[[], bool] = lambda: False,
 ) -> tuple[Array, Array]:
     """What `converge` reports beside one level beyond that of each variant: how far results are off, and the errors
-    told of them (R, V); NaN where there is no such level, or no values. The level beyond has the floating frame. Raises
-    Halted."""
+    told of them (R, V); NaN where there is no such level, or no values. The level beyond has the floating frame, and
+    more modes where these are open. Raises Halted."""
     found = converge(study, values, duration, longest, rung, halted)
     apart, left = np.full_like(found.error, np.nan), ~lost(found.status)
-    for level in levels(study, longest):
+    for level in levels(study, longest, MORE_MODES * rung.modes):
         lanes = np.flatnonzero(left & (found.steps < level.steps))
         if halted():
             raise Halted

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -13,6 +14,7 @@ from engine.bodies.beam.beam import Beam
 from engine.bodies.beam.modes import uniform_beam
 from engine.bodies.rigid.rigid import Rigid
 from engine.floating.elastic import ABOUT_Y, ABOUT_Z, AXES, ElasticBody, X, Y, Z
+from engine.floating.static_shapes import with_statics
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -113,8 +115,9 @@ class Stretching:
         return {order: np.asarray(self.amplitude * k**order * np.sin(angle[order])) for order in orders}
 
 
-def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str) -> ElasticBody:
-    """A beam in its floating frame; modes: of bending, where the study leaves that open. Raises BadInput."""
+def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
+    """A beam in its floating frame; modes: of bending, where the study leaves that open; hung: places (m) at which
+    something hangs on it, whose static deflections are shapes too. Raises BadInput."""
     if body.springs:
         raise BadInput(
             "a beam on springs in a frame that moves is not built yet",
@@ -122,15 +125,15 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str) -> Ela
             expected="two ends, such as pinned-pinned or clamped-free",
         )
     count = int(body.modes) if body.modes != "auto" else int(modes or 0)
-    parts: list[Part] = [_bending(body, count, Z)]
+    x, dx = _gauss([0.0, *hung, body.length])
+    places, dm = np.zeros((x.size, 3)), body.mass_per_length * dx
+    places[:, 0] = x
+    parts: list[Part] = [with_statics(_bending(body, count, Z), hung, x, dm)]
     if frame.lateral_modes:
         lateral = body.model_copy(update={"second_moment": frame.lateral_second_moment})
-        parts.append(_bending(lateral, frame.lateral_modes, Y))
+        parts.append(with_statics(_bending(lateral, frame.lateral_modes, Y), hung, x, dm))
     if frame.axial_modes:
         parts.append(_stretching(body, frame.axial_modes))
-    x, dm = np.polynomial.legendre.leggauss(GAUSS)
-    places = np.zeros((GAUSS, 3))
-    places[:, 0] = 0.5 * (x + 1.0) * body.length
     lateral_moment = frame.lateral_second_moment or body.second_moment
     turning = body.density * body.length * (body.second_moment + lateral_moment)
     whirls = any(joint.freedoms > 1 for joint in frame.joints)
@@ -139,14 +142,24 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str) -> Ela
         body.mass,
         np.concatenate([part.omega for part in parts]),
         places,
-        0.5 * dm * body.mass,
-        np.zeros((GAUSS, 3, 0)),
+        dm,
+        np.zeros((x.size, 3, 0)),
         np.array([turning if whirls else 0.0, 0.0, 0.0]),
         Parts(tuple(parts)),
         frame.stiffening,
         body.build(),
     )
     return _with_shapes(found)
+
+
+def _gauss(bounds: Sequence[float]) -> tuple[Array, Array]:
+    """Places and lengths of the integrals between bounds, where shapes have kinks."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+    pieces = [(low, 0.5 * (high - low)) for low, high in pairwise(bounds) if high > low]
+    return (
+        np.concatenate([low + half * (nodes + 1.0) for low, half in pieces]),
+        np.concatenate([half * weights for _, half in pieces]),
+    )
 
 
 def _with_shapes(body: ElasticBody) -> ElasticBody:
@@ -169,7 +182,7 @@ def _stretching(beam: Beam, count: int) -> Stretching:
     return Stretching(k * speed, k, float(np.sqrt(2.0 / beam.mass)), int(free))
 
 
-def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str) -> ElasticBody:
+def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
     """A rigid body as a mass at its centre with an inertia of its own."""
     inertia = frame.inertia or (body.inertia,) * 3
     centre = np.array([[body.centre_of_mass, 0.0, 0.0]])

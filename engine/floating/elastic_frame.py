@@ -74,7 +74,7 @@ class Particles(NamedTuple):
     shapes: Array
 
 
-def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str) -> ElasticBody:
+def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
     """A frame of beams whose floating frame begins with its track, z where loads push it; modes: where that is open.
     Raises BadInput for what is not built."""
     _check(body, frame, where)

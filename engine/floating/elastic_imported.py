@@ -50,7 +50,7 @@ class NodeLine:
         return found
 
 
-def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str) -> ElasticBody:
+def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
     """A solid model in its floating frame, which begins with its track; modes: where that is open. Raises BadInput."""
     refuse_beam_words(frame, where)
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)

@@ -120,7 +120,10 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
     refuse_scene(study)
     names = list(_in_order(study))
     bodies = {
-        name: elastic_body(study.body[name], study.frame.get(name) or Frame(), modes, f"body.{name}") for name in names
+        name: elastic_body(
+            study.body[name], study.frame.get(name) or Frame(), modes, f"body.{name}", hung_on(study, name)
+        )
+        for name in names
     }
     joints: list[OneJoint] = []
     motions: list[str] = []
@@ -163,6 +166,17 @@ def _in_order(study: Study) -> Iterator[str]:
             yield name
             left.remove(name)
             done.add(name)
+
+
+def hung_on(study: Study, name: str) -> list[float]:
+    """Places (m) of a body's track at which others hang or torques act, whose moments its modes hardly hold; none
+    without `solver.static_correction`."""
+    if not study.solver.static_correction:
+        return []
+    hanging = [frame.at for frame in study.frame.values() if frame.on == name]
+    twisted = [load.at for load in study.load.values() if load.on == name and load.torque is not None]
+    length = study.body[name].length
+    return sorted({length if at is None else at for at in [*hanging, *twisted]})
 
 
 def _joints(study: Study, name: str, size: int, motions: list[str]) -> Iterator[OneJoint]:

@@ -1,17 +1,21 @@
-"""Which model a scene with frames that move is marched by: where nothing but modes and springs of carriages is left to
-move by itself, one whose steps are linear equations, if pilots find that it agrees with the floating frame."""
+"""Which model a scene with frames that move is marched by, as pilots find: with how many modes, where the study leaves
+these open; and where nothing but modes and springs of carriages is left to move by itself, one whose steps are linear
+equations, if it agrees with the floating frame."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.floating.converge import levels, stations, weights, worst
+from engine.accuracy.reference import left_over
+from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, stations, usual_steps, weights, worst
 from engine.floating.march import march
-from engine.floating.results import differences, outcome, results_of
+from engine.floating.model import build
+from engine.floating.results import Outcome, differences, outcome, results_of
 from engine.kernels.layout import LANES
+from engine.kernels.schemes import NewmarkScheme
 from engine.scene.frames import GROUND
 from results_schema.arrays import Array
 from results_schema.status import Fidelity
@@ -25,31 +29,83 @@ PILOTS = LANES  # of a scene: a block of lanes takes as long, however few of the
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
 
 
+UNLIMITED = NewmarkScheme("average-acceleration", 0.25, 0.5)  # in its steps, however fast the highest mode is
+FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these
+FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
+
+
 @dataclass(frozen=True, eq=False)
 class Rung:
-    """The model of a scene's variants, and what it leaves out: (R,) largest difference of every result among pilots."""
+    """The model of a scene's variants; modes: of bending, where these are open; left_out (R,): largest error of every
+    result, among pilots, by the model and these modes."""
 
     fidelity: Fidelity
+    modes: int
     left_out: Array
 
 
+class Pilots(NamedTuple):
+    """Some variants of a scene, which take a duration (P,) s, at most the longest of all variants."""
+
+    study: Study
+    values: VariantValues
+    duration: Array
+    longest: float
+
+    def march(self, level: Level, fidelity: Fidelity = Fidelity.FRAME) -> Outcome:
+        """What they report by a level."""
+        how = level.steps, stations(level), weights(level.scheme), fidelity
+        return outcome(level.model, march(level.model, self.values, self.duration, *how))
+
+
 def choose(study: Study, pilots: VariantValues, duration: Array, longest: float) -> Rung:
-    """The model of a scene, by some of its variants that take a duration (P,) s, marched on the coarsest level by
-    both; longest: of all variants (s)."""
-    level = next(iter(levels(study, longest)))
+    """The model of a scene, by some of its variants that take a duration (P,) s, marched on the coarsest level;
+    longest: of all variants (s)."""
+    own = Pilots(study, pilots, duration, longest)
+    modes, left_out = _enough_modes(own)
+    level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
-    full = Rung(Fidelity.FRAME, np.zeros(len(results)))
+    full = Rung(Fidelity.FRAME, modes, left_out)
     if study.solver.fidelity == "full" or not is_given(model, pilots):
         return full
-    cheap, dear = (
-        outcome(model, march(model, pilots, duration, level.steps, stations(level), weights(level.scheme), fidelity))
-        for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME)
-    )
+    cheap, dear = (own.march(level, fidelity) for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME))
     apart = differences(model, cheap, dear)
     known = ~np.isnan(apart).any(axis=0)  # what the floating frame itself has no values of tells nothing
     if not known.any() or (worst(apart, results, pilots)[known] > PART).any():
         return full
-    return Rung(Fidelity.GIVEN_FRAME, apart[:, known].max(axis=1))
+    return Rung(Fidelity.GIVEN_FRAME, modes, left_out + apart[:, known].max(axis=1))
+
+
+def _enough_modes(pilots: Pilots) -> tuple[int, Array]:
+    """The fewest modes whose error is a small part of the tolerance, or the most, and that error (R,); infinite where
+    no pilot can be marched with the steps of the coarsest levels."""
+    model = build(pilots.study, FIRST_MODES)
+    nothing = np.zeros(len(results_of(model)))
+    if not model.is_open:
+        return FIRST_MODES, nothing
+    tried = (_enough_by(pilots, usual_steps(model, pilots.longest) * factor) for factor in FINER)
+    return next((found for found in tried if found is not None), (MOST_MODES, nothing + np.inf))
+
+
+def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
+    """The same by marches of so many steps, whose own error is in all of them; None where no pilot gets through."""
+    modes, coarse, change = FIRST_MODES, None, np.array(np.nan)
+    while True:
+        level = Level(build(pilots.study, modes), steps, steps // STATIONS, UNLIMITED)
+        fine = pilots.march(level)
+        if coarse is not None:
+            apart = differences(level.model, coarse, fine)
+            left = left_over(apart, change)
+            known = ~np.isnan(left).any(axis=0)
+            if not known.any():
+                return None
+            before = worst(apart + left, results_of(level.model), pilots.values)
+            if (before[known] <= PART).all():
+                return modes // MORE_MODES, (apart + left)[:, known].max(axis=1)
+            if modes >= MOST_MODES:
+                return modes, left[:, known].max(axis=1)
+            change = apart
+        modes, coarse = modes * MORE_MODES, fine
 
 
 def is_given(model: FloatingModel, values: VariantValues) -> bool:

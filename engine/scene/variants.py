@@ -58,9 +58,7 @@ def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:
 def structural(study: Study, cases: Cases) -> list[str]:
     """Swept keys that change the scene itself."""
     motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
-    fixed = {
-        f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace
-    }
+    fixed = {f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace}
     return [path for path in cases.paths if path in fixed or not LANE_KEYS.fullmatch(path)]
 
 

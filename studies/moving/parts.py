@@ -63,6 +63,7 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     from engine.batch.plan import check_memory
     from engine.floating.converge import levels
     from engine.floating.model import build
+    from engine.floating.model_choice import FIRST_MODES
     from engine.scene.sweep import expand
 
     _check_steps(study)
@@ -72,7 +73,7 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     found: list[Piece] = []
     for scene in scenes(study, cases):
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
-        coarsest = next(iter(levels(scene.study, longest)))
+        coarsest = next(iter(levels(scene.study, longest, FIRST_MODES)))
         each = coarsest.steps * LEVELS_TAKEN * (STEP_SECONDS + COORDINATE_SECONDS * coarsest.model.size)
         size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
         for first in range(0, scene.variants.size, size):

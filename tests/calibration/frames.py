@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.floating.converge import FIRST_MODES, converge, levels, weights
+from engine.floating.converge import converge, levels, weights
 from engine.floating.march import march
 from engine.floating.model import FloatingModel, build
 from engine.floating.model_choice import choose
@@ -185,11 +185,12 @@ def judged(seed: int, tolerance: float, number: int) -> Judged:
     values = VariantValues(scene, cases.columns_of(np.arange(cases.size)), cases.size)
     duration = np.full(cases.size, scene.data["question"]["duration"])
     longest = float(duration.max())
-    found = converge(scene, values, duration, longest, choose(scene, values, duration, longest))
+    rung = choose(scene, values, duration, longest)
+    found = converge(scene, values, duration, longest, rung)
     rows, statuses = [], []
     for steps in np.unique(found.steps):
         own = np.flatnonzero(found.steps == steps)
-        truth, told_as = _truth(scene, values.part(own), int(steps), longest), _labels(found.status[own])
+        truth, told_as = _truth(scene, values.part(own), int(steps), longest, rung.modes), _labels(found.status[own])
         if truth is None:
             statuses += [(word, "too dear") for word in told_as]
             continue
@@ -208,12 +209,12 @@ def _labels(status: Array) -> list[str]:
     return [label(Status(int(one))) for one in status]
 
 
-def _truth(study: Study, values: VariantValues, steps: int, longest: float) -> Truth | None:
+def _truth(study: Study, values: VariantValues, steps: int, longest: float, modes: int) -> Truth | None:
     """Two much finer marches of the same variants than one of so many steps; None where they take too long."""
-    number, level = next((k, one) for k, one in enumerate(levels(study, longest)) if one.steps == steps)
+    level = next(one for one in levels(study, longest, modes) if one.steps == steps)
     found = []
     for finer, wider in FINER:
-        model = build(study, int(FIRST_MODES * 2**number * wider)) if level.model.is_open else level.model
+        model = build(study, int(modes * wider)) if level.model.is_open else level.model
         while steps * finer * level.scheme.stability_limit < longest * model.highest_omega:
             finer *= 2
         count = steps * finer

@@ -84,6 +84,7 @@ def study() -> Study:
             "trolley": trolley | {"motion": {"kind": "cruise", "start": 0.4, "end": 1.9, "speed": 0.7}},
         },
         question={"duration": 1.0},
+        solver={"static_correction": False},  # `fields` are of modes alone
     )
 
 
