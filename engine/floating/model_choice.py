@@ -37,11 +37,13 @@ FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
 @dataclass(frozen=True, eq=False)
 class Rung:
     """The model of a scene's variants; modes: of bending, where these are open; left_out (R,): largest error of every
-    result, among pilots, by the model and these modes."""
+    result, among pilots, by the model and these modes; by_fixed (R,): by modes that the study fixes, which is told and
+    not held."""
 
     fidelity: Fidelity
     modes: int
     left_out: Array
+    by_fixed: Array
 
 
 class Pilots(NamedTuple):
@@ -65,7 +67,8 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     modes, left_out = _enough_modes(own)
     level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
-    full = Rung(Fidelity.FRAME, modes, left_out)
+    by_fixed = _by_fixed_modes(own, modes)
+    full = Rung(Fidelity.FRAME, modes, left_out, by_fixed)
     if study.solver.fidelity == "full" or not is_given(model, pilots):
         return full
     cheap, dear = (own.march(level, fidelity) for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME))
@@ -73,7 +76,7 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     known = ~np.isnan(apart).any(axis=0)  # what the floating frame itself has no values of tells nothing
     if not known.any() or (worst(apart, results, pilots)[known] > PART).any():
         return full
-    return Rung(Fidelity.GIVEN_FRAME, modes, left_out + apart[:, known].max(axis=1))
+    return Rung(Fidelity.GIVEN_FRAME, modes, left_out + apart[:, known].max(axis=1), by_fixed)
 
 
 def _enough_modes(pilots: Pilots) -> tuple[int, Array]:
@@ -106,6 +109,35 @@ def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
                 return modes, left[:, known].max(axis=1)
             change = apart
         modes, coarse = modes * MORE_MODES, fine
+
+
+def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
+    """(R,) the largest error, among pilots, by modes that the study fixes, from twice and four times as many; NaN where
+    none has an estimate; modes: where these are open."""
+    studies = [pilots.study, *(_with_more_modes(pilots.study, times) for times in (2, 4))]
+    model = build(pilots.study, modes)
+    found: Array = np.zeros(len(results_of(model)))
+    if studies[0].body == studies[1].body:
+        return found
+    for factor in FINER:
+        steps = usual_steps(model, pilots.longest) * factor
+        own = (Level(build(study, modes), steps, steps // STATIONS, UNLIMITED) for study in studies)
+        fixed, twice, four = (pilots.march(level) for level in own)
+        change = differences(model, fixed, twice)
+        found = np.fmax.reduce(change + left_over(differences(model, twice, four), change), axis=1)
+        if not np.isnan(found).any():
+            break
+    return found
+
+
+def _with_more_modes(study: Study, times: int) -> Study:
+    """The study with so many times the modes that it fixes."""
+    bodies = {name: body if body.modes_are_open else body.with_more_modes(times) for name, body in study.body.items()}
+    frames = {
+        name: frame.model_copy(update={key: times * getattr(frame, key) for key in ("lateral_modes", "axial_modes")})
+        for name, frame in study.frame.items()
+    }
+    return study.model_copy(update={"body": bodies, "frame": frames})
 
 
 def is_given(model: FloatingModel, values: VariantValues) -> bool:

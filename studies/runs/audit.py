@@ -283,7 +283,7 @@ def _more(results: Results) -> str:
     fixed = [name for name, body in results.study.body.items() if body.modes != "auto"]
     if not (keeps and fixed):
         return "more of everything"
-    return f"more steps (modes of {listed(fixed[:3])} are fixed: what they leave out is in no estimate)"
+    return f"more steps (modes of {listed(fixed[:3])} are fixed)"
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
