@@ -1,4 +1,5 @@
-"""Which variants that go to and fro have settled, and how far forward and backward differ in these."""
+"""How fast the start dies out of what goes to and fro, which variants have settled by the last cycle, and how far these
+differ forward and backward."""
 
 from typing import Annotated
 
@@ -14,14 +15,76 @@ from studies.protocol.study import question_of
 from studies.results.formatting import counted, percent
 from studies.results.results import Results
 
-LEFT_OVER = 0.05  # of the start's vibration in the last cycle: more, and the variant has not settled
-REMAINDER = "by the damping of the first mode"
+BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
+SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
+MOST = (
+    1000  # different bodies, masses and dampers in a sweep: a tenth of a second; of more it is not known with dampers
+)
+PLACES = 65  # along the way, at the heaviest of which the mass stands: there the vibration dies out the slowest
+REMAINDER = "by damping and with the carriage on its way"
 #: Of keys of swept numbers, with the end of their range at which a variant settles last.
 ENDS = (
     (".motion.speed", np.min, "from {} on"),
     (".motion.frequency", np.min, "from {} on"),
     (".damping_ratio", np.max, "up to {}"),
 )
+
+
+def decay_rates(results: Results) -> Array:
+    """1/s, for every variant; NaN where dampers damp the body in a way that is not known here.
+
+    Without dampers zeta_1 omega_1/(1 + m phi_1^2), phi_1 at the place of the way where it is largest.
+    """
+    zeta, first = (results.everywhere(v) for v in (theory.damping_ratio(results), theory.first_omega(results)))
+    mass, dampers = _mass(results), _dampers(results)
+    omega, shapes = theory.elastic_modes(results, results.carriage.motion.path(np.linspace(0.0, 1.0, PLACES)).S)
+    heaviest = shapes[np.abs(shapes[:, 0]).argmax(), :BASIS]
+    alone = zeta * first / (1.0 + mass * heaviest[0] ** 2)
+    damped = sum(dampers.values(), np.zeros(results.shape)) > 0.0
+    if not damped.any():
+        return np.asarray(alone)
+    columns = np.stack([part.reshape(-1) for part in (zeta, first, mass, *dampers.values())], axis=1)
+    rows, own = np.unique(columns, axis=0, return_inverse=True)
+    if len(rows) > MOST or any(isinstance(at, str) for at in dampers):
+        return np.where(damped, np.nan, alone)
+    held = theory.elastic_modes(results, np.array([float(at) for at in dampers]))[1][:, :BASIS]
+    found = np.array([_slowest(row, omega[:BASIS], heaviest, held) for row in rows])
+    return np.where(damped, found[own.reshape(-1)].reshape(results.shape), alone)
+
+
+def remainder_of_start(results: Results) -> Array:
+    """Part of the vibration of the start that is left in the last cycle of a motion to and fro, for every variant; NaN
+    where that is not known."""
+    return np.asarray(np.exp(-decay_rates(results) * theory.cycle_time(results) * (theory.cycles(results) - 1.0)))
+
+
+def _slowest(row: Array, frequencies: Array, heaviest: Array, held: Array) -> float:
+    """The slowest decay of (1 + m phi phi^T) q'' + (2 zeta omega + sum c psi psi^T) q' + omega^2 q = 0."""
+    zeta, first, mass, *dampers = row
+    omega, N = frequencies * first / frequencies[0], frequencies.size
+    inertia = np.eye(N) + mass * np.outer(heaviest, heaviest)
+    damping = np.diag(2.0 * zeta * omega) + held.T @ (np.array(dampers)[:, None] * held)
+    state = np.zeros((2 * N, 2 * N))
+    state[:N, N:] = np.eye(N)
+    state[N:] = -np.linalg.solve(inertia, np.concatenate([np.diag(omega**2), damping], axis=1))
+    values = np.linalg.eigvals(state)
+    return float(-values[np.argsort(np.abs(values))[:SLOW]].real.max())
+
+
+def _mass(results: Results) -> Array:
+    """kg that move with the track, for every variant; none of what is sprung."""
+    name, parts = results.carriage_name, results.carriage.touching
+    found = (results.everywhere(results.parameter(f"carriage.{name}.{part}")) for part in parts)
+    return sum(found, np.zeros(results.shape))
+
+
+def _dampers(results: Results) -> dict[float | str, Array]:
+    """Coefficients (N s/m) of the dampers under the first carriage's body, for every variant, by their place."""
+    name = results.carriage.on
+    return {
+        at: results.everywhere(results.parameter(f"body.{name}.{key}"))
+        for key, at, _ in results.study.body[name].dampers()
+    }
 
 
 class Asked(Spec):
@@ -39,8 +102,9 @@ def thresholds(results: Results) -> tuple[float, ...]:
 
 
 def settled(results: Results) -> Mask:
-    """The variants, in the sweep's shape, whose start has died out by the last cycle, or of which that is not known."""
-    return np.asarray(~(theory.remainder_of_start(results) > LEFT_OVER))
+    """The variants, in the sweep's shape, of whose start no more is left in the last cycle than the smallest odd part
+    that is asked for, or of which that is not known."""
+    return np.asarray(~(remainder_of_start(results) > thresholds(results)[0]))
 
 
 def odd_parts(results: Results) -> Array:
@@ -64,7 +128,7 @@ def where_late(results: Results, late: Mask) -> str:
 def told_unsettled(results: Results) -> list[str]:
     """How many marched variants still carry more of the vibration of the start in their last cycle than the study's
     tolerance, and with how many cycles they would not; nothing where none is known to."""
-    left, held = theory.remainder_of_start(results), results.study.solver.tolerance
+    left, held = remainder_of_start(results), results.study.solver.tolerance
     late = (left > held) & (results.dataset["fidelity_used"].values != int(Fidelity.STATIC))
     if not late.any():
         return []

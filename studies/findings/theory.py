@@ -105,24 +105,12 @@ def cycle_frequency(results: Results) -> Any:
     return results.parameter(f"{key}.speed") / motion.max_speed
 
 
-def remainder_of_start(results: Results) -> Array:
-    """Part of the vibration of the start that is left in the last cycle of a motion to and fro, for every variant.
-
-    exp(-zeta_1 omega_1 T (cycles - 1)) with the cycle's time T; NaN where only dampers damp the body, so that zeta_1
-    is not known. Where both do it is an upper bound. The body is
-    taken without the carriage, whose mass makes the vibration die out more slowly.
-    """
-    damping, omega = (results.everywhere(value) for value in (damping_ratio(results), first_omega(results)))
-    unknown = (damping == 0.0) & (_support_damping(results) > 0.0)
-    return np.where(unknown, np.nan, np.exp(-damping * omega * _cycle_time(results) * (cycles(results) - 1.0)))
-
-
 def cycles(results: Results) -> Array:
     """How many cycles every variant runs."""
     return _of_motion(results, "cycles")[0]
 
 
-def _cycle_time(results: Results) -> Array:
+def cycle_time(results: Results) -> Array:
     """How long a cycle takes, s, for every variant."""
     if results.study.carriage[results.carriage_name].motion.pace == "frequency":
         (frequency,) = _of_motion(results, "frequency")
@@ -144,7 +132,7 @@ def loaded_frequency(results: Results, mass_ratio: Array) -> Array:
     pinned beam <phi_1^2> is (1 + J0(2 pi a/L)) over the beam's mass.
     """
     tau = np.arange(CYCLE_POINTS) / CYCLE_POINTS
-    first = _first_shape(results, results.carriage.motion.path(tau).S)
+    first = elastic_modes(results, results.carriage.motion.path(tau).S)[1][:, 0]
     mass = body_mass(results, results.carriage.on)
     return np.asarray((1.0 + mass_ratio * mass * float(np.mean(first**2))) ** -0.5)
 
@@ -165,14 +153,16 @@ def _rigid_modes(results: Results) -> int:
     return _model(results, {}).leading_body.modal.rigid_modes
 
 
-def _first_shape(results: Results, places: Array) -> Array:
-    """(S,) shape of the first elastic mode of the first carriage's body at places (S,), kg^(-1/2)."""
-    recorded, number = results.recorded(results.carriage.on), _rigid_modes(results)
-    if recorded is not None:
-        return np.asarray(
-            interpolate.CubicSpline(recorded["position"].values, recorded["mode_shape"].values[number])(places)
-        )
-    return np.asarray(_model(results, {}).leading_body.modal.shape(places, 0)[:, number])
+def elastic_modes(results: Results, places: Array) -> tuple[Array, Array]:
+    """omega (N,), rad/s, of the first carriage's body without sweep, and its shapes (S, N) at places (S,) of its track,
+    kg^(-1/2); without motions as a rigid body."""
+    recorded = results.recorded(results.carriage.on)
+    if recorded is None:
+        modal = _model(results, {}).leading_body.modal
+        return modal.omega[modal.rigid_modes :], modal.shape(places, 0)[:, modal.rigid_modes :]
+    omega = 2.0 * np.pi * recorded["frequency"].values
+    shapes = interpolate.CubicSpline(recorded["position"].values, recorded["mode_shape"].values, axis=1)(places)
+    return omega[omega > 0.0], shapes[omega > 0.0].T
 
 
 def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:
@@ -219,13 +209,6 @@ def end_spring_difference(results: Results, sensor: str) -> Array | None:
     first, second = (results.parameter(f"{key}.supports.{i}.stiffness") for i in (0, 1))
     bending: Any = results.parameter(f"{key}.youngs_modulus") * results.parameter(f"{key}.second_moment")
     return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
-
-
-def _support_damping(results: Results) -> Array:
-    """Sum of the dampers (N s/m) under the first carriage's body, for every variant."""
-    name = results.carriage.on
-    keys = [f"body.{name}.{key}" for key, _, _ in results.study.body[name].dampers()]
-    return sum((results.everywhere(results.parameter(key)) for key in keys), np.zeros(results.shape))
 
 
 def _is_swept(results: Results, key: str) -> bool:

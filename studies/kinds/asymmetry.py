@@ -15,7 +15,7 @@ from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.absolute_errors import absolute_errors, told_error
-from studies.findings.settled import LEFT_OVER, REMAINDER, Asked, odd_parts, thresholds, where_late
+from studies.findings.settled import REMAINDER, Asked, odd_parts, remainder_of_start, thresholds, where_late
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
@@ -111,8 +111,8 @@ class Asymmetry(Kind):
         return AsymmetryReduction()
 
     def findings(self, results: Results) -> list[str]:
-        left = theory.remainder_of_start(results)
-        settled = ~(left > LEFT_OVER)
+        left = remainder_of_start(results)
+        settled = ~(left > thresholds(results)[0])
         answer, start = _answer(results), _start(results, left)
         said = [answer, start] if settled.any() else [start, answer]
         for sensor in list(results.sensors)[:MOST_SENSORS]:
@@ -143,16 +143,17 @@ def _start(results: Results, left: Array) -> str:
 
     left: what is left of it, in the sweep's shape, NaN where that is not known.
     """
-    known, late = np.isfinite(left), left > LEFT_OVER
+    known, most = np.isfinite(left), thresholds(results)[0]
+    late = left > most
     if not known.any():
-        return "How much of the start is left in the last cycle is not known, as only dampers damp the body."
-    unknown = f" In {counted(int((~known).sum()), 'variant')} with dampers alone it is not known." * (not known.all())
+        return "How much of the start is left in the last cycle is not known, with these dampers."
+    unknown = f" In {counted(int((~known).sum()), 'variant')} with dampers it is not known." * (not known.all())
     if not late.any():
-        most = f"at most {percent(float(left[known].max()))} of the start is left, {REMAINDER}"
+        told = f"at most {percent(float(left[known].max()))} of the start is left, {REMAINDER}"
         who = "every variant" if known.all() else "every other variant"
-        return f"In the last cycle {most}: {who} has settled.{unknown}"
+        return f"In the last cycle {told}: {who} has settled.{unknown}"
     where = where_late(results, late)
-    told = f"more than {percent(LEFT_OVER)} of the start is left in the last cycle, {REMAINDER}{where}"
+    told = f"more than {percent(most)} of the start is left in the last cycle, {REMAINDER}{where}"
     if late.all():
         return f"No variant has settled: {told}. What follows holds the start too; run more cycles or with damping."
     count = f"In {int(late.sum()):,} of {counted(results.size, 'variant')}"

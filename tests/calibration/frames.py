@@ -197,7 +197,7 @@ def judged(seed: int, tolerance: float, number: int) -> Judged:
         model, finer, finest = truth
         held = np.array([np.isfinite(result.tolerance) for result in results_of(model)])
         apart, doubt = (differences(model, one, finest)[held] / tolerance for one in (found.outcome.of(own), finer))
-        told = found.error[:, own][held] / tolerance
+        told = (found.error[:, own] - rung.by_fixed[:, None])[held] / tolerance  # the truth keeps these
         for v in np.flatnonzero(~np.isnan(apart).any(axis=0)):
             marked = bool(found.status[own[v]] != Status.OK)
             rows.append(row_of(number, study_of(number), marked, apart[:, v], told[:, v], doubt[:, v]))
