@@ -197,6 +197,10 @@ class Body(SpecOfKind):
         remedy = f"{where} = false{along * (direction == 'along')}"
         raise BadInput(what, where=where, expected=expected, remedy=remedy)
 
+    def deflects_down(self, point: str | None = None) -> bool:
+        """Whether displacements of its track, or of a named point of it, count along gravity."""
+        return True
+
     @property
     def lacks_for_stress(self) -> str:
         """The key within the body that stress and strain need and that is not given, or ""."""
