@@ -108,7 +108,7 @@ def _map(seen: View, sensor: str) -> Figure:
     best = extreme(seen.cut(gain(results, sensor)))
     assert best is not None
     peak = float(seen.cut(gain(results, sensor)).values[best])
-    title = f"{sensor.replace('_', ' ')}: statics are exceeded {number(peak)} times at most"
+    title = f"{sensor.replace('_', ' ')}: dynamic over static is {number(peak)} at most"
     return draw("amplification-map", title, seen.caption(), 3.4, partial(_draw_map, seen, sensor))
 
 

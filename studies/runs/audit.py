@@ -23,7 +23,7 @@ from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
 from studies.protocol.stopping import AskedElsewhere
 from studies.results.cells import words_of
-from studies.results.formatting import counted, listed, number, percent, scientific
+from studies.results.formatting import counted, listed, percent, scientific, times
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -274,7 +274,7 @@ def _of_marked(verdict: Verdict, results: Results) -> str:
     said = f"{audit} computed again with {_more(results)}"
     if not verdict.marked_worst >= 0.0:
         return f"{said}: no number could be compared"
-    return f"{said}: the largest difference is {number(verdict.marked_worst, 2)} times the tolerance"
+    return f"{said}: the largest difference is {times(verdict.marked_worst, 'the tolerance', 2)}"
 
 
 def _more(results: Results) -> str:
