@@ -43,6 +43,11 @@ def told_trains(study: Study) -> list[tuple[str, str]]:
     ]
 
 
+def has_dampers(study: Study, body: str) -> bool:
+    """Whether damping ratios of a body's modes leave some of its damping out."""
+    return any(coefficient > 0.0 for _, _, coefficient in study.dampers(body))
+
+
 def told_hanging(results: Results, sensors: Sequence[str]) -> str:
     """Of which sensors of a figure displacements point down, as a sentence; "" where none does."""
     down = [name for name in sensors if results.hangs(name)]
