@@ -113,10 +113,19 @@ def test_an_amplification_that_is_the_same_all_over_is_a_sentence() -> None:
 
 
 @pytest.mark.parametrize(("key", "is_map"), [("force", False), ("mass", True)])
-def test_a_map_is_drawn_where_both_axes_tell(key: str, is_map: bool) -> None:
-    """A force multiplies all that it does, so that amplifications are those of the speed alone."""
-    kind = f"[carriage.table]\non = 'bed'\nkind = '{key}'\n{key} = 100.0"
-    text = scenes.text_of("passage").replace('[carriage.table]\non = "bed"\nkind = "mass"\nmass = 100.0', kind)
+@pytest.mark.parametrize(("kind", "name"), [("passage", "amplification-map"), ("asymmetry", "odd-map")])
+def test_a_map_is_drawn_where_both_axes_tell(kind: str, name: str, key: str, is_map: bool) -> None:
+    """A force multiplies all that it does, so that ratios are those of the speed alone."""
+    load = f"[carriage.table]\non = 'bed'\nkind = '{key}'\n{key} = 100.0"
+    text = scenes.text_of(kind).replace('[carriage.table]\non = "bed"\nkind = "mass"\nmass = 100.0', load)
     other = f'other = {{ of = "carriage.table.{key}", from = 100, to = 800, count = 7 }}'
-    found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace('passage', 1.0, 12.0)}\n{other}"))
-    assert ("amplification-map" in found) == is_map
+    found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace(kind, 1.0, 12.0)}\n{other}"))
+    assert (name in found) == is_map
+
+
+def test_contact_forces_that_a_swept_number_hardly_changes_are_curves() -> None:
+    damping = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.012] }'
+    text = scenes.text_of("passage").replace("mass = 100.0", "mass = 600.0")
+    found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace('passage', 1.0, 12.0)}\n{damping}"))["contact-table"]
+    assert "Nearly the same for zeta 0.01 to 0.012." in found.caption
+    assert found.drawing.axes[0].get_lines() and not found.drawing.axes[0].collections
