@@ -1,6 +1,7 @@
 """The study files that come with the program: built-in studies, and commented files to start from."""
 
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from studies.protocol.study import KINDS
 LIBRARY = Path(__file__).parents[1] / "library"
 STARTS = Path(__file__).parents[1] / "study_templates"
 MEASURED = LIBRARY / "measured.json"  # what `python -m tests.gallery` found of every built-in study
+COMMAND = "#     wanderlast "  # how a line with an example command begins
 EVERY_STUDY = STARTS / "every-study.part"
 
 
@@ -107,6 +109,22 @@ def start_text(kind: str) -> str:
         what, remedy = "no such kind of study, or none with a file to start from", _nearest(kind, known)
         raise BadInput(what, where=kind, expected=f"one of {', '.join([*known, *KINDS.foreign])}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
+
+
+def for_file(text: str, kind: str, path: Path) -> str:
+    """The text of a study file to start from, with the name of the file at `path` in its example commands.
+
+    >>> print(for_file("#     wanderlast run bed     the archive bed.nc\\n# bed", "bed", Path("slide.toml")))
+    #     wanderlast run slide.toml     the archive slide.nc
+    # bed
+    """
+    own = re.compile(rf"(?<![\w-]){re.escape(kind)}(\.toml|\.nc)?(?![\w-])")
+
+    def named(found: re.Match[str]) -> str:
+        return f"{path.stem}.nc" if found[1] == ".nc" else path.name
+
+    lines = text.split("\n")
+    return "\n".join(own.sub(named, line) if line.startswith(COMMAND) else line for line in lines)
 
 
 def _files(folder: Path) -> Mapping[str, Path]:

@@ -57,7 +57,7 @@ def init(kind: str, file: Path | None) -> None:
 
     text, path = catalogue.start_text(kind), file or Path(f"{kind}.toml")
     files.check_new_place(path)
-    files.write_text(path, text)
+    files.write_text(path, catalogue.for_file(text, kind, path))
     console.say(f"wrote {path}; next: wanderlast check {path}")
 
 

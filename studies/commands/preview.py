@@ -25,7 +25,7 @@ from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
-from studies.results.findings_common import told_trains
+from studies.results.findings_common import has_dampers, told_trains
 from studies.results.formatting import (
     counted,
     duration,
@@ -176,7 +176,8 @@ def _bodies(base: SceneModel) -> TextTable:
         ratios = rates[elastic] / (2.0 * omega[elastic])
         shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
         more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
-        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, spanned(ratios)))
+        damping = f"{spanned(ratios)}{' without its dampers' * has_dampers(base.study, part.name)}"
+        rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, damping))
     return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 

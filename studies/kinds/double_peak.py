@@ -24,7 +24,7 @@ from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
-from studies.results.formatting import MINUS, counted, listed, number, percent
+from studies.results.formatting import MINUS, counted, listed, number, percent, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -292,10 +292,10 @@ def _amplified(results: Results, sensor: str) -> list[str]:
         return []
     result = f"dynamic_amplification {sensor}"
     loosely = with_own_weight(results.study, sensor) + uncertainty(results, result, top)
-    said = f"{sensor}: at most {number(float(gain[top]), 4)} times the static value{loosely}{in_words(results, top)}"
+    said = f"{sensor}: at most {times(float(gain[top]), 'the static value', 4)}{loosely}{in_words(results, top)}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]
-    below = f"below {number(SLOW)} of the first natural frequency at most {number(float(gain[slow]), 4)} times"
+    below = f"below {number(SLOW)} of the first natural frequency at most {times(float(gain[slow]), digits=4)}"
     below += uncertainty(results, result, slow)
     return [f"{said}; {below}{in_words(results, slow)}{_rule(results, sensor, slow)}."]
 

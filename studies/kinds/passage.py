@@ -11,7 +11,13 @@ from results_schema.arrays import Array, Mask
 from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import absolute_errors, weight
-from studies.findings.amplification import DYNAMIC_AMPLIFICATION, largest, sizes, with_amplification, with_own_weight
+from studies.findings.amplification import (
+    DYNAMIC_AMPLIFICATION,
+    largest,
+    sizes,
+    with_amplification,
+    with_own_weight,
+)
 from studies.findings.between_speeds import told_between_speeds
 from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
 from studies.findings.effects import told_effects, unchanged
@@ -20,7 +26,7 @@ from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
-from studies.results.formatting import counted, listed, number, quantity
+from studies.results.formatting import counted, listed, number, quantity, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -103,7 +109,7 @@ def _largest(results: Results, sensor: str) -> str:
     if best is None:
         return f"{said}{where}."
     static = sizes(results, sensor)[best] / gain[best]
-    amplified = f"{number(float(gain[best]))} times the static {quantity(float(static), results.sensors[sensor])}"
+    amplified = times(float(gain[best]), f"the static {quantity(float(static), results.sensors[sensor])}")
     amplified += with_own_weight(results.study, sensor)
     if best == top:
         return f"{said}, {amplified},{where}."

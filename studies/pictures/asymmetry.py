@@ -52,9 +52,17 @@ def pictures(results: Results) -> list[Figure]:
     if seen.x is not None:
         found += [_lag(seen, sensors, more), _parts(seen, sensors, more)]
         by_mass = view(results, SPEEDS, MASSES, top)
-        if by_mass.y is not None and np.nanmax(_odd(by_mass, sensors[0]), initial=0.0) > BANDS[0] / 100.0:
+        if by_mass.y is not None and _has_map(by_mass, seen, sensors[0]):
             found.append(_map(by_mass, sensors[0]))
     return found
+
+
+def _has_map(by_mass: View, seen: View, sensor: str) -> bool:
+    """Whether the odd part has a map: not where curves say already that the second axis changes nothing."""
+    assert by_mass.y is not None
+    least, odd = BANDS[0] / 100.0, by_mass.results.of_sensor("odd_rms", sensor)
+    told = by_mass.y is seen.y and by_mass.most_along(by_mass.y, odd) <= least
+    return not told and bool(np.nanmax(_odd(by_mass, sensor), initial=0.0) > least)
 
 
 def _odd(seen: View, sensor: str) -> Array:

@@ -40,7 +40,7 @@ LEAST_RATIO = 1e-6  # below, ratios are rounding
 RATIOS = {  # file name, title and caption of the figure of each
     "dynamic_amplification": (
         "amplification",
-        "Statics are exceeded {} times at most, in {}",
+        "Dynamic over static is {} at most, in {}",
         "Largest absolute value in the last cycle over the largest absolute static value.",
     ),
     "odd_even_ratio": (

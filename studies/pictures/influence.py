@@ -11,6 +11,7 @@ from studies.at_rest.findings import READING_WANTED, contacts_vary, reading_erro
 from studies.pictures import at_rest
 from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve
+from studies.results.findings_common import told_hanging
 from studies.results.formatting import quantity, scale_for
 from studies.results.places import chosen, spread
 from studies.results.results import Results
@@ -46,7 +47,7 @@ def _curves(results: Results, name: str) -> list[Curve]:
 
 def _readings(results: Results, sensors: list[str]) -> Figure:
     seen = at_rest.swept(results)
-    texts = ["Everything at rest: displacements point down, as gravity does."]
+    texts = ["Everything at rest.", told_hanging(results, sensors)]
     if any(f"{name}_unreduced" in results.dataset for name in sensors):
         texts.append("Circles are the unreduced finite-element model" + (", without the sweep." if seen else "."))
     if seen is not None:

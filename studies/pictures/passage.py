@@ -23,6 +23,7 @@ from studies.pictures.common.sweep_view import (
     MOST_CURVES,
     SPEEDS,
     View,
+    alone,
     along_axis,
     draw_curves,
     draw_map,
@@ -56,7 +57,7 @@ def pictures(results: Results) -> list[Figure]:
                 continue  # the findings say so
             asked = not first or limits.limit(name) is not None
             (first if asked else others).append(_sizes(results, own, limits.limit(name)))
-        if seen.y is not None and len(seen.y.values) > MANY and _varies(seen, gain(results, sensors[0])):
+        if seen.y is not None and len(seen.y.values) > MANY and _is_telling(seen, gain(results, sensors[0])):
             first.append(_map(seen, sensors[0]))
         touching = [name for name in results.study.carriage if _has_contact(seen, name)]
         first += [_contact(seen, touching)] if touching else []
@@ -90,6 +91,11 @@ def _varies(seen: View, values: Any) -> bool:
     return bool(known.size and np.ptp(known) > FLAT)
 
 
+def _is_telling(seen: View, values: Any) -> bool:
+    """Whether ratios differ so along both axes: a map with stripes says no more than curves."""
+    return all(seen.most_along(axis, values) > FLAT for axis in (seen.x, seen.y) if axis is not None)
+
+
 def _has_contact(seen: View, carriage: str) -> bool:
     """Whether there is a force of a carriage that varies; what is the same everywhere the findings say."""
     inertial = seen.results.study.carriage[carriage].inertial
@@ -102,7 +108,7 @@ def _map(seen: View, sensor: str) -> Figure:
     best = extreme(seen.cut(gain(results, sensor)))
     assert best is not None
     peak = float(seen.cut(gain(results, sensor)).values[best])
-    title = f"{sensor.replace('_', ' ')}: statics are exceeded {number(peak)} times at most"
+    title = f"{sensor.replace('_', ' ')}: dynamic over static is {number(peak)} at most"
     return draw("amplification-map", title, seen.caption(), 3.4, partial(_draw_map, seen, sensor))
 
 
@@ -116,11 +122,15 @@ def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
 def _contact(seen: View, carriages: list[str]) -> Figure:
     """One figure for all carriages: a curve for each, or of many, and in maps, the smallest of all."""
     force, several = _smallest_force(seen, carriages), len(carriages) > 1
+    alike = ""
+    if seen.y is not None and not seen.is_sampled and seen.most_along(seen.y, force) <= FLAT:
+        alike, seen = f"Nearly the same for {seen.y.noun} {seen.y.span}.", alone(seen)
     line = "; the line is where that begins" if _has_line(seen, force) else ""
     caption = seen.caption(
         "Smallest contact force over the weight, without the last 2 % of a way towards a held end.",
         f"Of {len(carriages)} carriages the smallest." if several and not _apart(seen, carriages) else "",
         f"Below zero the carriage would lift off{line}.",
+        alike,
     )
     least = float(np.nanmin(seen.plane(force)))
     who, keeps, its = (f"{len(carriages)} carriages", "keep", "their") if several else (carriages[0], "keeps", "its")

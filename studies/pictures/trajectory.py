@@ -15,6 +15,7 @@ from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, 
 from studies.pictures.common.sweep_view import Curve, coincide
 from studies.pictures.common.traces import coarse, picked
 from studies.protocol.study import question_of
+from studies.results.findings_common import told_hanging
 from studies.results.formatting import ALIKE, quantity, scale_for
 from studies.results.places import Index, chosen
 from studies.results.results import Results
@@ -39,7 +40,7 @@ def _over_time(results: Results) -> list[Figure]:
     more = f" {left_out} more sensors are in the archive." if left_out else ""
     many = f"{len(shown)} of {len(results.traced())} kept histories." if len(results.traced()) > len(shown) else ""
     units = {name: results.sensors[name] for name in sensors}
-    hang = " Displacements point down, as the body hangs." if any(map(results.hangs, sensors)) else ""
+    hang = f" {said}" if (said := told_hanging(results, sensors)) else ""
     title = ranging(results, sensors[0], units[sensors[0]], shown)
     fine = coarse(results, results.trace(sensors[0], shown[0]).times)
     found = [histories(results, "sensors", title, f"{many}{more}{hang}{fine}", units, shown)]

@@ -34,7 +34,7 @@ from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
-from studies.results.findings_common import told_trains
+from studies.results.findings_common import has_dampers, told_trains
 from studies.results.formatting import counted, number, percent, quantity, spanned, swept_quantity, typed_speed
 
 PAGE = "drawing.html"
@@ -123,7 +123,8 @@ def _of_body(model: SceneModel, body: Placed) -> Shapes:
         if omega.size > len(shown)
         else "All its modes, without carriages"
     )
-    return Shapes(f"Mode shapes of {name}", f"{kept}; grey: at rest.", shown)
+    beside = " Damping is of the body alone: its dampers come on top." * has_dampers(model.study, name)
+    return Shapes(f"Mode shapes of {name}", f"{kept}; grey: at rest.{beside}", shown)
 
 
 def _of_whole(model: SceneModel) -> Iterator[Shapes]:

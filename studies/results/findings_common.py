@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from engine.scene.carriages import Carriage
@@ -39,6 +41,32 @@ def told_trains(study: Study) -> list[tuple[str, str]]:
         )
         for name, train in study.train.items()
     ]
+
+
+def has_dampers(study: Study, body: str) -> bool:
+    """Whether damping ratios of a body's modes leave some of its damping out."""
+    return any(coefficient > 0.0 for _, _, coefficient in study.dampers(body))
+
+
+def told_hanging(results: Results, sensors: Sequence[str]) -> str:
+    """Of which sensors of a figure displacements point down, as a sentence; "" where none does."""
+    down = [name for name in sensors if results.hangs(name)]
+    sideways = [name for name in sensors if results.sensors[name] == "m" and name not in down]
+    return hanging(down, sideways)
+
+
+def hanging(down: Sequence[str], sideways: Sequence[str]) -> str:
+    """The same of names whose displacements count along gravity, and of others.
+
+    >>> hanging(["bed", "table"], ["sway"])
+    'Displacements point down for bed and table, as the body hangs; others count along directions of their own.'
+    >>> hanging(["bed", "table"], []), hanging([], ["sway"])
+    ('Displacements point down, as the body hangs.', '')
+    """
+    if not down or not sideways:
+        return "Displacements point down, as the body hangs." if down else ""
+    names = listed([name.replace("_", " ") for name in down])
+    return f"Displacements point down for {names}, as the body hangs; others count along directions of their own."
 
 
 def in_words(results: Results, index: Index) -> str:

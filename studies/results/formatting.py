@@ -104,6 +104,18 @@ def quantity(value: float, units: str, digits: int = 3, beside: float = 0.0) -> 
     return f"{text} {scale.unit}" if scale.unit else text
 
 
+def times(ratio: float, of: str = "", digits: int = 3) -> str:
+    """A ratio in words; of: over what it is, where that is said.
+
+    >>> times(1.264, "the static value"), times(1.00001, "the static value"), times(1.00001)
+    ('1.26 times the static value', 'as large as the static value', 'as large')
+    """
+    text = number(ratio, digits)
+    if text == "1":
+        return f"as large as {of}" if of else "as large"
+    return f"{text} times {of}".strip()
+
+
 def percent(part: float, digits: int = 2) -> str:
     """A part in percent.
 

@@ -182,8 +182,14 @@ class Results:
         return f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
 
     def hangs(self, sensor: str) -> bool:
-        """Whether it reads a displacement along the loads, which points down as the body hangs."""
-        return self.sensors[sensor] == "m" and self.study.sensor[sensor].direction is None
+        """Whether it reads a displacement along gravity, which points down as the body hangs."""
+        own, body = self.study.sensor[sensor], self.study.body[self.study.body_of(sensor)]
+        along_gravity = own.node is not None or own.member is not None or body.deflects_down(own.point)
+        return self.sensors[sensor] == "m" and own.direction is None and along_gravity
+
+    def hangs_along(self, envelope: str) -> bool:
+        """The same of an envelope."""
+        return self.envelopes[envelope] == "m" and self.study.body[self.study.envelope[envelope].body].deflects_down()
 
     def label(self, sensor: str, unit: str, of: str = "") -> str:
         """Quantity, place and unit of a sensor as on a figure's axis, in lines that fit beside a panel."""

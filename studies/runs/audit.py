@@ -23,7 +23,7 @@ from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.protocol.parts import Work
 from studies.protocol.stopping import AskedElsewhere
 from studies.results.cells import words_of
-from studies.results.formatting import counted, listed, number, percent, scientific
+from studies.results.formatting import counted, listed, percent, scientific, times
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -42,6 +42,10 @@ REASONS = (
 )
 NONE_AUDITED = f"no variant was audited: {REASONS}"
 NONE_COMPARED = f"no variant was audited: those drawn for it have no values, {REASONS}"
+NONE_OF_THOSE_ASKED = (
+    "no variant was audited, though audit = {}: those drawn for it have no values, or nothing finer than what they "
+    "were computed with is left, or the study was run from Python, which audits none"
+)
 
 
 def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
@@ -216,7 +220,8 @@ class Verdict:
 def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
     """What was asked, estimated and observed, and what is far from exact as nothing holds it; "" where no estimates
     are."""
-    said = (_held_accuracy(group, results), told_errors(results), _not_held(results))
+    fewer = [] if group is None else [f"{text[0].upper()}{text[1:]}." for text in _fewer(Verdict.of(group), results)]
+    said = (_held_accuracy(group, results), *fewer, told_errors(results), _not_held(results))
     return " ".join(text for text in said if text)
 
 
@@ -248,7 +253,30 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     errors = "estimated errors" if fine.all() else "estimated errors of those that are ok"
     found = f"{errors} at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"
     said = f"{found} where {_span(tolerances)} was asked"
-    return f"{said}; {'no variant was audited.' if group is None else _compared(group, results)}"
+    return f"{said}; {_none(results) if group is None else _compared(group, results)}"
+
+
+def _none(results: Results) -> str:
+    """In a few words that no variant was audited, and why; `told_audit` says it at length."""
+    reasons = {
+        0: "as the study asks for none",
+        "auto": "as it would have taken too long, or nothing finer is left (audit = 20 audits 20 all the same)",
+    }
+    asked = results.study.solver.audit
+    though = f"though audit = {asked}: nothing finer is left, or those drawn have no values"
+    return f"no variant was audited, {reasons.get(asked, though)}."
+
+
+def _fewer(verdict: Verdict, results: Results) -> list[str]:
+    """Why fewer variants were audited than were picked, or than the study asks for, in sentences."""
+    asked, drawn, told = results.study.solver.audit, verdict.count + verdict.marked + verdict.left_out, list[str]()
+    if verdict.left_out:
+        more = counted(verdict.left_out, "further variant")
+        told.append(f"{more} picked for the audit could not be compared: without values, or nothing finer is left")
+    if asked != "auto" and drawn < asked:
+        others = "" if drawn == results.variants else " but for those by which models were chosen for others"
+        told.append(f"audit = {asked} asks for more variants than there are{others}")
+    return told
 
 
 def _span(tolerances: Array) -> str:
@@ -259,7 +287,7 @@ def _compared(group: xr.Dataset, results: Results) -> str:
     """In words what the group says of variants that the archive calls ok."""
     verdict = Verdict.of(group)
     if not verdict.count:
-        return f"{_of_marked(verdict, results)}." if verdict.marked else "no variant was audited."
+        return f"{_of_marked(verdict, results)}."
     audit = f"{counted(verdict.count, 'variant')} computed again with {_more(results)}"
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
@@ -274,7 +302,7 @@ def _of_marked(verdict: Verdict, results: Results) -> str:
     said = f"{audit} computed again with {_more(results)}"
     if not verdict.marked_worst >= 0.0:
         return f"{said}: no number could be compared"
-    return f"{said}: the largest difference is {number(verdict.marked_worst, 2)} times the tolerance"
+    return f"{said}: the largest difference is {times(verdict.marked_worst, 'the tolerance', 2)}"
 
 
 def _more(results: Results) -> str:
@@ -287,11 +315,12 @@ def _more(results: Results) -> str:
 
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
-    """What the group says, in sentences; where there is none, that no variant was audited if the study left it open."""
+    """What the group says, in sentences; where there is none, why no variant was audited if the study asks for some."""
+    asked = results.study.solver.audit
     if group is None:
-        left_open = is_marched(results.dataset) and results.study.solver.audit == "auto"
         reason = NONE_AUDITED if bool(results.kept.all()) else NONE_COMPARED
-        return [reason] if left_open and bool(results.kept.any()) else []
+        reason = reason if asked == "auto" else NONE_OF_THOSE_ASKED.format(asked)
+        return [reason] if asked != 0 and is_marched(results.dataset) and bool(results.kept.any()) else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:
@@ -300,10 +329,7 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
         told.append(f"{counted(verdict.unknown, 'variant')} could not be compared, which counts as not held")
     if verdict.marked:
         told.append(_of_marked(verdict, results))
-    if verdict.left_out:
-        more = counted(verdict.left_out, "further variant")
-        told.append(f"{more} picked for the audit could not be compared: without values, or nothing finer is left")
-    return told
+    return [*told, *_fewer(verdict, results)]
 
 
 def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:

@@ -356,6 +356,14 @@ def test_init_writes_a_study_that_runs(here: Path, kind: str, capsys: Captured) 
     assert f"{kind}.toml" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("kind", ["passage", "machine-bed-run"])
+def test_init_names_its_own_file_in_its_commands(here: Path, kind: str) -> None:
+    assert main(["init", kind, "slide.toml"]) == 0
+    commands = [line for line in (here / "slide.toml").read_text().splitlines() if line.startswith("#     wanderlast")]
+    assert any("run slide.toml" in line for line in commands) and any("slide.nc" in line for line in commands)
+    assert not any(kind in line for line in commands)
+
+
 def test_the_first_study_that_people_run_ends_well(here: Path) -> None:
     assert main(["init", "passage"]) == 0
     assert main(["run", "passage.toml"]) == 0

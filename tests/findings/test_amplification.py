@@ -8,6 +8,7 @@ import studies
 from engine.scene.study import Study, load
 from studies.findings.amplification import sizes, with_derived_errors
 from studies.protocol.study import kind_of
+from studies.reporting import answers
 from studies.results.results import Results
 from tests.studies import scenes
 
@@ -39,6 +40,14 @@ def test_the_answer_says_that_own_weight_counts_in_an_amplification(kind: str) -
         assert ("(own weight in both)" in said) == (study is heavy)
     sag = 5.0 * 7850.0 * 0.01 * 9.80665 * 10.0**4 / (384.0 * 210e9 * 8e-6)
     assert static[1] - static[0] == pytest.approx(sag, rel=1e-3)
+
+
+def test_an_answer_says_as_large_where_nothing_is_amplified() -> None:
+    """A static passage of masses was told to be "1 times the static 35.7 µm"."""
+    masses = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+    dataset = studies.run(load(scenes.text_of("passage", masses, extra="[solver]\nfidelity = 'static'")))
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert " as large as the static " in said and " 1 times" not in said
 
 
 def study_of(kind: str, own_weight: str) -> Study:

@@ -17,11 +17,12 @@ from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from studies.commands import catalogue
-from studies.commands.preview import FREQUENCIES_SHOWN
+from studies.commands.preview import FREQUENCIES_SHOWN, preview
 from studies.pictures.common.figures import MUTED
 from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
 from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, in_a_row, layout, starts
+from studies.protocol.study import kind_of
 from studies.reporting.drawing import PAGE, page_of, write_drawing
 from studies.results.formatting import number
 from tests.bodies import models
@@ -31,6 +32,7 @@ from tests.engine.build import Table, beam, cruise, force, mass, shuttle, study,
 from tests.floating.scenes import ARM, history, steps
 from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
 from tests.robots.scenes import marched, scene
+from tests.studies import scenes
 
 STUDIES = {f"built-in {name}": path for name, path in catalogue.built_in().items()}
 STARTS = {f"start {kind}": catalogue.start_text(kind) for kind in catalogue.starts()}
@@ -267,6 +269,17 @@ def test_top_speeds_are_those_of_the_sweep() -> None:
     }
     (table,) = (table for table in page_of(study(beam(), CAR, sweep=sweep), ()).tables if table.title == "Carriages")
     assert table.rows[0][-1] == "1 m/s to 3 m/s"
+
+
+@pytest.mark.parametrize("damping", [0.0, 2e3])
+def test_it_is_said_that_dampers_come_on_top_of_damping_ratios(damping: float) -> None:
+    """By drawings and by `check`, where there are such."""
+    mounts = ", ".join(f"{{ at = {at}, stiffness = 1e6, damping = {damping} }}" for at in (0.0, 10.0))
+    given = engine.load(scenes.text_of("passage").replace('"pinned-pinned"', f"[{mounts}]"))
+    words = "Damping is of the body alone: its dampers come on top."
+    assert (words in page_of(given, []).shapes[0].note) == (damping > 0.0)
+    tables = {table.title: table for table in preview(kind_of(given).parts(given), 1).tables}
+    assert (tables["Bodies"].rows[0][-1] == "0.03 without its dampers") == (damping > 0.0)
 
 
 def test_bodies_that_nothing_uses_are_told() -> None:

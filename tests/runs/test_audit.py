@@ -27,6 +27,7 @@ from studies.runs.audit import (
     GROUP,
     NONE_AUDITED,
     NONE_COMPARED,
+    NONE_OF_THOSE_ASKED,
     Verdict,
     as_json,
     audit_group,
@@ -142,10 +143,23 @@ def test_variants_without_values_are_left_out_and_counted() -> None:
         "1 further variant picked for the audit could not be compared: without values, or nothing finer is left"
     )
     assert audit_group(plan, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
-    assert told_audit(None, Results.of(dataset)) == []
+    assert told_audit(None, Results.of(dataset)) == [NONE_OF_THOSE_ASKED.format(4)]
     auto = studies.run(crossing(RICH, {}))
     auto["status"].values.reshape(-1)[0] = Status.DIVERGED
     assert told_audit(None, Results.of(auto)) == [NONE_COMPARED]
+
+
+def test_it_is_said_why_fewer_variants_are_audited_than_were_asked_for() -> None:
+    plan = make_plan(crossing(RICH, FINE | {"audit": 50}))
+    results = Results.of(studies.run(plan.study))
+    group = audit_group(plan, results.dataset, Work(1))[GROUP]
+    said = told_accuracy(group, results)
+    assert "6 variants computed again" in said and "Audit = 50 asks for more variants than there are." in said
+    assert told_audit(group, results)[-1] == "audit = 50 asks for more variants than there are"
+    assert "no variant was audited, though audit = 50: nothing finer is left" in told_accuracy(None, results)
+    none = Results.of(studies.run(crossing(RICH, FINE | {"audit": 0})))
+    assert told_audit(None, none) == []
+    assert "no variant was audited, as the study asks for none." in told_accuracy(None, none)
 
 
 def test_what_the_archive_marks_itself_is_told_apart() -> None:

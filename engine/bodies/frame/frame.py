@@ -213,6 +213,10 @@ class Frame(Body):
         """The direction in which loads act on the track."""
         return self.gravity if self.track.direction is None else self.track.direction
 
+    def deflects_down(self, point: str | None = None) -> bool:
+        way = self.direction if point is None else self.point[point].direction
+        return way is None or bool(np.allclose(unit(way), unit(self.gravity)))
+
     @property
     def lacks_for_stress(self) -> str:
         for name, _ in self.line.members:

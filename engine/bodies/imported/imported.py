@@ -132,6 +132,10 @@ class Imported(Body):
         """The direction in which loads act on the track."""
         return self.gravity_direction if self.track.direction is None else self.track.direction
 
+    def deflects_down(self, point: str | None = None) -> bool:
+        way = self.direction if point is None else self.point[point].direction
+        return way is None or bool(np.allclose(unit(way), unit(self.gravity_direction)))
+
     @property
     def untold(self) -> tuple[str, ...]:
         return tuple(word for word in OF_SECTION if word not in self.recovered)

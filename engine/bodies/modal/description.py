@@ -188,9 +188,18 @@ class Body(SpecOfKind):
     def check_inertia(self, direction: Direction) -> None:
         """Raise BadInput where the inertia of what rides cannot act in a direction."""
         where = f"inertia_{direction}"
-        what = f"this body does not move {direction} its own track"
+        what = f"this body does not move {direction} its own track, so its deflection does not depend on this key"
         expected = "a frame, or a body out of finite-element files" + " in space" * (direction == "across")
-        raise BadInput(what, where=where, expected=expected, remedy=f"{where} = false")
+        along = (
+            "; the drive still pushes the body along by -m s'', straight into its supports. For a body that sways"
+            ' take kind = "frame", with springs or legs that give way along the track'
+        )
+        remedy = f"{where} = false{along * (direction == 'along')}"
+        raise BadInput(what, where=where, expected=expected, remedy=remedy)
+
+    def deflects_down(self, point: str | None = None) -> bool:
+        """Whether displacements of its track, or of a named point of it, count along gravity."""
+        return True
 
     @property
     def lacks_for_stress(self) -> str:

@@ -19,9 +19,11 @@ from studies.pictures.common.figures import (
     limit_far,
     limit_line,
     shades,
+    telling_limits,
     zero_line,
 )
 from studies.pictures.common.sizes import FAR
+from studies.results.findings_common import hanging
 from studies.results.formatting import Scale, counted, quantity, scale_for
 from studies.results.places import Index, spread
 from studies.results.results import Results
@@ -40,7 +42,8 @@ def pictures(results: Results) -> list[Figure]:
     height = 0.8 + 2.1 * len(shown)
     title = f"{largest_along(results, names[0])}{_against(results, names[0])}"
     title = f"{title[0].upper()}{title[1:]}"
-    return [draw("envelopes", title, _caption(results, names, shown), height, partial(_draw, results, shown))]
+    caption, fill = _caption(results, names, shown), partial(_draw, results, shown)
+    return [telling_limits(draw("envelopes", title, caption, height, fill))]
 
 
 def _limit(results: Results, name: str) -> float | None:
@@ -60,11 +63,12 @@ def _caption(results: Results, names: list[str], shown: list[str]) -> str:
     held = results.with_values
     whose = " whose contact holds" if held.sum() < results.kept.values.sum() else ""
     band = f"; the grey band holds those of all {counted(int(held.sum()), 'variant')}{whose}" if held.sum() > 1 else ""
-    hang = " Displacements point down, as the body hangs." if "m" in map(results.envelopes.get, shown) else ""
+    down = [name for name in shown if results.hangs_along(name)]
+    said = hanging(down, [name for name in shown if results.envelopes[name] == "m" and name not in down])
+    hang = f" {said}" if said else ""
     left_out = len(names) - len(shown)
     more = f" {counted(left_out, 'more envelope')} in the archive." if left_out else ""
-    limits = " Red: limits that the study names." if any(_limit(results, name) for name in shown) else ""
-    return f"{lines}{band}.{hang}{limits}{more}"
+    return f"{lines}{band}.{hang}{more}"
 
 
 def _draw(results: Results, names: list[str], drawing: Drawing) -> None:
@@ -102,7 +106,7 @@ def _draw_one(axes: Axes, results: Results, name: str, variants: list[Index]) ->
     zero_line(axes)
     _draw_limit(axes, results, name, scale, (float(bottom.min()), float(top.max())))
     axes.set_xlim(places[0], places[-1])
-    if results.envelopes[name] == "m":
+    if results.hangs_along(name):
         axes.invert_yaxis()
     words = f"{name}\n{results.study.envelope[name].quantity}".replace("_", " ")
     axes.set_ylabel(f"{words} ({scale.unit})" if scale.unit else words)

@@ -29,6 +29,7 @@ from results_schema.arrays import Array
 from studies.results.formatting import ALIKE, number
 
 INK, MUTED, HAIR = "#22272e", "#69707a", "#d9dde2"
+LIMIT = "_limit"  # the label of lines at limits, which legends leave out
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
 DISTINCT = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 SEQUENTIAL = "viridis"
@@ -208,9 +209,17 @@ def zero_line(axes: Axes) -> None:
 
 def limit_line(axes: Axes, value: float, words: str, side: Literal["left", "right"]) -> None:
     """A line at a limit, in the axis's unit, with words on it at the side where curves are low."""
-    axes.axhline(value, color=VERMILION, linewidth=1.1, zorder=2.5)
+    axes.axhline(value, color=VERMILION, linewidth=1.1, zorder=2.5, label=LIMIT)
     across, at = axes.get_yaxis_transform(), {"left": 0.01, "right": 0.99}[side]
     axes.text(at, value, words, transform=across, ha=side, va="bottom", color=VERMILION, fontsize=8.0)
+
+
+def telling_limits(figure: Figure) -> Figure:
+    """The figure with a sentence on its lines at limits; as it is where no limit lies within its plots."""
+    lines = [line for axes in figure.drawing.axes for line in axes.get_lines()]
+    if not any(line.get_label() == LIMIT for line in lines):
+        return figure
+    return replace(figure, caption=f"{figure.caption} Red: limits that the study names.".strip())
 
 
 def limit_far(axes: Axes, words: str) -> None:

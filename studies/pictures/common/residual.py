@@ -13,11 +13,20 @@ from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import Limits
 from studies.findings.effects import by_effect
 from studies.findings.residual import MOST_SENSORS, residual_of, ringing
-from studies.pictures.common.figures import BLUE, Figure, draw, legend_of_all, limit_far, limit_line, shades
+from studies.pictures.common.figures import (
+    BLUE,
+    Figure,
+    draw,
+    legend_of_all,
+    limit_far,
+    limit_line,
+    shades,
+    telling_limits,
+)
 from studies.pictures.common.sizes import FAR
 from studies.pictures.common.sweep_view import View, along_axis, coincide, draw_curves, one_legend, view
 from studies.pictures.common.traces import coarse, picked, since_rest
-from studies.results.findings_common import in_words
+from studies.results.findings_common import in_words, told_hanging
 from studies.results.formatting import counted, quantity, scale_for
 from studies.results.places import Index, extreme
 from studies.results.results import Results
@@ -55,11 +64,11 @@ def _over_sweep(results: Results, sensors: list[str], limits: Limits, fewer: int
     caption = seen.caption(
         "Largest difference from the static value after all carriages have come to rest or left.",
         f"{'Bars' if seen.is_sampled else 'Bands'}: the estimated error.",
-        "" if limit is None else "Red: the limit that the study names.",
         f"{counted(fewer, 'more sensor')} in the archive." if fewer else "",
     )
     fill = partial(_draw_sweep, seen, sensors, limits)
-    return [draw("residual", f"{swings}{against},{in_words(results, top)}", caption, 0.9 + 1.9 * len(sensors), fill)]
+    title, height = f"{swings}{against},{in_words(results, top)}", 0.9 + 1.9 * len(sensors)
+    return [telling_limits(draw("residual", title, caption, height, fill))]
 
 
 def _draw_sweep(seen: View, sensors: list[str], limits: Limits, drawing: Drawing) -> None:
@@ -110,7 +119,7 @@ def _over_time(results: Results, sensors: list[str], shown: list[Index]) -> Figu
     caption = (
         "Readings from the moment on at which all carriages have come to rest or left."
         + (" Brightest line: the kept history that swings most." if len(shown) > 1 else "")
-        + (" Displacements point down, as the body hangs." if any(map(results.hangs, sensors)) else "")
+        + (f" {hang}" if (hang := told_hanging(results, sensors)) else "")
         + coarse(results, seconds)
     )
     title = ",".join(text for text in (moves, in_words(results, shown[-1])) if text)

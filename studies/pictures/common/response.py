@@ -10,9 +10,18 @@ from matplotlib.figure import Figure as Drawing
 
 from studies.findings.beyond import Limits
 from studies.pictures.common import figures as look
-from studies.pictures.common.figures import Figure, draw, legend_of_all, limit_far, limit_line, shades, zero_line
+from studies.pictures.common.figures import (
+    Figure,
+    draw,
+    legend_of_all,
+    limit_far,
+    limit_line,
+    shades,
+    telling_limits,
+    zero_line,
+)
 from studies.pictures.common.traces import over_way
-from studies.results.findings_common import LOOSE
+from studies.results.findings_common import LOOSE, told_hanging
 from studies.results.formatting import percent, quantity, scale_for
 from studies.results.places import Index
 from studies.results.results import Results
@@ -20,7 +29,6 @@ from studies.results.results import Results
 MOST_SENSORS = 4
 REACHED = 0.5  # of a limit: what stays below has no line, beside which it would be flat
 LEFT = 0.02  # of the way: what is recorded beyond it is free vibration
-DOWN = "Displacements point down, as the body hangs."
 
 
 def response(results: Results, ranked: list[str], limits: Limits, shown: list[Index], top: Index) -> Figure:
@@ -28,7 +36,6 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
 
     ranked: sensors, the most telling first. top: the variant of the answer."""
     sensors = ranked[:MOST_SENSORS]
-    read = {results.study.sensor[name].quantity for name in sensors}
     first, own = sensors[0], shown[-1]
     way = over_way(results, first, own)
     at = int(np.argmax(np.abs(way.values)))
@@ -38,16 +45,14 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
     whose = "the variant of the answer" if own == top else "the kept history with the largest value"
     errors = {sensor: results.error_at(sensor, own) for sensor in sensors}
     loose = [f" {name.replace('_', ' ')}: estimated to within {percent(e)}." for name, e in errors.items() if e > LOOSE]
-    hang = f" {DOWN}" if any(map(results.hangs, sensors)) else ""
     caption = (
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")
         + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
-        + hang
-        + (" Red: limits that the study names." if any(map(limits.limit, read)) else "")
+        + (f" {hang}" if (hang := told_hanging(results, sensors)) else "")
         + "".join(loose)
     )
     height = 0.8 + 1.9 * len(sensors)
-    return draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown))
+    return telling_limits(draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown)))
 
 
 def _draw(results: Results, sensors: list[str], limits: Limits, shown: list[Index], drawing: Drawing) -> None:

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure as Drawing
 
 from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes
+from studies.findings.effects import HARDLY
 from studies.findings.in_step import speeds_in_step
-from studies.pictures.common.figures import INK, Figure, draw, limit_far, limit_line
-from studies.pictures.common.sweep_view import Curve, View, along_axis, draw_curves, one_legend, ratio_above
-from studies.results.findings_common import LOOSE, in_words
-from studies.results.formatting import counted, listed, percent, quantity, scale_for
+from studies.pictures.common.figures import INK, Figure, draw, limit_far, limit_line, telling_limits
+from studies.pictures.common.sweep_view import UNSEEN, Curve, View, along_axis, draw_curves, one_legend, ratio_above
+from studies.results.findings_common import LOOSE, in_words, told_hanging
+from studies.results.formatting import counted, listed, number, percent, quantity, scale_for, spanned
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -42,23 +43,58 @@ def sizes_of(seen: View, sensors: list[str], limit: float | None, top: Index) ->
     """The largest absolute values of sensors of one quantity, those with the largest where they are many, beside their
     amplification where statics know it. top: the variant with the largest value of the first sensor."""
     results = seen.results
-    shown = sorted(sensors, key=lambda name: -peak(results, name))[:MOST_SENSORS]
+    varied = [name for name in sensors if not _is_flat(seen, name)] or sensors
+    shown = sorted(varied, key=lambda name: -peak(results, name))[:MOST_SENSORS]
     shown = [name for name in sensors if name in shown]
-    fewer = len(sensors) - len(shown)
-    amplified = any(np.isfinite(seen.plane(gain(results, sensor))).any() for sensor in shown)
+    fewer = len(varied) - len(shown)
+    amplified = any(_has_gain(seen, sensor) for sensor in shown)
     loose = [sensor.replace("_", " ") for sensor in shown if _is_loose(seen, sensor)]
     caption = seen.caption(
         f"{'Left: l' if amplified else 'L'}argest absolute values"
         f"{'; right: over the largest absolute static value of the same model' if amplified else ''}.",
-        "" if limit is None else "Red: the limit that the study names.",
         f"Dashed: {listed(loose)} estimated to within more than {percent(LOOSE)}." if loose else "",
-        "Displacements point down." if any(map(results.hangs, shown)) else "",
+        told_hanging(results, shown),
         "While the contact holds the answer counts; lines go on beyond." if not results.held.all() else "",
         f"{counted(fewer, 'more sensor')} with smaller values." if fewer else "",
+        *(_told_flat(seen, name) for name in sensors if name not in varied),
+        *(_told_gain(seen, name) for name in shown),
     )
     fill = partial(_draw, seen, shown, limit, 1 + amplified)
     name = f"largest-{results.noun(shown[0])}"
-    return draw(name, _title(results, sensors[0], limit, top), caption, 0.9 + 1.9 * len(shown), fill)
+    return telling_limits(draw(name, _title(results, sensors[0], limit, top), caption, 0.9 + 1.9 * len(shown), fill))
+
+
+def _is_flat(seen: View, sensor: str) -> bool:
+    """Whether the sizes of a sensor change along the horizontal axis by no more than an eye sees; not of samples."""
+    assert seen.x is not None
+    size = seen.results.dataset["status"].copy(data=sizes(seen.results, sensor))
+    top = float(np.nanmax(seen.plane(size), initial=0.0))
+    return not seen.is_sampled and 0.0 < top * UNSEEN >= seen.most_along(seen.x, size)
+
+
+def _has_gain(seen: View, sensor: str) -> bool:
+    """Whether the amplification of a sensor is known and is more than a line at one height."""
+    known = seen.plane(gain(seen.results, sensor))
+    known = known[np.isfinite(known)]
+    return bool(known.size and np.ptp(known) > HARDLY)
+
+
+def _told_gain(seen: View, sensor: str) -> str:
+    """The amplification of a sensor that is the same all over, as a sentence; "" where it is drawn, or unknown."""
+    known = seen.plane(gain(seen.results, sensor))
+    known = known[np.isfinite(known)]
+    if not known.size or np.ptp(known) > HARDLY:
+        return ""
+    return f"Dynamic amplification of {sensor.replace('_', ' ')}: {number(float(known.max()))} throughout."
+
+
+def _told_flat(seen: View, sensor: str) -> str:
+    """The sizes of a sensor that are no panel, as they hardly change along the horizontal axis."""
+    assert seen.x is not None
+    known = seen.plane(seen.results.dataset["status"].copy(data=sizes(seen.results, sensor)))
+    ends = spanned(known[np.isfinite(known)], partial(quantity, units=seen.results.sensors[sensor]))
+    same = f"the same within {percent(UNSEEN)} for {seen.x.noun} {seen.x.span}"
+    return f"Not drawn: {sensor.replace('_', ' ')}, {ends}, {same}."
 
 
 def peak(results: Results, sensor: str) -> float:
@@ -105,7 +141,7 @@ def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, dra
         _draw_sizes(row[0], seen, sensor, limit)
         if columns == 1:
             continue
-        if np.isfinite(seen.plane(gain(results, sensor))).any():
+        if _has_gain(seen, sensor):
             draw_curves(row[1], seen, _curves(seen, sensor, gain(results, sensor)))
             row[1].set_ylabel(f"dynamic amplification\n{results.place(sensor)}")
         else:

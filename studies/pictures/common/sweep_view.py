@@ -84,6 +84,11 @@ class View:
         full = xr.broadcast(*bare)[0].transpose(*axes)
         return np.asarray(full.isel({dim: _order(axis) for dim, axis in axes.items()}).values, dtype=np.float64)
 
+    def most_along(self, axis: Axis, values: Any) -> float:
+        """The largest difference that values have along one of the axes, all others held; of a sample, that of all."""
+        grid, place = self.plane(values), 1 if axis is self.y and not self.is_sampled else 0
+        return float(np.nan_to_num(np.fmax.reduce(grid, axis=place) - np.fmin.reduce(grid, axis=place)).max())
+
     def along(self, axis: Axis) -> Array:
         """The values (n,) of an axis in the order of `plane`, in the unit of its title."""
         return np.asarray(axis.shown[_order(axis)])

@@ -256,6 +256,15 @@ def test_refusals(name: str) -> None:
         base_scene(study({"middle": {"at": 2.0}}, bed, carriage={"car": car}))
 
 
+def test_beams_say_what_their_drive_does_all_the_same() -> None:
+    """They refuse the key, as it would change nothing; where the push goes, and how a bed sways, is said."""
+    with pytest.raises(BadInput) as refused:
+        base_scene(study({"middle": {"at": 2.0}}, beam(length=SPAN), carriage=pushing(BRAKES)))
+    assert "its deflection does not depend on this key" in str(refused.value)
+    assert "remedy: inertia_along = false; the drive still pushes the body along by -m s''" in str(refused.value)
+    assert 'take kind = "frame"' in str(refused.value)
+
+
 def test_saved_and_riding_bodies_are_refused(tmp_path: Path) -> None:
     save_body(body(PORTAL), tmp_path / "body.nc")
     reduced = {"kind": "reduced", "file": str(tmp_path / "body.nc")}

@@ -1,0 +1,131 @@
+"""Captions say what figures show: which way displacements count, which limits are drawn, and what is not drawn as it is
+the same all over."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+import xarray as xr
+
+import studies
+from studies.pictures.common.figures import Figure
+from studies.reporting import answers
+from tests.pictures.test_passages import MASS, limits, panels
+from tests.studies import scenes
+
+BED = """\
+schema_version = 1
+kind = "passage"
+
+[body.bed]
+kind = "frame"
+plane = "xz"
+damping_ratio = 0.03
+modes = 4
+node = { left = [0, 0], mount_1 = [0.3, 0], mount_2 = [2.7, 0], right = [3, 0] }
+section.box = { area = 0.035, second_moment = 6.4e-4, youngs_modulus = "110 GPa", density = 7200 }
+member.one = { nodes = ["left", "mount_1"], section = "box", elements = 2 }
+member.two = { nodes = ["mount_1", "mount_2"], section = "box" }
+member.three = { nodes = ["mount_2", "right"], section = "box", elements = 2 }
+spring.mount_1 = { node = "mount_1", stiffness = [1e7, 0, 1e8] }
+spring.mount_2 = { node = "mount_2", stiffness = [1e7, 0, 1e8] }
+track.members = ["one", "two", "three"]
+
+[carriage.slide]
+on = "bed"
+kind = "mass"
+mass = 400
+inertia_along = true
+motion = { kind = "point-to-point", start = 0.6, end = 2.4, speed = 1, acceleration = 6, jerk = 200, dwell = 0.1 }
+
+[sensor.middle]
+body = "bed"
+at = 1.5
+
+[sensor.sway]
+body = "bed"
+node = "mount_1"
+direction = "x"
+
+[envelope.bed]
+body = "bed"
+places = 5
+
+[solver]
+steps = 1200
+audit = 0
+
+[sweep]
+acceleration = { of = "carriage.slide.motion.acceleration", values = [2, 4, 6] }
+mass = { of = "carriage.slide.mass", values = [200, 400] }
+"""
+
+
+@cache
+def swayed(question: str = "") -> xr.Dataset:
+    return studies.run(f"{BED}\n{question}")
+
+
+def drawn(dataset: xr.Dataset) -> dict[str, Figure]:
+    return {figure.name: figure for figure in answers.figures(dataset)}
+
+
+def test_displacements_are_said_to_point_down_where_they_do() -> None:
+    found = drawn(swayed())
+    own = "Displacements point down for middle, as the body hangs; others count along directions of their own."
+    assert own in found["response"].caption
+    for sensor, axes in panels(found["response"]).items():
+        assert axes.yaxis_inverted() == (sensor == "middle")
+    assert "Displacements point down, as the body hangs." in found["envelopes"].caption
+    assert "point down" not in found["largest-displacement"].caption  # that of the middle is told in words
+
+
+def test_a_track_whose_loads_act_sideways_does_not_hang() -> None:
+    """Its loads act askew, and so its deflection is no sag."""
+    askew = BED.replace("inertia_along = true\n", "").replace(
+        "track.members", "track.direction = [1, 0, 1]\ntrack.members"
+    )
+    found = drawn(studies.run(askew))
+    assert not any("point down" in figure.caption for figure in found.values())
+    assert not panels(found["response"])["middle"].yaxis_inverted()
+
+
+def test_red_is_explained_where_a_limit_is_drawn() -> None:
+    for limit, is_drawn in (("0.1 mm", True), ("2 m", False)):
+        found = drawn(swayed(f'[question]\ndisplacement = "{limit}"'))
+        for name in ("largest-displacement", "response", "envelopes"):
+            lines = [line for axes in found[name].drawing.axes for line in limits(axes)]
+            assert bool(lines) == ("Red: limits that the study names." in found[name].caption)
+            assert bool(lines) == is_drawn or name == "envelopes"
+
+
+def test_what_hardly_changes_along_the_axis_is_told_and_not_drawn() -> None:
+    figure = drawn(swayed())["largest-displacement"]
+    assert list(panels(figure)) == ["sway"]
+    assert "Not drawn: middle, 17.8 µm to 35.7 µm, the same within 1 % for acceleration" in figure.caption
+
+
+def test_an_amplification_that_is_the_same_all_over_is_a_sentence() -> None:
+    resting = drawn(scenes.run("passage", MASS, extra="[solver]\nfidelity = 'static'"))["largest-displacement"]
+    assert "Dynamic amplification of midspan: 1 throughout." in resting.caption
+    assert len(resting.drawing.axes) == 1 and "right:" not in resting.caption
+
+
+@pytest.mark.parametrize(("key", "is_map"), [("force", False), ("mass", True)])
+@pytest.mark.parametrize(("kind", "name"), [("passage", "amplification-map"), ("asymmetry", "odd-map")])
+def test_a_map_is_drawn_where_both_axes_tell(kind: str, name: str, key: str, is_map: bool) -> None:
+    """A force multiplies all that it does, so that ratios are those of the speed alone."""
+    load = f"[carriage.table]\non = 'bed'\nkind = '{key}'\n{key} = 100.0"
+    text = scenes.text_of(kind).replace('[carriage.table]\non = "bed"\nkind = "mass"\nmass = 100.0', load)
+    other = f'other = {{ of = "carriage.table.{key}", from = 100, to = 800, count = 7 }}'
+    found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace(kind, 1.0, 12.0)}\n{other}"))
+    assert (name in found) == is_map
+
+
+def test_contact_forces_that_a_swept_number_hardly_changes_are_curves() -> None:
+    damping = 'zeta = { of = "body.bed.damping_ratio", values = [0.01, 0.012] }'
+    text = scenes.text_of("passage").replace("mass = 100.0", "mass = 600.0")
+    found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace('passage', 1.0, 12.0)}\n{damping}"))["contact-table"]
+    assert "Nearly the same for zeta 0.01 to 0.012." in found.caption
+    assert found.drawing.axes[0].get_lines() and not found.drawing.axes[0].collections
