@@ -322,3 +322,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stopping.end_undisturbed()
         gc.freeze()  # looking through what is left would take a third of a second
     return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -61,6 +61,8 @@ class Passage(Kind):
         said = [told_along(results, name) for name in envelopes]
         said += ["".join(tell(results, sensor) for tell in told) for sensor in sensors]
         said = _with_remark(said, told_between_speeds(results))
+        if sensors:  # of which those after the first may be cut
+            said[len(envelopes)] += _amplified_besides(results, sensors[0])
         said[0] += _effects(results, envelopes, sensors)
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
@@ -142,6 +144,19 @@ def _amplified(results: Results, sensor: str) -> str:
     threshold = question_of(results.study, AskedOfPassages).amplification
     where = where_beyond(results, gain, threshold, results.axis(*PACES))
     return f" The dynamic amplification exceeds {number(threshold)} {where}."
+
+
+def _amplified_besides(results: Results, told: str) -> str:
+    """Which sensors besides that one exceed statics by as much as the question names, the most first."""
+    gains = {name: results.numbers("dynamic_amplification", name) for name in results.sensors if name != told}
+    most = {name: float(np.nanmax(gain)) for name, gain in gains.items() if np.isfinite(gain).any()}
+    threshold = question_of(results.study, AskedOfPassages).amplification
+    beyond = sorted((name for name, gain in most.items() if gain > threshold), key=lambda name: -most[name])
+    if results.size < 2 or not beyond:
+        return ""
+    words = [f"{name} (up to {number(most[name])})" for name in beyond[:MOST_TOLD]]
+    words += [f"{len(beyond) - MOST_TOLD} more"] * (len(beyond) > MOST_TOLD)
+    return f" Of the other sensors {listed(words)} exceed{'s' * (len(beyond) == 1)} {number(threshold)}."
 
 
 def _limited(results: Results, sensor: str) -> str:

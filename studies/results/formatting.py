@@ -128,9 +128,11 @@ def percent(part: float, digits: int = 2) -> str:
 def scientific(value: float) -> str:
     """A relative error with two digits.
 
-    >>> scientific(1e-3), scientific(2.14e-4), scientific(0.0)
-    ('1e-3', '2.1e-4', '0')
+    >>> scientific(1e-3), scientific(2.14e-4), scientific(0.0), scientific(float("nan"))
+    ('1e-3', '2.1e-4', '0', 'not known')
     """
+    if not math.isfinite(value):
+        return "not known"
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{mantissa.removesuffix('.0')}e{int(exponent)}" if value else "0"
 

@@ -10,6 +10,7 @@ from studies.findings.amplification import sizes, with_derived_errors
 from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.results.results import Results
+from tests.engine.build import beam, cruise, fixed, mass, study
 from tests.studies import scenes
 
 
@@ -65,3 +66,13 @@ def test_an_error_that_is_not_known_stays_so() -> None:
     found = with_derived_errors(given, {"a over b": ("a", "b")})
     np.testing.assert_array_equal(found.estimated_error.sel(result="a over b"), np.float32([np.nan, 2e-3]))
     xr.testing.assert_identical(found.sel(result=["a", "b"]), given)
+
+
+def test_other_sensors_that_exceed_statics_are_told_with_the_first() -> None:
+    """Near an end the vibration is larger beside the little deflection there."""
+    sensors = {"midspan": fixed(0.5), "end": fixed(0.02)}
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.02, 0.3]}}
+    found = studies.run(study(beam(), mass(0.3, cruise(0.0, 1.0, 0.1)), sensor=sensors, sweep=speeds))
+    gain = {name: float(found.dynamic_amplification.sel(sensor=name).max()) for name in sensors}
+    assert gain["end"] > 1.1
+    assert f"Of the other sensors end (up to {gain['end']:.3g}) exceeds 1.1." in answers.answer(found)[0]
