@@ -16,6 +16,7 @@ from typing import Any, Protocol, TypedDict, TypeVar
 import numpy as np
 
 from engine.accuracy.jobs import Crashed, Halted, Job
+from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted as Gone
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
@@ -69,7 +70,11 @@ class Where(TypedDict, total=False):
 
 @contextmanager
 def place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> Iterator[Place]:
-    """The place, as of `Where`, while the block lasts. Raises BadInput and WorkersGaveUp."""
+    """The place, as of `Where`, while the block lasts. Raises BadInput and WorkersGaveUp.
+
+    Its linear algebra keeps to one thread: by several, modes of a portal differ by rounding, and what is told of its
+    robots' errors by a tenth and more.
+    """
     check_place(threads, workers, scheduler)
     if scheduler is not None:
         from engine.batch.workers import of_scheduler
@@ -82,7 +87,8 @@ def place(threads: int | None = None, workers: int = 0, scheduler: str | None = 
         with on_this_machine(workers, threads or 1) as found:
             yield found
     else:
-        yield Threads(threads or cores())
+        with one_thread():
+            yield Threads(threads or cores())
 
 
 def check_place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> None:

@@ -272,7 +272,8 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     """Run a study, or that of a file, in memory: the dataset of its archive. Raises BadInput; what is allowed and yet
     often a mistake is a warning, a `Remark`.
 
-    options: progress and chunk, and where to run, as of `engine.run`.
+    options: progress and chunk, and where to run, as of `engine.run`. Meanwhile numpy's linear algebra keeps to one
+    thread in the whole process.
     """
     from engine.batch.executors import Where, check_options, place
     from engine.scene.study import study_of

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController
 
+import studies
 from engine.linear_algebra import one_thread
+from tests.floating.scenes import sliding_mass
 
 AFTER_A_RUN = """
 import scipy.linalg
@@ -59,6 +61,13 @@ def test_given_back_after_an_error() -> None:
         assert threads() == {1}
         raise ZeroDivisionError
     assert threads() == {3}
+
+
+def test_studies_of_frames_that_move_are_computed_by_one_thread() -> None:
+    """Whatever computes them; a progress is told between pieces."""
+    seen = []
+    studies.run(sliding_mass(), progress=lambda done, size: seen.append(threads()))
+    assert seen and all(part == {1} for part in seen) and 3 in threads()
 
 
 def test_a_run_from_python_gives_the_process_its_threads_back() -> None:
