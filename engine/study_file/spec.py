@@ -104,7 +104,7 @@ class KindOf:
         if "kind" not in value:
             problem = fault("the kind is missing", expected=f"one of {known}")
         else:
-            remedy = nearest(kind, list(self.table))
+            remedy = nearest(kind, list(self.table)) or _OTHER_KINDS.get(str(kind), "")
             what = f"unknown {self.noun} kind"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
@@ -160,6 +160,12 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
         raise fault("a list in ascending order is wanted here", expected="each once", received=shortened(values))
     return values
 
+
+# kinds that others look for -> what there is of them
+_OTHER_KINDS = {
+    "pendulum": 'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is not built',
+    "train": "a train is a table of its own: [train.NAME] (docs/study-file.md)",
+}
 
 # what others call a number -> its key; of several the first that is there
 _SYNONYMS: dict[str, tuple[str, ...]] = {

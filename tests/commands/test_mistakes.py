@@ -125,6 +125,12 @@ def test_a_swept_key_by_another_word(capsys: pytest.CaptureFixture[str]) -> None
     assert 'did you mean "body.beam.youngs_modulus"?' in told(capsys, 2, "check", "study.toml")
 
 
+def test_a_kind_that_is_not_built_says_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("study.toml").write_text(SMALL.replace('kind = "mass"', 'kind = "pendulum"'))
+    message = told(capsys, 2, "check", "study.toml")
+    assert 'is kind = "oscillator"' in message and "swings on a rope is not built" in message
+
+
 def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture[str]) -> None:
     Path("study.toml").write_text(
         SMALL.replace("= 1000.0", "= 7.85").replace("modes = 4", "modes = 4\nown_weight = true")
