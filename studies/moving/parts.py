@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -124,6 +124,7 @@ def results_names(model: FloatingModel) -> list[str]:
     return [result.name for result in results_of(model)]
 
 
+@lru_cache(maxsize=4)  # the pieces of a scene ask in turn
 def _rung(scene: Scene, cases: Cases, duration: Callable[[Mapping[str, Array], int], Array], longest: float) -> Rung:
     """The model of a scene, by pilots all over it, whichever of its variants are marched."""
     from engine.floating.model_choice import PILOTS, choose

@@ -17,7 +17,11 @@ CODES = {
 
 
 def test_every_error_has_its_exit_code():
-    classes = [value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, Exception)]
+    classes = [
+        value
+        for value in vars(errors).values()
+        if isinstance(value, type) and issubclass(value, errors.WanderlastError)
+    ]
     found = {one.__name__: one.exit_code for one in classes}
     assert found == CODES
 
