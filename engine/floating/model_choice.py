@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.accuracy.reference import left_over
+from engine.bodies.modal.description import MAX_MODES
 from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, stations, usual_steps, weights, worst
 from engine.floating.march import march
 from engine.floating.model import build
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 PILOTS = LANES  # of a scene: a block of lanes takes as long, however few of them are used
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
-
-
 UNLIMITED = NewmarkScheme("average-acceleration", 0.25, 0.5)  # in its steps, however fast the highest mode is
 FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these
 FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
@@ -117,7 +116,7 @@ def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
     studies = [pilots.study, *(_with_more_modes(pilots.study, times) for times in (2, 4))]
     model = build(pilots.study, modes)
     found: Array = np.zeros(len(results_of(model)))
-    if studies[0].body == studies[1].body:
+    if (studies[0].body, studies[0].frame) == (studies[1].body, studies[1].frame):
         return found
     for factor in FINER:
         steps = usual_steps(model, pilots.longest) * factor
@@ -131,12 +130,12 @@ def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
 
 
 def _with_more_modes(study: Study, times: int) -> Study:
-    """The study with so many times the modes that it fixes."""
+    """The study with so many times the modes that it fixes, as far as there may be so many."""
     bodies = {name: body if body.modes_are_open else body.with_more_modes(times) for name, body in study.body.items()}
-    frames = {
-        name: frame.model_copy(update={key: times * getattr(frame, key) for key in ("lateral_modes", "axial_modes")})
-        for name, frame in study.frame.items()
-    }
+    frames = {}
+    for name, frame in study.frame.items():
+        lateral, axial = (min(times * count, MAX_MODES) for count in (frame.lateral_modes, frame.axial_modes))
+        frames[name] = frame.model_copy(update={"lateral_modes": lateral, "axial_modes": axial})
     return study.model_copy(update={"body": bodies, "frame": frames})
 
 

@@ -17,9 +17,7 @@ from studies.results.results import Results
 
 BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
 SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
-MOST = (
-    1000  # different bodies, masses and dampers in a sweep: a tenth of a second; of more it is not known with dampers
-)
+MOST = 1000  # different bodies, masses and dampers in a sweep, an eighth of a second; of more no decay is known
 PLACES = 65  # along the way, at the heaviest of which the mass stands: there the vibration dies out the slowest
 REMAINDER = "by damping and with the carriage on its way"
 #: Of keys of swept numbers, with the end of their range at which a variant settles last.
@@ -40,14 +38,14 @@ def decay_rates(results: Results) -> Array:
     omega, shapes = theory.elastic_modes(results, results.carriage.motion.path(np.linspace(0.0, 1.0, PLACES)).S)
     heaviest = shapes[np.abs(shapes[:, 0]).argmax(), :BASIS]
     alone = zeta * first / (1.0 + mass * heaviest[0] ** 2)
-    damped = sum(dampers.values(), np.zeros(results.shape)) > 0.0
+    damped = sum((rate for _, rate in dampers), np.zeros(results.shape)) > 0.0
     if not damped.any():
         return np.asarray(alone)
-    columns = np.stack([part.reshape(-1) for part in (zeta, first, mass, *dampers.values())], axis=1)
+    columns = np.stack([part.reshape(-1) for part in (zeta, first, mass, *(rate for _, rate in dampers))], axis=1)
     rows, own = np.unique(columns, axis=0, return_inverse=True)
-    if len(rows) > MOST or any(isinstance(at, str) for at in dampers):
+    if len(rows) > MOST or any(isinstance(at, str) for at, _ in dampers):
         return np.where(damped, np.nan, alone)
-    held = theory.elastic_modes(results, np.array([float(at) for at in dampers]))[1][:, :BASIS]
+    held = theory.elastic_modes(results, np.array([float(at) for at, _ in dampers]))[1][:, :BASIS]
     found = np.array([_slowest(row, omega[:BASIS], heaviest, held) for row in rows])
     return np.where(damped, found[own.reshape(-1)].reshape(results.shape), alone)
 
@@ -78,13 +76,11 @@ def _mass(results: Results) -> Array:
     return sum(found, np.zeros(results.shape))
 
 
-def _dampers(results: Results) -> dict[float | str, Array]:
-    """Coefficients (N s/m) of the dampers under the first carriage's body, for every variant, by their place."""
+def _dampers(results: Results) -> list[tuple[float | str, Array]]:
+    """Places of the dampers under the first carriage's body, and their coefficients (N s/m) for every variant."""
     name = results.carriage.on
-    return {
-        at: results.everywhere(results.parameter(f"body.{name}.{key}"))
-        for key, at, _ in results.study.body[name].dampers()
-    }
+    found = results.study.body[name].dampers()
+    return [(at, results.everywhere(results.parameter(f"body.{name}.{key}"))) for key, at, _ in found]
 
 
 class Asked(Spec):

@@ -7,10 +7,13 @@ import pytest
 import xarray as xr
 
 import studies
-from engine.scene.study import Study
+from engine.floating.model_choice import choose
+from engine.scene.study import Study, load
 from engine.scene.sweep import expand
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from studies.commands.catalogue import built_in
 from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
 from studies.protocol.study import kind_of
@@ -104,6 +107,16 @@ def test_what_fixed_modes_leave_out_is_told_and_not_held() -> None:
         assert 1e-4 < apart < one["estimated_error"].sel(result=name) < 300.0 * apart
     alone = one["estimated_error"].sel(result="load_contact_force_max")
     assert alone > 0.05
+
+
+def test_what_fixed_modes_across_the_track_leave_out_is_told_beside_open_ones() -> None:
+    flyer = load(built_in()["free-flyer"]).without_sweep()
+    given = {"body.hull.modes": "auto", "frame.hull.lateral_modes": 1, "frame.hull.joints.0.rate.2": 0.1}
+    study = flyer.with_values(given | {"question.duration": 5.0})
+    one = choose(study, VariantValues(study, {}, 1), np.full(1, 5.0), 5.0)
+    flat = study.with_values({"frame.hull.lateral_modes": 0})
+    none = choose(flat, VariantValues(flat, {}, 1), np.full(1, 5.0), 5.0)
+    assert np.nanmax(one.by_fixed) > 1e-6 and not none.by_fixed.any()
 
 
 def test_every_kind_that_keeps_bodies_still_refuses_frames() -> None:
