@@ -17,10 +17,12 @@ def chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
     (1, 400, 200)
     >>> chunk_shape((1_000_000,), 8), chunk_shape((1_000_000, 12), 8)
     ((131072,), (131072, 1))
+    >>> chunk_shape((1000, 1000, 12), 8)
+    (131, 1000, 1)
     """
     left = max(1, CHUNK_BYTES // itemsize)
-    if shape[0] >= left and math.prod(shape[1:]) <= APART:
-        return (left, *(1 for _ in shape[1:]))
+    if len(shape) > 1 and shape[-1] <= APART and math.prod(shape[:-1]) >= left:
+        return (*chunk_shape(shape[:-1], itemsize), 1)
     chunks = []
     for size in reversed(shape):
         chunks.append(min(size, left))

@@ -97,15 +97,19 @@ class Group:
     @property
     def chunk_bytes(self) -> float:
         """Bytes of a variant's histories and statistics while it is marched."""
-        asked, study = self.grid.asked, self.scene.study
-        steps, rows = self.usual_steps, min(self.grid.unit, MOST_COMPARED)
-        if asked.reduction is not None:
-            rows = min(2 * asked.reduction.stations, steps)
+        steps, study = self.usual_steps, self.scene.study
         places = max((envelope.places for envelope in study.envelope.values()), default=0)
         signals = len(study.sensor) + len(self.scene.carriages)
-        found = 8.0 * rows * max(1, len(study.sensor)) + 8.0 * STATISTICS * max(signals, places)
+        found = 8.0 * self.rows * max(1, len(study.sensor)) + 8.0 * STATISTICS * max(signals, places)
         pair = 24.0 * min(steps, MOST_STATIONS) * max(signals, places)  # which has all histories of a segment
         return found + (pair if self.scene.scheme.stride > 1 else 0.0)
+
+    @property
+    def rows(self) -> int:
+        """Stations of a variant's histories that are kept while it is marched."""
+        if self.grid.asked.reduction is not None:
+            return min(2 * self.grid.asked.reduction.stations, self.usual_steps)
+        return min(self.grid.unit, MOST_COMPARED)
 
     @cached_property
     def seconds_per_variant(self) -> float:
@@ -142,6 +146,11 @@ class MarchGroup(Group):
     @property
     def usual_steps(self) -> int:
         return self.steps
+
+    @property
+    def rows(self) -> int:
+        keeps = self.grid.asked.reduction is not None or self.grid.listens
+        return super().rows if keeps else 0
 
     @property
     def work(self) -> float:

@@ -11,6 +11,8 @@ import numpy as np
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from results_schema.blocks import APART
+
 RECENT_BYTES = 2**27  # of the array that was read last, which is likely to be asked for again
 
 Read = Callable[[slice, tuple[int | slice, ...]], np.ndarray]
@@ -30,10 +32,15 @@ class OnDisk(BackendArray):
         """The numbers at some rows (a slice, or one) and further places."""
         rows = key[0] if isinstance(key[0], slice) else slice(key[0], key[0] + 1)
         first, end, step = rows.indices(self.shape[0])
-        if _RECENT.array is self or (first == 0 and end == self.shape[0] and self.nbytes <= RECENT_BYTES):
+        whole = (first, end) == (0, self.shape[0]) and not self._is_column(key) and self.nbytes <= RECENT_BYTES
+        if _RECENT.array is self or whole:
             return np.asarray(_RECENT.whole(self)[key])
         found = self.read(slice(first, max(first, end)), key[1:])
         return np.asarray(found[::step] if isinstance(key[0], slice) else found[0])
+
+    def _is_column(self, key: tuple[int | slice, ...]) -> bool:
+        """Whether one of a few numbers of each variant is asked for: they lie apart."""
+        return len(self.shape) > 1 and self.shape[-1] <= APART and not isinstance(key[-1], slice)
 
     @property
     def nbytes(self) -> int:

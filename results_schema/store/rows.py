@@ -12,7 +12,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from results_schema.blocks import BLOCK_BYTES, slices
+from results_schema.blocks import APART, BLOCK_BYTES, slices
 from results_schema.errors import OutputFailed
 from results_schema.store import files
 from results_schema.store.tables import Table, from_arrays
@@ -59,9 +59,13 @@ def joined(parts: Sequence[Rows]) -> Rows | None:
     filled up with NaN."""
     if not parts:
         return None
-    variants, order = np.unique(np.concatenate([part.variants for part in parts]), return_index=True)
-    names = parts[0].arrays
-    return Rows(variants, {name: _stacked([part.arrays[name] for part in parts])[order] for name in names})
+    parts = sorted(parts, key=lambda part: part.variants[:1].tolist())
+    variants, names = np.concatenate([part.variants for part in parts]), parts[0].arrays
+    arrays = {name: _stacked([part.arrays[name] for part in parts]) for name in names}
+    if np.all(np.diff(variants) > 0):
+        return Rows(variants, arrays)
+    variants, order = np.unique(variants, return_index=True)
+    return Rows(variants, {name: array[order] for name, array in arrays.items()})
 
 
 class Collector:
@@ -133,7 +137,7 @@ class RowsOnDisk:
     """Rows of all variants, taken as they come and read again by name in the order of the variants.
 
     The file, without a name in a folder, holds blocks of neighbouring variants; in each, one array after another with
-    the rows as they came.
+    the rows as they came; a few numbers of each variant lie apart, as they are asked for.
     """
 
     def __init__(self, file: IO[bytes], folder: Path, size: int) -> None:
@@ -162,8 +166,9 @@ class RowsOnDisk:
             own = np.flatnonzero(blocks == block)
             held = sum(came.size for came in self._came[block])
             for name in self._kinds:
-                self._file.seek(self._place(name, block, held))
-                self._file.write(np.ascontiguousarray(rows.arrays[name][own]).data)
+                for number, column in enumerate(self._columns(name, rows.arrays[name][own])):
+                    self._file.seek(self._place(name, block, number, held))
+                    self._file.write(np.ascontiguousarray(column).data)
             self._came[block].append((rows.variants[own] - block * self._block).astype(np.int32))
         self._file.flush()
 
@@ -174,29 +179,53 @@ class RowsOnDisk:
         self._block = max(1, 2 * BLOCK_BYTES // self._bytes)
         self._came = [[] for _ in range(0, self._size, self._block)]
 
+    def _columns(self, name: str, array: np.ndarray) -> Sequence[np.ndarray]:
+        """An array of rows as it lies in a block."""
+        return list(array.T) if self._lies_apart(name) else [array]
+
+    def _lies_apart(self, name: str) -> bool:
+        _, shape = self._kinds[name]
+        return len(shape) == 1 and shape[0] <= APART
+
     def _bytes_of(self, name: str) -> int:
         """Bytes of a variant in an array."""
         dtype, shape = self._kinds[name]
         return dtype.itemsize * math.prod(shape)
 
-    def _place(self, name: str, block: int, row: int) -> int:
-        """Where in the file a row of a block is."""
+    def _place(self, name: str, block: int, column: int, row: int) -> int:
+        """Where in the file a row of a block is, of one column where these lie apart."""
         variants = min(self._block, self._size - block * self._block)
-        return block * self._block * self._bytes + variants * self._starts[name] + row * self._bytes_of(name)
+        start = block * self._block * self._bytes + variants * self._starts[name]
+        if not self._lies_apart(name):
+            return start + row * self._bytes_of(name)
+        return start + (column * variants + row) * self._kinds[name][0].itemsize
 
-    def read(self, name: str, first: int, end: int) -> np.ndarray:
-        """(end - first, ...) an array from one variant to before another."""
+    def read(self, name: str, first: int, end: int, columns: Sequence[int] | None = None) -> np.ndarray:
+        """(end - first, ...) an array from one variant to before another; of a few numbers of each those at `columns`
+        alone."""
         dtype, shape = self._kinds[name]
+        if self._lies_apart(name):
+            chosen = range(*shape) if columns is None else columns
+            found = np.empty((len(chosen), end - first), dtype)
+            for row, column in zip(found, chosen, strict=True):
+                self._fill(row, name, first, column)
+            return found.T
         found = np.empty((end - first, *shape), dtype)
+        self._fill(found, name, first, 0)
+        return found
+
+    def _fill(self, found: np.ndarray, name: str, first: int, column: int) -> None:
+        """Read what lies together into an array of rows from one variant on."""
+        end = first + len(found)
         for block in range(first // self._block, -(-end // self._block)):
             places = np.concatenate(self._came[block]) + (block * self._block - first)
-            self._file.seek(self._place(name, block, 0))
-            rows = np.frombuffer(self._file.read(places.size * self._bytes_of(name)), dtype).reshape(-1, *shape)
-            if places.min() < 0 or places.max() >= end - first:
-                inside = (places >= 0) & (places < end - first)
+            self._file.seek(self._place(name, block, column, 0))
+            size = places.size * found[:1].nbytes
+            rows = np.frombuffer(self._file.read(size), found.dtype).reshape(-1, *found.shape[1:])
+            if places.min() < 0 or places.max() >= len(found):
+                inside = (places >= 0) & (places < len(found))
                 places, rows = places[inside], rows[inside]
             found[places] = rows
-        return found
 
     def array(self, name: str, shape: tuple[int, ...]) -> Any:
         """An array of a dataset over the grid of all variants, `shape`, that is read when it is asked for."""
@@ -207,10 +236,15 @@ class RowsOnDisk:
 
     def _over_grid(self, name: str, shape: tuple[int, ...], rows: slice, at: tuple[int | slice, ...]) -> np.ndarray:
         dtype, rest = self._kinds[name]
+        columns: Sequence[int] | None = None
+        if self._lies_apart(name) and len(at) == len(shape):  # what is wanted of the last axis
+            columns = np.atleast_1d(np.arange(*rest)[at[-1]]).tolist()
+            at = (*at[:-1], slice(None) if isinstance(at[-1], slice) else 0)
+            rest = (len(columns),)
         inner, each = (*shape[1:], *rest), math.prod(shape[1:])
         found = np.empty((rows.stop - rows.start, *np.empty(inner, np.int8)[at].shape), dtype)
         for block in slices((len(found), *inner), dtype.itemsize):
-            part = self.read(name, (rows.start + block.start) * each, (rows.start + block.stop) * each)
+            part = self.read(name, (rows.start + block.start) * each, (rows.start + block.stop) * each, columns)
             found[block] = part.reshape(-1, *inner)[(slice(None), *at)]
         return found
 

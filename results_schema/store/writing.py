@@ -1,5 +1,6 @@
 """Tables into one netCDF-4 file: the same tables give the same bytes."""
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,12 @@ from results_schema.blocks import CHUNK_BYTES, chunk_shape, slices
 from results_schema.store import files
 from results_schema.store.tables import Column, Table
 
-PLAIN: Mapping[str, Any] = {"fletcher32": True}  # of what is read soon
+PLAIN: Mapping[str, Any] = {}  # of parts, which are read soon, and whose whole files have a SHA-256
+GUARDED: Mapping[str, Any] = {"fletcher32": True}
 PACKED: Mapping[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
+# What keeps more than this part of its bytes is left as it is: results of a march keep two thirds, and to pack those of
+# a million variants takes longer than a tenth of the march itself.
+WORTH_PACKING = 0.6
 
 
 def write_tables(
@@ -51,7 +56,9 @@ def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, A
     if column.data.dtype.kind == "f" and not column.is_coordinate:
         options["fill_value"] = column.data.dtype.type(np.nan)
     if column.is_chunked:
-        options |= {**filters, "chunksizes": chunk_shape(column.data.shape, column.data.dtype.itemsize)}
+        shape = chunk_shape(column.data.shape, column.data.dtype.itemsize)
+        hard = filters is PACKED and not _shrinks(column.data, shape)
+        options |= {**(GUARDED if hard else filters), "chunksizes": shape}
     variable = place.createVariable(name, str if column.is_text else column.data.dtype, column.dims, **options)
     variable.set_auto_maskandscale(False)
     if column.is_chunked:
@@ -63,6 +70,16 @@ def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, A
         return
     for part in slices(column.data.shape, column.data.dtype.itemsize):
         variable[part] = np.asarray(column.data[part])
+
+
+def _shrinks(data: Any, shape: tuple[int, ...]) -> bool:
+    """Whether the first chunk of an array says that it is worth packing; arrays of a chunk are."""
+    if data.nbytes <= CHUNK_BYTES:
+        return True
+    size = data.dtype.itemsize
+    first = np.asarray(data[: shape[0]])[tuple(slice(length) for length in shape)]
+    shuffled = np.ascontiguousarray(first).view(np.uint8).reshape(-1, size).T.tobytes()
+    return len(zlib.compress(shuffled, PACKED["complevel"])) < WORTH_PACKING * len(shuffled)
 
 
 def _attribute(value: Any) -> Any:

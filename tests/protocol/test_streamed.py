@@ -132,6 +132,7 @@ def test_rows_come_back_in_the_order_of_variants(tmp_path: Path, monkeypatch: py
     order, expected = np.random.default_rng(3).permutation(1000), {"a": np.arange(1000.0), "b": np.empty((1000, 3, 2))}
     expected["b"][:] = np.arange(6.0).reshape(3, 2) + np.arange(1000.0)[:, None, None]
     expected["c"] = (np.arange(1000) % 7).astype(np.int8)
+    expected["apart"] = np.arange(4000.0).reshape(1000, 4)
     with (tmp_path / "scratch").open("w+b") as file:
         found = RowsOnDisk(file, tmp_path, 1000)
         for variants in np.array_split(order, 13):
@@ -143,6 +144,10 @@ def test_rows_come_back_in_the_order_of_variants(tmp_path: Path, monkeypatch: py
                 np.testing.assert_array_equal(found.read(name, first, end), array[first:end])
             on_grid = found.array(name, (10, 20, 5))
             np.testing.assert_array_equal(np.asarray(on_grid), array.reshape(10, 20, 5, *array.shape[1:]))
+        np.testing.assert_array_equal(found.read("apart", 100, 700, [3, 1]), expected["apart"][100:700, [3, 1]])
+        grid, numbers = tables.xr.Variable(("x", "y", "z"), found.array("apart", (50, 20))), expected["apart"]
+        for key in ((..., 2), (slice(4, 9), 3, 1), (slice(None), slice(None), slice(3, None, -2))):
+            np.testing.assert_array_equal(grid[key].values, numbers.reshape(50, 20, 4)[key])
         with pytest.raises(AssertionError, match="comes twice"):
             found.add(Rows(order[:1], {name: array[order[:1]] for name, array in expected.items()}))
 

@@ -84,6 +84,16 @@ def test_filters_flags_and_attributes_on_disk(path):
         assert not raw.cmptypes and not raw.vltypes and not raw.enumtypes
 
 
+def test_what_packing_hardly_shrinks_is_left_as_it_is(path):
+    root = march().isel(speed=[0] * 1000, mass=[0] * 200).drop_vars(["speed", "mass", "speed_ratio"], errors="ignore")
+    root["midspan_max"][:] = np.random.default_rng(1).normal(size=root["midspan_max"].shape)
+    write_archive(path, root)
+    with netCDF4.Dataset(path) as raw:
+        assert raw["midspan_max"].filters()["fletcher32"] and not raw["midspan_max"].filters()["zlib"]
+        assert raw["status"].filters()["zlib"]
+    np.testing.assert_array_equal(open_archive(path).root["midspan_max"].values, root["midspan_max"].values)
+
+
 def test_debians_ncdump_reads_it(path):
     write_archive(path, march(), groups())
     if shutil.which("ncdump"):
