@@ -248,6 +248,8 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
         return ""
     fine = results.dataset["status"].values == int(Status.OK)
     estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
+    if not tolerances.size and group is not None and Verdict.of(group).count:
+        return f"nothing is held to a tolerance; {_unheld(group, results)}."
     if not tolerances.size or (group is None and not estimates.size):
         return ""
     errors = "estimated errors" if fine.all() else "estimated errors of those that are ok"
@@ -335,6 +337,8 @@ def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
 def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
     """The sentence on variants that the archive calls ok."""
     said = f"audit of {counted(verdict.count, 'variant')} found "
+    if not np.isfinite(group["tolerance"].values).any():
+        return f"{said}what is only estimated: {_unheld(group, results)}"
     if not np.isfinite(verdict.worst) or verdict.worst < 0.0:
         return f"{said}no number to compare"
     asked, observed, name = _worst(group, verdict)
@@ -344,6 +348,20 @@ def _told(group: xr.Dataset, verdict: Verdict, results: Results) -> str:
     )
     at = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in words.items())
     return f"asked {scientific(asked)}, {said}at most {scientific(observed)}, worst{f' at {at}' if at else ''} ({name})"
+
+
+def _unheld(group: xr.Dataset, results: Results) -> str:
+    """What the group says of variants that the archive calls ok where nothing is held: the largest observed error of
+    what is no place, beside the estimated one."""
+    ours = np.asarray(group["variant_status"].values) == int(Status.OK)
+    own = [not str(name).endswith("_position") for name in group["result"].values]
+    observed, told = (group[f"{name}_error"].values[ours][:, own] for name in ("observed", "estimated"))
+    said = f"{counted(int(ours.sum()), 'variant')} computed again with {_more(results)}"
+    if not np.isfinite(observed).any():
+        return f"{said} found no number to compare"
+    place = np.unravel_index(int(np.nanargmax(observed)), observed.shape)
+    name, differ = group["result"].values[own][place[1]], "differ" if ours.sum() > 1 else "differs"
+    return f"{said} {differ} by at most {scientific(observed[place])} ({name}; {scientific(told[place])} was estimated)"
 
 
 def _worst(group: xr.Dataset, verdict: Verdict) -> tuple[float, float, str]:

@@ -21,7 +21,7 @@ from studies.commands.cli import main
 from studies.commands.screens import show_outcome
 from studies.protocol.parts import Work
 from studies.reporting.summary import exit_code
-from studies.results.formatting import number
+from studies.results.formatting import number, scientific
 from studies.results.results import Results
 from studies.runs.audit import (
     GROUP,
@@ -70,6 +70,19 @@ def test_what_is_observed_is_what_a_finer_march_by_hand_says(tmp_path: Path) -> 
         gap = abs(float(reported["midspan_max"] - fine["midspan_max"])) / static
         observed = float(own["observed_error"].sel(result="midspan_max"))  # at least half of what histories differ by
         assert 0.98 * gap <= observed <= 5.0 * gap + 2e-4
+
+
+def test_what_nothing_holds_is_audited_and_told(fine: Outcome) -> None:
+    group, results = group_of(fine).copy(deep=True), Results.of(fine.results)
+    group["tolerance"][:] = np.nan
+    own = group.sel(result=[name for name in group["result"].values if not name.endswith("_position")])
+    worst = own["observed_error"].max("sample").idxmax().item()
+    told = told_audit(group, results)[0]
+    assert "no number" not in told and f"({worst};" in told
+    assert f"at most {scientific(float(own['observed_error'].max()))} " in told
+    unheld = fine.results.assign(tolerance=group["tolerance"])
+    assert told_accuracy(group, Results.of(unheld)).startswith("nothing is held to a tolerance; ")
+    assert Verdict.of(group).held
 
 
 def test_plenty_holds(fine: Outcome) -> None:
