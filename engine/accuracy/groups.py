@@ -20,6 +20,7 @@ from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, 
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
 from engine.march.outcome import number_of, outcome, used, vibration
+from engine.march.rest import counts_settling
 from engine.model.timeline import MOST_STATIONS
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
 from results_schema.arrays import Array, Counts, split
@@ -150,7 +151,7 @@ class MarchGroup(Group):
     @property
     def rows(self) -> int:
         keeps = self.grid.asked.reduction is not None or self.grid.listens
-        return super().rows if keeps else 0
+        return super().rows if keeps else counts_settling(self.tables).size
 
     @property
     def work(self) -> float:

@@ -70,6 +70,10 @@ class Pair:
         """A place, over the length of the first carriage's track."""
         return self.gap(name) / self.model.riders[0].length
 
+    def duration(self, name: str) -> Array:
+        """A time that something takes, over itself."""
+        return _over(self.gap(name), np.abs(self.other.numbers[name]))
+
     def history(self, sensor: int) -> Array:
         """A kept history."""
         return np.asarray(self.apart[sensor] / self.other.scale[:, sensor])
@@ -115,6 +119,9 @@ def _of_sensors(asked: Asked) -> Iterator[Entry]:
             yield Result(own, name, *extreme), partial(Pair.reading, name=own, sensor=j)
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)
+        if sensor.settling_band is not None:
+            own = f"{name}_settling_time"
+            yield Result(own, name), partial(Pair.duration, name=own)
         if asked.keeps_histories:
             yield Result(name, name, *history), partial(Pair.history, sensor=j)
 

@@ -22,6 +22,7 @@ from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES
 from engine.march.envelopes import check_places, places_read
 from engine.march.outcome import Asked
+from engine.march.rest import settling
 from engine.march.step_rules import check_even_steps, check_free_vibration, check_most_steps, check_slowest, check_steps
 from engine.march.tables import SceneTables
 from engine.model.distinct_models import base_scene, scenes
@@ -316,7 +317,8 @@ def check_readings(scene: SceneModel, window: Window) -> None:
 def numbers_per_variant(asked: Asked) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
     study, reduction = asked.study, asked.reduction
-    found = (6 + study.output.residual) * len(study.sensor) + 4 * len(study.carriage) + 10 + 2 * places_read(study)
+    found = (6 + study.output.residual) * len(study.sensor) + len(settling(study))
+    found += 4 * len(study.carriage) + 10 + 2 * places_read(study)
     found += -(-len(results_of(asked)) // 2)  # errors are of half that size
     if reduction is not None:
         sizes = reduction.sizes(study)

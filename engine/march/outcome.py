@@ -14,6 +14,7 @@ from engine.kernels import layout
 from engine.kernels.schemes import Scheme
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
+from engine.march.rest import counts_settling, elapsed, residuals, settling_times
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
@@ -99,14 +100,16 @@ def outcome(
 ) -> Outcome:
     """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
     own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
-    counts = np.unique(np.concatenate([own, stations, *(side.counts for side in tables.kinks)]))
+    watched = (counts_settling(tables), *(side.counts for side in tables.kinks))
+    counts = np.unique(np.concatenate([own, stations, *watched]))
     lanes, size = in_whole_blocks(values), values.size
     marched = march_scheme(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
         **_extremes(tables, marched, counts),
-        **_residuals(tables, values, marched),
+        **residuals(tables, values, marched),
+        **settling_times(tables, values, counts, marched.history),
         **_contact_forces(tables, values, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
@@ -159,19 +162,6 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
         found[f"{sensor.name}_rms"] = np.sqrt(
             statistics[layout.SQUARES] / np.where(statistics[layout.SECONDS] > 0.0, statistics[layout.SECONDS], 1.0)
         )
-    return found
-
-
-def _residuals(tables: SceneTables, values: VariantValues, marched: Marched) -> Flat:
-    """By how much every sensor is off its static value at most, while all carriages rest."""
-    if not len(marched.resting):
-        return {}
-    unit, found = tables.statics.at(tables.at_rest), Flat()
-    for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
-        static = unit.force[0, j] @ weights(tables.model, values) + unit.gravity[0, j] * values.gravity
-        above, below = marched.resting[j, layout.LARGEST] - static, static - marched.resting[j, layout.SMALLEST]
-        off = np.maximum(above, below)
-        found[f"{sensor.name}_residual"] = np.where(np.isneginf(off), np.nan, off)
     return found
 
 
@@ -314,7 +304,7 @@ def histories(
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
     marched = march_scheme(tables, in_whole_blocks(values), counts, values.size, halted)
     time_scale = values.scene_time_scale
-    arrays: dict[str, Array] = {"elapsed": _elapsed(tables, counts, time_scale)}
+    arrays: dict[str, Array] = {"elapsed": elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):
         arrays[sensor.name] = marched.history[:, j].T
     for c, carriage in enumerate(tables.model.carriages):
@@ -327,20 +317,6 @@ def histories(
         if name != "elapsed":
             array[nothing] = np.nan
     return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-
-
-def _elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
-    """(V, H) seconds since time 0 of stations by their count."""
-    timeline = tables.timeline
-    index, tau = timeline.moments(counts.astype(np.float64))
-    found = tau * time_scale[:, None]
-    free = np.array([segment.free for segment in timeline.segments])[index]
-    if free.any():
-        start = next(segment.first for segment in timeline.segments if segment.free)
-        steps = timeline.steps - start
-        rest = (counts - start) * (tables.free_seconds / steps)
-        found = found + np.where(free, rest, 0.0)
-    return found
 
 
 def _reduced(

@@ -35,10 +35,10 @@ def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "no
     return np.unique(np.rint(np.linspace(first, last, WHOLE_STATIONS)).astype(np.int64))
 
 
-def counts_at_rest(timeline: Timeline) -> Counts:
-    """Stations by their count over the end of a run, from where all carriages rest."""
+def counts_at_rest(timeline: Timeline, most: int = REST_STATIONS) -> Counts:
+    """Stations by their count over the end of a run, from where all carriages rest; at most so many."""
     first, last = min(segment.first for segment in timeline.segments if segment.rests), timeline.window[1]
-    return np.unique(np.rint(np.linspace(first, last, REST_STATIONS)).astype(np.int64))
+    return np.unique(np.rint(np.linspace(first, last, most)).astype(np.int64))
 
 
 def counts_reduced(timeline: Timeline, stations: int) -> Counts:

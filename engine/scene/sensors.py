@@ -43,12 +43,18 @@ NodeName = Annotated[Annotated[str, Tag(WORD)] | Annotated[int, Tag(NUMBER)], by
 
 
 Limit = Annotated[Frequency, Field(gt=0)]
+Band = Annotated[Length, Field(gt=0)]
 
 
 def _check_limit(limit: float | None, reads: Quantity) -> None:
     if limit is not None and not reads.rate:
         known = ", ".join(name for name, quantity in QUANTITIES.items() if quantity.rate)
         raise fault(f"a frequency_limit of {reads.name} is not told", expected=f"quantity: one of {known}")
+
+
+def _check_band(sensor: Sensor) -> None:
+    if sensor.settling_band is not None and sensor.reads.unit != "m":
+        raise fault("a settling_band is one of displacements", expected='quantity = "displacement"')
 
 
 def _check_moment(sensor: Sensor) -> None:
@@ -70,6 +76,7 @@ class Sensor(Spec):
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
     forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration.
+    settling_band: within which of its static value a displacement has settled after a stop.
     """
 
     body: str | None = None
@@ -84,6 +91,7 @@ class Sensor(Spec):
     quantity: Annotated[str, AfterValidator(one_of(more=QUANTITIES, meant=MEANT))] = "displacement"
     tolerance: OwnTolerance | None = None
     frequency_limit: Limit | None = None
+    settling_band: Band | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:
@@ -98,6 +106,7 @@ class Sensor(Spec):
         if self.reads.of_support and (self.rides, self.member, self.point) != (None, None, None):
             raise fault("a support is a place of a beam, or a node", expected="at = metres, or node = its name")
         _check_moment(self)
+        _check_band(self)
         if self.direction is not None and self.node is None and self.member is None:
             raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):

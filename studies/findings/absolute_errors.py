@@ -54,6 +54,8 @@ def _scale(results: Results, name: str, sensor: str) -> Any:
         return results.of_sensor(name, sensor)
     if name == "lag":
         return _cruise(results)
+    if name.endswith("_settling_time"):
+        return dataset[name]
     if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
         return _scale_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
     return 1.0  # an index

@@ -9,7 +9,7 @@ from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
 from studies.findings.effects import by_effect
 from studies.results.findings_common import in_words
-from studies.results.formatting import quantity
+from studies.results.formatting import counted, quantity
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
@@ -67,9 +67,30 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
-    limit = limits.limit(results.study.sensor[sensor].quantity)
+    limit, settled = limits.limit(results.study.sensor[sensor].quantity), _settled(results, sensor)
     if limit is None:
-        return f"{said}."
+        return f"{said}{settled}."
     axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None else ""
-    return f"{said}; it exceeds {quantity(limit, units)} {where_beyond(results, values, limit, axis)}{over}."
+    return f"{said}; it exceeds {quantity(limit, units)} {where_beyond(results, values, limit, axis)}{over}{settled}."
+
+
+def _settled(results: Results, sensor: str) -> str:
+    """How long a sensor takes to settle at most, and how many variants have not by the end of their runs."""
+    band = results.study.sensor[sensor].settling_band
+    if band is None:
+        return ""
+    name = f"{sensor}_settling_time"
+    values = np.where(results.with_values, results.dataset[name].transpose(*results.dims).values, np.nan)
+    left = int(np.count_nonzero(results.with_values & np.isnan(values)))
+    more = (
+        f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run" if left else ""
+    )
+    place, units = extreme(values), results.sensors[sensor]
+    if place is None or float(values[place]) == 0.0:
+        first = "" if place is None else "it is there from the stop on"
+    else:
+        took, error = float(values[place]), float(absolute_errors(results, name)[place])
+        first = f"it settles {quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
+        first += in_words(results, place)
+    return f"; within {quantity(band, units)} of its static value {', '.join(one for one in (first, more) if one)}"

@@ -149,3 +149,17 @@ def test_the_study_of_the_documentation() -> None:
     half_swing = np.array([2.99, 4.84, 0.95]) * 1e-6
     first = 1.0 + 0.5 * np.pi * 0.02  # over half of the swing, which spans half a period more
     assert found.sway_residual.values == pytest.approx(half_swing * first, rel=0.01)
+
+
+def test_it_is_said_how_long_it_takes_to_settle() -> None:
+    """At most, for which variant, and how many have not settled."""
+    damped, sensors = beam(modes=1, damping_ratio=0.03), {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    found = studies.run(study(damped, force(2.0, MOVE), output={"residual": True}, sensor=sensors, sweep=SWEPT))
+    times = found.midspan_settling_time.values
+    assert np.isnan(times).sum() == 1 and np.nanmax(times) > 0.1
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    longest = STEPS[int(np.nanargmax(times))]
+    assert f"within 8 mm of its static value it settles {np.nanmax(times):.3g} s after the stop at the latest" in said
+    assert f"at acceleration {longest} m/s²" in said and said.endswith(
+        "1 variant has not settled by the end of the run."
+    )

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import engine
 from engine.model.timeline import MOST_STATIONS
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, under
 
@@ -127,3 +128,61 @@ def test_a_sprung_mass_rests_on_the_modes_that_are_marched() -> None:
         assert int(found.modes_used) > 12
         rest.append(float(found.column_residual))
     assert rest[0] == pytest.approx(rest[1], rel=0.1)
+
+
+def settles(band: float, dwell: float = 6.0, **changes: Any) -> Study:
+    """One damped mode under a force that moves and stops."""
+    sensors = {"midspan": fixed(0.5) | {"settling_band": band}}
+    tables: Table = {"solver": ONE_MODE, "output": {"residual": True}, "sensor": sensors}
+    return study(beam(modes=1, damping_ratio=0.03), force(2.0, MOVE | {"dwell": dwell}), **(tables | changes))
+
+
+@pytest.mark.parametrize("scheme", ["average-acceleration", "fox-goodwin", "richardson"])
+def test_when_it_has_settled(scheme: str) -> None:
+    """The last time that an ODE is beyond the band; 0 where it never is, and none where it still is at the end."""
+    motion = settles(1.0).carriage["car"].motion
+    scale = motion.time_scale
+    end = motion.rests_from * scale
+
+    def shape(s: float) -> float:
+        return math.sqrt(2.0) * math.sin(math.pi * s)
+
+    def rates(t: float, state: Any) -> list[float]:
+        place = float(motion.path(min(t, end) / scale).S)
+        return [state[1], 2.0 * shape(place) - 0.06 * OMEGA * state[1] - OMEGA**2 * state[0]]
+
+    times = np.linspace(end, scale, 100001)
+    start = [2.0 * shape(0.2) / OMEGA**2, 0.0]
+    at = solve_ivp(rates, (0.0, scale), start, t_eval=times, rtol=1e-10, atol=1e-13, max_step=0.01).y[0]
+    off = np.abs(shape(0.5) * (at - 2.0 * shape(0.7) / OMEGA**2))
+    for band in (5e-3, 7e-3, 9e-3):
+        expected = times[np.flatnonzero(off > band)[-1]] - end
+        found = engine.run(settles(band, solver=ONE_MODE | {"scheme": scheme}))
+        assert float(found.midspan_settling_time) == pytest.approx(expected, abs=2e-4)
+        assert found.midspan_settling_time.attrs["units"] == "s"
+        told = float(found.estimated_error.sel(result="midspan_settling_time")) * expected
+        assert abs(float(found.midspan_settling_time) - expected) <= told + 7e-5  # as far as the ODE tells it
+    assert np.isnan(float(engine.run(settles(1e-3)).midspan_settling_time))
+    assert float(engine.run(settles(0.5)).midspan_settling_time) == 0.0
+
+
+def test_settling_of_a_sweep_is_that_of_each_alone() -> None:
+    """By pilots and chunks that keep no histories, and by more steps than stations."""
+    damping = np.linspace(0.01, 0.1, 400).tolist()
+    swept = {"damping": {"of": "body.bed.damping_ratio", "values": damping}}
+    found = engine.run(settles(5e-3, solver={"tolerance": 1e-3}, sweep=swept))
+    fine = engine.run(settles(5e-3, solver={"steps": 20_000, "scheme": "fox-goodwin"}, sweep=swept))
+    here, there = (np.asarray(one.midspan_settling_time.values) for one in (found, fine))
+    told = found.estimated_error.sel(result="midspan_settling_time").values * here
+    known = np.isfinite(here) & np.isfinite(there)
+    assert known.sum() > 340
+    assert np.mean(np.abs(here - there)[known] <= told[known] + 1e-4) > 0.95
+    assert found.tolerance.sel(result="midspan_residual") == 1e-3
+    assert np.isnan(found.tolerance.sel(result="midspan_settling_time"))
+
+
+def test_a_band_wants_a_displacement_and_residual_vibrations() -> None:
+    with pytest.raises(BadInput, match=r"\[output\] residual = true"):
+        settles(1e-3, output={})
+    with pytest.raises(BadInput, match="a settling_band is one of displacements"):
+        settles(1e-3, sensor={"midspan": fixed(0.5, "velocity") | {"settling_band": 1e-3}})

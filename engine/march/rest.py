@@ -1,0 +1,95 @@
+"""What sensors do after all carriages have come to rest or left: how far they swing on, and how long until they have
+settled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.kernels import layout
+from engine.model.lane_table import weights
+from engine.observation.histories import counts_at_rest
+from results_schema.arrays import Array, Counts
+
+if TYPE_CHECKING:
+    from engine.march.march import Marched
+    from engine.march.tables import SceneTables
+    from engine.scene.study import Study
+    from engine.scene.variants import VariantValues
+
+MOST_STATIONS = 4097  # of a rest on which it is looked for when sensors have settled: 16 of each of 256 swings
+
+
+def residuals(tables: SceneTables, values: VariantValues, marched: Marched) -> dict[str, Array]:
+    """By how much every sensor is off its static value at most, while all carriages rest."""
+    if not len(marched.resting):
+        return {}
+    found, names = dict[str, Array](), list(tables.model.study.sensor)
+    for name, static, watched in zip(names, _static(tables, values), marched.resting, strict=False):
+        off = np.maximum(watched[layout.LARGEST] - static, static - watched[layout.SMALLEST])
+        found[f"{name}_residual"] = np.where(np.isneginf(off), np.nan, off)
+    return found
+
+
+def settling(study: Study) -> list[str]:
+    """The sensors of which it is told how long they take to settle."""
+    return [name for name, sensor in study.sensor.items() if sensor.settling_band is not None]
+
+
+def counts_settling(tables: SceneTables) -> Counts:
+    """Stations by their count at which it is looked for when sensors have settled; none where that is not told."""
+    if not (settling(tables.model.study) and tables.watches_rest):
+        return np.zeros(0, dtype=np.int64)
+    return counts_at_rest(tables.timeline, MOST_STATIONS)
+
+
+def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> dict[str, Array]:
+    """How long after all carriages have come to rest or left a sensor is off its static value by more than its band,
+    s; NaN where it still is at the end. history (H, J, V) of the sensors at stations by their count."""
+    own, found = counts_settling(tables), dict[str, Array]()
+    if not own.size:
+        return found
+    readings, seconds = history[np.searchsorted(counts, own)], elapsed(tables, own, values.scene_time_scale).T
+    for j, (name, static) in enumerate(zip(tables.model.study.sensor, _static(tables, values), strict=True)):
+        band = tables.model.study.sensor[name].settling_band
+        if band is not None:
+            found[f"{name}_settling_time"] = last_beyond(np.abs(readings[:, j] - static), band, seconds - seconds[0])
+    return found
+
+
+def last_beyond(off: Array, band: float, seconds: Array) -> Array:
+    """(V,) when what is off (H, V) at times (H, V) comes within a band for good, between stations along a line.
+
+    >>> last_beyond(np.array([[3.0, 0.1], [1.0, 0.2]]), 2.0, np.array([[0.0, 0.0], [1.0, 1.0]])).tolist()
+    [0.5, 0.0]
+    """
+    beyond, lanes = ~(off <= band), np.arange(off.shape[1])
+    last = len(off) - 1 - np.argmax(beyond[::-1], axis=0)
+    here, after = np.minimum(last, len(off) - 2), np.minimum(last + 1, len(off) - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = (off[here, lanes] - band) / (off[here, lanes] - off[after, lanes])
+        when = seconds[here, lanes] + part * (seconds[after, lanes] - seconds[here, lanes])
+    when = np.where(last == len(off) - 1, np.nan, when)
+    return np.asarray(np.where(beyond.any(axis=0), when, 0.0))
+
+
+def _static(tables: SceneTables, values: VariantValues) -> Array:
+    """(J, V) static readings of the sensors where all carriages rest."""
+    unit, count = tables.statics.at(tables.at_rest), len(tables.model.study.sensor)
+    static = unit.force[0, :count] @ weights(tables.model, values) + unit.gravity[0, :count, None] * values.gravity
+    return np.asarray(static)
+
+
+def elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
+    """(V, H) seconds since time 0 of stations by their count."""
+    timeline = tables.timeline
+    index, tau = timeline.moments(counts.astype(np.float64))
+    found = tau * time_scale[:, None]
+    free = np.array([segment.free for segment in timeline.segments])[index]
+    if free.any():
+        start = next(segment.first for segment in timeline.segments if segment.free)
+        steps = timeline.steps - start
+        rest = (counts - start) * (tables.free_seconds / steps)
+        found = found + np.where(free, rest, 0.0)
+    return found
