@@ -83,14 +83,14 @@ def _settled(results: Results, sensor: str) -> str:
     name = f"{sensor}_settling_time"
     values = np.where(results.with_values, results.dataset[name].transpose(*results.dims).values, np.nan)
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
-    more = (
-        f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run" if left else ""
-    )
-    place, units = extreme(values), results.sensors[sensor]
-    if place is None or float(values[place]) == 0.0:
-        first = "" if place is None else "it is there from the stop on"
-    else:
+    place, units, said = extreme(values), results.sensors[sensor], list[str]()
+    within = f"within {quantity(band, units)} of its static value"
+    if place is not None and float(values[place]) == 0.0:
+        said.append(f"it is {within} from the stop on")
+    elif place is not None:
         took, error = float(values[place]), float(absolute_errors(results, name)[place])
-        first = f"it settles {quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
-        first += in_words(results, place)
-    return f"; within {quantity(band, units)} of its static value {', '.join(one for one in (first, more) if one)}"
+        when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
+        said.append(f"it has settled {within} {when}{in_words(results, place)}")
+    if left:
+        said.append(f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run")
+    return "".join(f"; {one}" for one in said)
