@@ -36,6 +36,12 @@ def residual_of(results: Results, sensor: str) -> Array:
     return np.where(results.with_values, values, np.nan)
 
 
+def settling_of(results: Results, sensor: str) -> Array:
+    """The settling time of a sensor, in the sweep's shape; NaN where it has not settled."""
+    values = results.dataset[f"{sensor}_settling_time"].transpose(*results.dims).values
+    return np.where(results.with_values, values, np.nan)
+
+
 def ringing(results: Results, limits: Limits) -> list[str]:
     """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it."""
     if not results.study.output.residual:
@@ -80,15 +86,14 @@ def _settled(results: Results, sensor: str) -> str:
     band = results.study.sensor[sensor].settling_band
     if band is None:
         return ""
-    name = f"{sensor}_settling_time"
-    values = np.where(results.with_values, results.dataset[name].transpose(*results.dims).values, np.nan)
+    values = settling_of(results, sensor)
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
     within = f"within {quantity(band, units)} of its static value"
     if place is not None and float(values[place]) == 0.0:
         said.append(f"it is {within} from the stop on")
     elif place is not None:
-        took, error = float(values[place]), float(absolute_errors(results, name)[place])
+        took, error = float(values[place]), float(absolute_errors(results, f"{sensor}_settling_time")[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
         said.append(f"it has settled {within} {when}{in_words(results, place)}")
     if left:

@@ -161,3 +161,9 @@ def test_it_is_said_how_long_it_takes_to_settle() -> None:
     longest, latest = STEPS[int(np.nanargmax(times))], f"{np.nanmax(times):.3g} s after the stop at the latest"
     assert f"it has settled within 8 mm of its static value {latest} at acceleration {longest} m/s²" in said
     assert said.endswith("; 1 variant has not settled by the end of the run.")
+    (figure,) = (one for one in studies.figures(found) if one.name == "settling")
+    assert figure.title.startswith(f"midspan takes up to {np.nanmax(times):.3g} s to settle")
+    assert "Gaps: not settled" in figure.caption
+    (axes,) = figure.drawing.axes
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), times, rtol=1e-6)
+    assert axes.get_ylabel() == "settling time (s)"

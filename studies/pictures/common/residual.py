@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +14,7 @@ from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import Limits
 from studies.findings.effects import by_effect
-from studies.findings.residual import MOST_SENSORS, residual_of, ringing
+from studies.findings.residual import MOST_SENSORS, residual_of, ringing, settling_of
 from studies.pictures.common.figures import (
     BLUE,
     Figure,
@@ -27,7 +29,7 @@ from studies.pictures.common.sizes import FAR
 from studies.pictures.common.sweep_view import View, along_axis, coincide, draw_curves, one_legend, view
 from studies.pictures.common.traces import coarse, picked, since_rest
 from studies.results.findings_common import in_words, told_hanging
-from studies.results.formatting import counted, quantity, scale_for
+from studies.results.formatting import counted, listed, quantity, scale_for
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
@@ -35,60 +37,101 @@ MOST_HISTORIES = 3
 BAND = 0.3  # of their colour that bands have together
 
 
+class Row(NamedTuple):
+    """A panel over the sweep: values and estimated errors in the sweep's shape, their unit, what stands beside the axis
+    in a unit, and a limit of the values."""
+
+    sensor: str
+    values: Array
+    errors: Array
+    units: str
+    label: Callable[[str], str]
+    limit: float | None = None
+
+
 def pictures(results: Results, limits: Limits) -> list[Figure]:
-    """Over the sweep and over time, of sensors that swing on; none where the study does not tell it."""
+    """Over the sweep and over time, of sensors that swing on, and how long they take to settle; none where the study
+    does not tell it."""
     told = [sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any()]
     if not told:
         return []
     sensors, values = told[:MOST_SENSORS], residual_of(results, told[0])
     shown = picked(results, values, MOST_HISTORIES)
-    over_sweep = _over_sweep(results, sensors, limits, len(told) - len(sensors))
-    return [*over_sweep, *([_over_time(results, sensors, shown)] if shown else [])]
+    over_sweep = _residuals(results, sensors, limits, len(told) - len(sensors))
+    over_time = [_over_time(results, sensors, shown)] if shown else []
+    return [*over_sweep, *_settling(results, sensors), *over_time]
 
 
-def _over_sweep(results: Results, sensors: list[str], limits: Limits, fewer: int) -> list[Figure]:
-    """Residual vibrations against the swept number that changes those of the first sensor most; none without one."""
-    values = residual_of(results, sensors[0])
-    top = extreme(values)
-    assert top is not None
-    first, *others = [axis.paths for axis in by_effect(results, values)] or [()]
-    if not first:
-        return []
-    seen = view(results, first, [path for paths in others for path in paths], top)
-    units, size = results.sensors[sensors[0]], float(values[top])
-    limit = limits.limit(results.study.sensor[sensors[0]].quantity)
+def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int) -> list[Figure]:
+    """Residual vibrations over the sweep."""
+    rows = []
+    for sensor in sensors:
+        errors, label = absolute_errors(results, f"{sensor}_residual"), partial(results.label, sensor, of="residual")
+        limit = limits.limit(results.study.sensor[sensor].quantity)
+        rows.append(Row(sensor, residual_of(results, sensor), errors, results.sensors[sensor], label, limit))
+    size, units, limit = float(np.nanmax(rows[0].values)), rows[0].units, rows[0].limit
     against = ""
     if limit is not None:
         against = f", {'beyond' if size > limit else 'within'} the limit of {quantity(limit, units)}"
-    swings = f"{sensors[0].replace('_', ' ')} still swings by up to {quantity(size, units)} at rest"
-    caption = seen.caption(
+    swings = f"{sensors[0].replace('_', ' ')} still swings by up to {quantity(size, units)} at rest{against}"
+    caption = (
         "Largest difference from the static value after all carriages have come to rest or left.",
-        f"{'Bars' if seen.is_sampled else 'Bands'}: the estimated error.",
         f"{counted(fewer, 'more sensor')} in the archive." if fewer else "",
     )
-    fill = partial(_draw_sweep, seen, sensors, limits)
-    title, height = f"{swings}{against},{in_words(results, top)}", 0.9 + 1.9 * len(sensors)
-    return [telling_limits(draw("residual", title, caption, height, fill))]
+    return _over_sweep(results, "residual", rows, swings, caption)
 
 
-def _draw_sweep(seen: View, sensors: list[str], limits: Limits, drawing: Drawing) -> None:
-    rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
-    for axes, sensor in zip(rows, sensors, strict=True):
-        _draw_row(axes, seen, sensor, limits.limit(seen.results.study.sensor[sensor].quantity))
-    one_legend(list(rows))
-    along_axis(rows[-1], seen)
+def _settling(results: Results, sensors: list[str]) -> list[Figure]:
+    """Settling times over the sweep, of sensors that have a band and do not all settle at once."""
+    rows, bands = [], []
+    for sensor in sensors:
+        band, name = results.study.sensor[sensor].settling_band, f"{sensor}_settling_time"
+        if band is None or not np.nanmax(values := settling_of(results, sensor), initial=0.0) > 0.0:
+            continue
+        rows.append(Row(sensor, values, absolute_errors(results, name), "s", "settling time ({})".format))
+        bands.append(f"{sensor.replace('_', ' ')} {quantity(band, results.sensors[sensor])}")
+    if not rows:
+        return []
+    longest = quantity(float(np.nanmax(rows[0].values)), "s")
+    caption = (
+        f"Time after the stop until the reading stays within the band of its static value: {listed(bands)}.",
+        "Gaps: not settled by the end of the run." if any(np.isnan(row.values).any() for row in rows) else "",
+    )
+    takes = f"{rows[0].sensor.replace('_', ' ')} takes up to {longest} to settle"
+    return _over_sweep(results, "settling", rows, takes, caption)
+
+
+def _over_sweep(results: Results, name: str, rows: list[Row], title: str, words: Sequence[str]) -> list[Figure]:
+    """Rows against the swept number that changes those of the first most; none without one."""
+    top = extreme(rows[0].values)
+    assert top is not None
+    first, *others = [axis.paths for axis in by_effect(results, rows[0].values)] or [()]
+    if not first:
+        return []
+    seen = view(results, first, [path for paths in others for path in paths], top)
+    said, *more = words
+    caption = seen.caption(said, f"{'Bars' if seen.is_sampled else 'Bands'}: the estimated error.", *more)
+    height = 0.9 + 1.9 * len(rows)
+    title = f"{title},{in_words(results, top)}"
+    return [telling_limits(draw(name, title, caption, height, partial(_draw_sweep, seen, rows)))]
+
+
+def _draw_sweep(seen: View, rows: list[Row], drawing: Drawing) -> None:
+    panels = drawing.subplots(len(rows), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, row in zip(panels, rows, strict=True):
+        _draw_row(axes, seen, row)
+    one_legend(list(panels))
+    along_axis(panels[-1], seen)
     drawing.align_ylabels()
 
 
-def _draw_row(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
-    """The residual vibrations of one sensor with their errors, and its limit."""
-    results, units = seen.results, seen.results.sensors[sensor]
-    like = results.dataset["status"]
-    values, errors = residual_of(results, sensor), absolute_errors(results, f"{sensor}_residual")
-    largest = float(np.nanmax(seen.plane(like.copy(data=values)), initial=0.0))
-    scale = scale_for(largest, units)
-    curves = seen.curves(like.copy(data=values * scale.factor))
-    bounds = [curve.y for curve in seen.curves(like.copy(data=errors * scale.factor))]
+def _draw_row(axes: Axes, seen: View, row: Row) -> None:
+    """The values of one sensor with their errors, and its limit."""
+    like, limit = seen.results.dataset["status"], row.limit
+    largest = float(np.nanmax(seen.plane(like.copy(data=row.values)), initial=0.0))
+    scale = scale_for(largest, row.units)
+    curves = seen.curves(like.copy(data=row.values * scale.factor))
+    bounds = [curve.y for curve in seen.curves(like.copy(data=row.errors * scale.factor))]
     draw_curves(axes, seen, curves)
     bands = list(zip(curves, bounds, shades(len(curves)), strict=True))
     if seen.y is not None and coincide(curves):
@@ -101,9 +144,9 @@ def _draw_row(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
             axes.fill_between(
                 curve.x, curve.y - off, curve.y + off, color=colour, alpha=BAND / len(bands), linewidth=0.0
             )
-    axes.set_ylabel(results.label(sensor, scale.unit, "residual"))
-    axes.set_title(sensor.replace("_", " "))
-    said = f"limit {quantity(limit, units)}" if limit is not None else ""
+    axes.set_ylabel(row.label(scale.unit))
+    axes.set_title(row.sensor.replace("_", " "))
+    said = f"limit {quantity(limit, row.units)}" if limit is not None else ""
     if limit is not None and limit <= FAR * largest:
         limit_line(axes, limit * scale.factor, said, "left")
     elif limit is not None:
