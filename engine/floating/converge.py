@@ -139,7 +139,7 @@ def converge(
         apart = differences(model, found.of(active), now)
         by_steps = np.maximum(left_over(apart, change[:, active]), now.sooner)
         told = by_steps + rung.left_out[:, None]
-        error[:, active], change[:, active] = told + rung.by_fixed[:, None], apart
+        error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
         held[active] = worst(told, results, own)

@@ -115,7 +115,7 @@ def test_when_something_slides_over_an_end_is_known_to_a_step() -> None:
     off = np.abs(found.outcome.numbers["duration"] / wanted - 1.0)
     assert (wanted < 29.0).all()
     assert off.max() > 1e-4
-    assert (off <= (found.error - rung.by_fixed[:, None]).min(axis=0)).all()
+    assert (off <= (found.error - rung.by_fixed.told(columns, 12)).min(axis=0)).all()
 
 
 def test_a_missing_part_of_a_history_is_a_difference() -> None:

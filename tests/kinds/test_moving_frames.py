@@ -116,7 +116,7 @@ def test_what_fixed_modes_across_the_track_leave_out_is_told_beside_open_ones() 
     one = choose(study, VariantValues(study, {}, 1), np.full(1, 5.0), 5.0)
     flat = study.with_values({"frame.hull.lateral_modes": 0})
     none = choose(flat, VariantValues(flat, {}, 1), np.full(1, 5.0), 5.0)
-    assert np.nanmax(one.by_fixed) > 1e-6 and not none.by_fixed.any()
+    assert np.nanmax(one.by_fixed.error) > 1e-6 and not none.by_fixed.error.any()
 
 
 def test_every_kind_that_keeps_bodies_still_refuses_frames() -> None:
