@@ -12,8 +12,8 @@ from engine.accuracy.neighbour_errors import margin_of, nearest_others
 from engine.kernels.nearest_pilots import nearest
 from results_schema.arrays import Array
 
-# Measured over 114 scenes with 2 or 6 to 8 swept numbers (see `tests.calibration.fixed_modes`): by 3 or 6 of 16 pilots as
-# many errors were told too small; up to twice the largest a tenth fewer, by a median that is 7 to 18 % larger.
+# Measured over 114 scenes with 2 or 6 to 8 swept numbers (see `tests.calibration.fixed_modes`): by 3 or 6 of 16 pilots
+# as many errors were told too small; up to twice the largest a tenth fewer, by a median that is 7 to 18 % larger.
 NEAREST = 4  # pilots that tell a variant
 MOST = 1.5  # times the largest error of all pilots, beyond which nothing is told
 
