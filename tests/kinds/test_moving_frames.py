@@ -1,6 +1,7 @@
 """Studies of bodies whose frames move: from the study file to the dataset and its sentences."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,14 @@ from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from results_schema.store.archive import open_archive
 from studies.commands.catalogue import built_in
 from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
+from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
 from studies.results.results import Results
+from studies.runs.runner import run_to_archive
 from tests.floating.scenes import ARM, PAPER_BEAM, sliding_mass
 
 SWEPT = {
@@ -81,6 +85,19 @@ def test_a_mass_that_lifts_off_is_marked() -> None:
     status = studies.run(study)["status"]
     assert status.sel(mass=100.0, damping=0.0) == Status.SEPARATED
     assert status.sel(mass=50.0, damping=0.02) == Status.OK
+
+
+@pytest.mark.parametrize("histories", ["all", "none"])
+def test_a_mass_that_slides_over_an_end_is_archived(histories: str, tmp_path: Path) -> None:
+    """Its histories end there, of places with three numbers too; and where no variant has a history."""
+    study = paper(3.0, output={"histories": histories}).with_values({"carriage.load.motion.speed": 6.0})
+    outcome = run_to_archive(study, tmp_path / "off.nc", RunOptions())
+    found = open_archive(outcome.archive).root
+    assert (found["status"] == Status.SEPARATED).all() and (found["duration"] < 2.5).all()
+    assert ("end_place" in found) == (histories == "all")
+    if histories == "all":
+        gone = np.isnan(found["end_place"]).all(dim=("frame", "component"))
+        assert not gone.isel(station=0).any() and gone.isel(station=-1).all()
 
 
 def test_open_modes_are_as_many_as_pilots_find_enough() -> None:
