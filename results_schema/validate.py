@@ -146,7 +146,8 @@ def _value_findings(dataset: xr.Dataset, name: str, variable: Variable) -> Itera
         return
     missing = np.isnan(array.values)
     if variable.gaps_allowed:
-        missing &= missing.all(axis=-1, keepdims=True)
+        lead = 1 if "history" in array.dims else dataset["status"].ndim if "status" in dataset else 0
+        missing &= missing.all(axis=tuple(range(lead, array.ndim)), keepdims=True)
     unexplained = missing & ~failed
     if unexplained.any():
         yield f"{name}: expected numbers where the status keeps them, received NaN at {_places(unexplained)}"

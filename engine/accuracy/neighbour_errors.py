@@ -180,10 +180,10 @@ class _LeftOut(NamedTuple):
         own = measured.error[march[near]]
         tell = measured.error[march[near[0][:, None], others[near[1]]]] * rises[near][:, :, None]
         pairs = zip(own.T, worst_but_one(tell, axis=1).T, strict=True)
-        return np.array([_quantile(*pair) for pair in pairs]), _quantile(worst[near], most[near])
+        return np.array([margin_of(*pair) for pair in pairs]), margin_of(worst[near], most[near])
 
 
-def _quantile(own: Array, told: Array) -> float:
+def margin_of(own: Array, told: Array) -> float:
     """The ratio of errors to what is told of them that few are beyond."""
     known = (told > 0.0) & np.isfinite(own) & np.isfinite(told)
     return float(max(1.0, np.quantile(own[known] / told[known], SURE))) if known.any() else 1.0

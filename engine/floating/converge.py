@@ -137,9 +137,9 @@ def converge(
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
         apart = differences(model, found.of(active), now)
-        by_steps = left_over(apart, change[:, active])
+        by_steps = np.maximum(left_over(apart, change[:, active]), now.sooner)
         told = by_steps + rung.left_out[:, None]
-        error[:, active], change[:, active] = told + rung.by_fixed[:, None], apart
+        error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
         held[active] = worst(told, results, own)
@@ -209,4 +209,5 @@ def _replaced(found: Outcome, lanes: Counts, other: Outcome) -> Outcome:
     for name, array in found.numbers.items():
         array[lanes] = other.numbers[name]
     found.history[lanes], found.times[lanes], found.status[lanes] = other.history, other.times, other.status
+    found.sooner[lanes] = other.sooner
     return found

@@ -14,7 +14,7 @@ from engine.bodies.beam.beam import Beam
 from engine.bodies.beam.modes import uniform_beam
 from engine.bodies.rigid.rigid import Rigid
 from engine.floating.elastic import ABOUT_Y, ABOUT_Z, AXES, ElasticBody, X, Y, Z
-from engine.floating.static_shapes import with_statics
+from engine.floating.static_shapes import BENDING, STRETCHING, Law, with_statics
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -128,12 +128,13 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: 
     x, dx = _gauss([0.0, *hung, body.length])
     places, dm = np.zeros((x.size, 3)), body.mass_per_length * dx
     places[:, 0] = x
-    parts: list[Part] = [with_statics(_bending(body, count, Z), hung, x, dm)]
+    modal: list[tuple[Part, Law]] = [_bending(body, count, Z)]
     if frame.lateral_modes:
         lateral = body.model_copy(update={"second_moment": frame.lateral_second_moment})
-        parts.append(with_statics(_bending(lateral, frame.lateral_modes, Y), hung, x, dm))
+        modal.append(_bending(lateral, frame.lateral_modes, Y))
     if frame.axial_modes:
-        parts.append(_stretching(body, frame.axial_modes))
+        modal.append(_stretching(body, frame.axial_modes))
+    parts = [with_statics(part, law, hung, x, dm) for part, law in modal]
     lateral_moment = frame.lateral_second_moment or body.second_moment
     turning = body.density * body.length * (body.second_moment + lateral_moment)
     whirls = any(joint.freedoms > 1 for joint in frame.joints)
@@ -167,19 +168,23 @@ def _with_shapes(body: ElasticBody) -> ElasticBody:
     return replace(body, shapes=body.fields(body.places[:, 0], (0,))[0, :, : Z + 1])
 
 
-def _bending(beam: Beam, count: int, axis: int) -> Bending:
+def _bending(beam: Beam, count: int, axis: int) -> tuple[Bending, Law]:
     """The lowest modes that bend; those as a rigid body are the frame's own."""
     rigid = uniform_beam(beam, 2).rigid_modes
-    return Bending(beam, axis, np.asarray(uniform_beam(beam, count + rigid).omega[rigid:]), rigid)
+    omega = np.asarray(uniform_beam(beam, count + rigid).omega[rigid:])
+    law = Law(BENDING, beam.ends, beam.bending_stiffness / beam.length**3, beam.length)
+    return Bending(beam, axis, omega, rigid), law
 
 
-def _stretching(beam: Beam, count: int) -> Stretching:
+def _stretching(beam: Beam, count: int) -> tuple[Stretching, Law]:
     """Axial modes, the far end free, the near one held unless both ends of the beam are free."""
     number = np.arange(1, count + 1)
     free = beam.ends == ("free", "free")
     k = np.asarray((number if free else number - 0.5) * np.pi / beam.length)
     speed = np.sqrt(beam.youngs_modulus / beam.density)
-    return Stretching(k * speed, k, float(np.sqrt(2.0 / beam.mass)), int(free))
+    stiffness = beam.youngs_modulus * beam.area / beam.length
+    law = Law(STRETCHING, ("free" if free else "clamped", "free"), stiffness, beam.length)
+    return Stretching(k * speed, k, float(np.sqrt(2.0 / beam.mass)), int(free)), law
 
 
 def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from engine.bodies.frame.assembly import Assembly
+from engine.bodies.frame.assembly import MASSES, Assembly
 from engine.bodies.frame.body import motion_of_points
 from engine.bodies.frame.frame import Frame as FrameBody
 from engine.bodies.frame.frame import PointMass
+from engine.bodies.frame.sections import TrackSections
+from engine.bodies.frame.shapes import mode_forces
 from engine.bodies.frame.track import TrackBeams, TrackPoints, line_of
+from engine.bodies.modal.flexibility import factorised, without_rounding
 from engine.floating.elastic import AXES, ElasticBody, Z, floating_axes, refuse_beam_words, refuse_unheld
+from engine.floating.static_shapes import Motions
 from engine.scene.frames import Frame
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
@@ -66,6 +70,31 @@ def _linear(values: tuple[Array, Array], part: Array, rate: Array, order: int) -
     return np.asarray(values[0] + part[:, None] * (values[1] - values[0]))
 
 
+class Track(NamedTuple):
+    """Members in a row, whose ends go with points; axes (3, 3): of the floating frame, as rows."""
+
+    beams: TrackBeams
+    points: TrackPoints
+    axes: Array
+
+    def moving(self, nodal: Array) -> Line:
+        """It where all points move by (6 P, N)."""
+        return Line(self.beams, self.points.of(nodal), self.axes)
+
+    def loads(self, places: Sequence[float], size: int) -> Array:
+        """(size, 6 A) on all points: unit forces along the axes at places (A,) m, and unit moments about them."""
+        found = np.zeros((size, 0))
+        for place in places:
+            x = np.array([place])
+            first = self.beams.at(x)[0]
+            ends = np.zeros((self.points.points.size, AXES, 2 * AXES))
+            ends[first, :, :AXES] = ends[first + 1, :, AXES:] = np.eye(AXES)
+            work = np.split(Line(self.beams, ends, self.axes).fields(x, (0,))[0, 0], 2, axis=1)
+            at = (self.points.loads(part, end, size) for part, end in zip(work, (first, first + 1), strict=True))
+            found = np.concatenate([found, sum(at)], axis=1)
+        return found
+
+
 class Particles(NamedTuple):
     """Places (G, 3) m, masses (G,) kg and displacements (G, 3, N) by every mode, in the axes of the floating frame."""
 
@@ -75,29 +104,38 @@ class Particles(NamedTuple):
 
 
 def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
-    """A frame of beams whose floating frame begins with its track, z where loads push it; modes: where that is open.
-    Raises BadInput for what is not built."""
+    """A frame of beams whose floating frame begins with its track, z where loads push it; modes: where that is open;
+    hung: places of its track (m) at which something hangs on it. Raises BadInput for what is not built."""
     _check(body, frame, where)
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)
     own = asked.model_copy(update={"rigid_body_modes": "drop"})
     assembly, motion = motion_of_points(own)
     refuse_unheld(assembly.rigid.shape[1], frame, where)
-    line = own.line
+    line, modal = own.line, own.build()
     axes = floating_axes(line.tangent, line.direction)
-    track, points = line_of(own, assembly.mesh, line.members, line.direction, np.array(own.track.offset))
-    nodal = motion.reshape(-1, motion.shape[2])
+    beams, points = line_of(own, assembly.mesh, line.members, line.direction, np.array(own.track.offset))
     start = assembly.mesh.points[points.points[0]] + points.arms[0] + own.track.offset
-    modal = own.build()
-    particles = _together([*_of_members(own, assembly, nodal, axes), *_of_masses(own, assembly, motion, axes)])
+    track = Track(beams, TrackPoints(points.points, points.arms + own.track.offset), axes)
+    shapes = motion.reshape(-1, motion.shape[2])[assembly.free]
+    found = Motions(np.asarray(modal.omega), shapes, modal.omega**2 * shapes)
+    if hung:
+        elements = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
+        found = found.with_statics(elements, track.loads(hung, motion.size // motion.shape[2])[assembly.free])
+        moved = without_rounding(points.of(assembly.whole(found.shapes)), (0, 1))
+        inertia = points.of(assembly.whole(found.inertia))
+        forces = mode_forces(beams, moved, inertia, MASSES[own.mass_matrix](beams.beams))
+        modal = replace(modal, sections=replace(cast(TrackSections, modal.sections), modes=forces))
+    nodal = assembly.whole(found.shapes)
+    particles = _together([*_of_members(own, assembly, nodal, axes), *_of_masses(own, assembly, nodal, axes)])
     return ElasticBody(
         length=own.length,
         mass=assembly.total_mass,
-        omega=np.asarray(modal.omega),
+        omega=found.omega,
         places=particles.places - axes @ start,
         weights=particles.masses,
         shapes=particles.shapes,
         own_inertia=np.zeros(3),
-        along=Line(track, _ends(points, nodal, np.array(own.track.offset)), axes),
+        along=track.moving(nodal),
         stiffens=False,
         modal=modal,
         slender=False,
@@ -132,13 +170,6 @@ def _check(body: FrameBody, frame: Frame, where: str) -> None:
             )
 
 
-def _ends(points: TrackPoints, nodal: Array, offset: Array) -> Array:
-    """(E + 1, 6, N) motions of the ends of a line beside its axis by an offset (3,)."""
-    ends = points.of(nodal)
-    ends[:, :3] += np.cross(ends[:, 3:], offset[None, :, None], axis=1)
-    return ends
-
-
 def _of_members(body: FrameBody, assembly: Assembly, nodal: Array, axes: Array) -> Iterator[Particles]:
     """Four particles around each place of Gauss of every element, so far out that they have its inertia of twist."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
@@ -162,9 +193,9 @@ def _of_members(body: FrameBody, assembly: Assembly, nodal: Array, axes: Array) 
             yield Particles(centre + arm, 0.25 * dm, moved[:, : Z + 1] + turned[:, :, None] * twist[:, None])
 
 
-def _of_masses(body: FrameBody, assembly: Assembly, motion: Array, axes: Array) -> Iterator[Particles]:
+def _of_masses(body: FrameBody, assembly: Assembly, nodal: Array, axes: Array) -> Iterator[Particles]:
     """Six particles for every point mass, as far from its centre as its inertia asks."""
-    names = list(body.node)
+    names, motion = list(body.node), nodal.reshape(-1, AXES, nodal.shape[1])
     for mass in body.point_mass.values():
         number = names.index(mass.node)
         node = assembly.mesh.points[number]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 
-from engine.bodies.imported.body import motion_of_nodes
+from engine.bodies.imported.body import motion_of_nodes, told_along
 from engine.bodies.imported.imported import Imported
-from engine.bodies.imported.line import LineShapes, spline_slopes
+from engine.bodies.imported.line import LineRecovered, LineShapes, spline_slopes
 from engine.bodies.imported.model import HeldModel
 from engine.floating.elastic import (
     ABOUT_Y,
@@ -23,6 +23,7 @@ from engine.floating.elastic import (
     refuse_beam_words,
     refuse_unheld,
 )
+from engine.floating.static_shapes import Motions
 from engine.scene.frames import Frame
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -51,30 +52,43 @@ class NodeLine:
 
 
 def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
-    """A solid model in its floating frame, which begins with its track; modes: where that is open. Raises BadInput."""
+    """A solid model in its floating frame, which begins with its track; modes: where that is open; hung: places of its
+    track (m) at which torques act. Raises BadInput."""
     refuse_beam_words(frame, where)
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)
     own = asked.model_copy(update={"rigid_body_modes": "drop"})
     held, motion = motion_of_nodes(own)
     refuse_unheld(held.flexibility.rigid.shape[1], frame, where)
-    mass = nodal_mass(held, where)
-    line = own.line
+    mass, line, modal = nodal_mass(held, where), own.line, own.build()
     axes = floating_axes(np.asarray(line.tangent), np.asarray(own.direction))
     track = np.asarray(line.nodes)
     start = held.file.places[track[0]] * own.length_unit
     places = (held.file.places * own.length_unit - start) @ axes.T
+    rows = held.file.owner[held.free], held.file.direction[held.free]
+    omega = np.asarray(modal.omega)
+    found = Motions(omega, motion[rows], omega**2 * motion[rows])
+    if hung:
+        loads = np.zeros((len(motion), 3, AXES * len(hung)))
+        each = np.einsum("ab,tbn->tan", axes, np.eye(3 * len(track)).reshape(len(track), 3, -1))
+        acting = _line(line.places, each).fields(np.array(hung), (0,))[0]
+        loads[track] = np.moveaxis(acting.reshape(-1, len(track), 3), 0, 2)
+        found = found.with_statics(held.flexibility, loads[rows])
+        motion = np.zeros((len(motion), 3, found.omega.size))
+        motion[rows] = found.shapes
+        if own.recovered:
+            told = told_along(own, held) @ found.shapes
+            modal = replace(modal, sections=replace(cast(LineRecovered, modal.sections), values=told))
     shapes = np.einsum("ab,pbn->pan", axes, motion)
-    modal = own.build()
     weights, points, moved = particles(mass, places, shapes)
     return ElasticBody(
         length=own.length,
         mass=float(weights.sum()),
-        omega=np.asarray(modal.omega),
+        omega=found.omega,
         places=points,
         weights=weights,
         shapes=moved,
         own_inertia=np.zeros(3),
-        along=NodeLine(tuple(_component(line.places, shapes[track, axis]) for axis in range(3))),
+        along=_line(line.places, shapes[track]),
         stiffens=False,
         modal=modal,
         slender=False,
@@ -125,7 +139,11 @@ def particles(mass: Any, places: Array, shapes: Array) -> tuple[Array, Array, Ar
     return weights, found[:, 1:4], found[:, 4:].reshape(len(rows), 3, N)
 
 
-def _component(places: Array, values: Array) -> LineShapes:
-    ends = np.zeros((2 * len(places), values.shape[1]))
-    ends[::2], ends[1::2] = values, spline_slopes(places) @ values
-    return LineShapes(places, ends)
+def _line(places: Array, moved: Array) -> NodeLine:
+    """A track whose nodes (T,) at places m move by (T, 3, N)."""
+    components = []
+    for values in np.moveaxis(moved, 1, 0):
+        ends = np.zeros((2 * len(places), values.shape[1]))
+        ends[::2], ends[1::2] = values, spline_slopes(places) @ values
+        components.append(LineShapes(places, ends))
+    return NodeLine(tuple(components))

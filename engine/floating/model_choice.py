@@ -4,11 +4,13 @@ equations, if it agrees with the floating frame."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.accuracy.few_pilots import FewPilots
 from engine.accuracy.reference import left_over
 from engine.bodies.modal.description import MAX_MODES
 from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, stations, usual_steps, weights, worst
@@ -36,13 +38,13 @@ FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
 @dataclass(frozen=True, eq=False)
 class Rung:
     """The model of a scene's variants; modes: of bending, where these are open; left_out (R,): largest error of every
-    result, among pilots, by the model and these modes; by_fixed (R,): by modes that the study fixes, which is told and
-    not held."""
+    result, among pilots, by the model and these modes; by_fixed: of pilots by modes that the study fixes, which is told
+    and not held."""
 
     fidelity: Fidelity
     modes: int
     left_out: Array
-    by_fixed: Array
+    by_fixed: FewPilots
 
 
 class Pilots(NamedTuple):
@@ -110,23 +112,30 @@ def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
         modes, coarse = modes * MORE_MODES, fine
 
 
-def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
-    """(R,) the largest error, among pilots, by modes that the study fixes, from twice and four times as many; NaN where
-    none has an estimate; modes: where these are open."""
-    studies = [pilots.study, *(_with_more_modes(pilots.study, times) for times in (2, 4))]
+def _by_fixed_modes(pilots: Pilots, modes: int) -> FewPilots:
+    """The errors of pilots by modes that the study fixes, from twice and four times as many; modes: where these are
+    open."""
     model = build(pilots.study, modes)
-    found: Array = np.zeros(len(results_of(model)))
-    if (studies[0].body, studies[0].frame) == (studies[1].body, studies[1].frame):
-        return found
+    found: Array = np.zeros((len(results_of(model)), pilots.values.size))
+    more = _with_more_modes(pilots.study, 2)
+    if (pilots.study.body, pilots.study.frame) == (more.body, more.frame):
+        return FewPilots(pilots.values.columns, found)
     for factor in FINER:
-        steps = usual_steps(model, pilots.longest) * factor
-        own = (Level(build(study, modes), steps, steps // STATIONS, UNLIMITED) for study in studies)
-        fixed, twice, four = (pilots.march(level) for level in own)
+        fixed, twice, four = with_more_modes(pilots, modes, factor)
         change = differences(model, fixed, twice)
-        found = np.fmax.reduce(change + left_over(differences(model, twice, four), change), axis=1)
-        if not np.isnan(found).any():
+        found = change + left_over(differences(model, twice, four), change)
+        if not np.isnan(found).all(axis=1).any():
             break
-    return found
+    return FewPilots(pilots.values.columns, found)
+
+
+def with_more_modes(pilots: Pilots, modes: int, factor: int) -> Iterator[Outcome]:
+    """What pilots report with the modes that the study fixes, twice and four times as many; factor: times the usual
+    steps."""
+    steps = usual_steps(build(pilots.study, modes), pilots.longest) * factor
+    for times in (1, 2, 4):
+        study = _with_more_modes(pilots.study, times) if times > 1 else pilots.study
+        yield pilots.march(Level(build(study, modes), steps, steps // STATIONS, UNLIMITED))
 
 
 def _with_more_modes(study: Study, times: int) -> Study:

@@ -59,17 +59,19 @@ class Result(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What V variants report by one march: numbers (V,) and (V, B, 3) by name, histories (V, stations, signals) of all
-    signals with their times (V, stations), and statuses (V,)."""
+    signals with their times (V, stations), statuses (V,), and the part of a variant's time (V,) by which it may have
+    ended sooner: of what has slid over an end its last step."""
 
     numbers: dict[str, Array]
     history: Array
     times: Array
     status: np.ndarray[tuple[int], np.dtype[np.int8]]
+    sooner: Array
 
     def of(self, lanes: Counts) -> Outcome:
         """That of some of the variants."""
         numbers = {name: array[lanes] for name, array in self.numbers.items()}
-        return Outcome(numbers, self.history[lanes], self.times[lanes], self.status[lanes])
+        return Outcome(numbers, self.history[lanes], self.times[lanes], self.status[lanes], self.sooner[lanes])
 
 
 def signals(model: FloatingModel) -> Iterator[Signal]:
@@ -130,7 +132,9 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
         array[lost(marched.status)] = np.nan
     left = np.isfinite(np.concatenate(list(limits.values()), axis=1)).any(axis=1)
     status = gravest(marched.status, np.where(left, np.int8(Status.BEYOND_THEORY), np.int8(Status.OK)))
-    return Outcome(found | limits, marched.history, marched.times, status)
+    ended = duration < marched.times[:, -1] * (1.0 - ROUNDING)
+    sooner = np.where(ended, 1.0 / np.maximum(marched.last, 1), 0.0)
+    return Outcome(found | limits, marched.history, marched.times, status, sooner)
 
 
 def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:

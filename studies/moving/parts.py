@@ -168,7 +168,8 @@ def _march(
 
     run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
     parts = [found[first] for first in sorted(found)]
-    return unlabelled({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return unlabelled({name: array for name, array in whole.items() if array.size})  # none may have a history
 
 
 def again(

@@ -32,11 +32,12 @@ class Told(NamedTuple):
 
 
 def labelled(pieces: Sequence[xr.Dataset], told: Told) -> xr.Dataset:
-    """All pieces in one. Each has `number` and `kept`, the flat numbers of its variants and of those with histories;
-    `status`, `fidelity_used`, `modes_used`, `steps_used`, `estimated_error` and other results, the variants first."""
+    """All pieces in one. Each has `number`, the flat numbers of its variants, and `kept`, those of its variants with
+    histories, where there are some; `status`, `fidelity_used`, `modes_used`, `steps_used`, `estimated_error` and other
+    results, the variants first."""
     cases, declared = told.cases, told.declared
     rows = _joined(pieces)
-    order, kept = np.argsort(rows.pop("number")), rows.pop("kept")
+    order, kept = np.argsort(rows.pop("number")), rows.pop("kept", np.zeros(0, dtype=np.int64))
     histories = {name.removeprefix(HISTORY): rows.pop(name) for name in list(rows) if name.startswith(HISTORY)}
     rows = {name: rows[name][order] for name in list(rows)}
     dataset = _empty(told)

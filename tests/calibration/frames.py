@@ -169,7 +169,8 @@ def _modes(random: Random, most: int) -> int | str:
     return "auto" if random.random() < 0.1 else int(random.integers(1, most + 1))
 
 
-def _is_open(study: Study) -> bool:
+def is_open(study: Study) -> bool:
+    """Whether it leaves modes of a body open."""
     return any(body.modes_are_open for body in study.body.values())
 
 
@@ -197,7 +198,8 @@ def judged(seed: int, tolerance: float, number: int) -> Judged:
         model, finer, finest = truth
         held = np.array([np.isfinite(result.tolerance) for result in results_of(model)])
         apart, doubt = (differences(model, one, finest)[held] / tolerance for one in (found.outcome.of(own), finer))
-        told = (found.error[:, own] - rung.by_fixed[:, None])[held] / tolerance  # the truth keeps these
+        by_fixed = rung.by_fixed.told(values.part(own).columns, own.size)  # the truth keeps these modes
+        told = (found.error[:, own] - by_fixed)[held] / tolerance
         for v in np.flatnonzero(~np.isnan(apart).any(axis=0)):
             marked = bool(found.status[own[v]] != Status.OK)
             rows.append(row_of(number, study_of(number), marked, apart[:, v], told[:, v], doubt[:, v]))
@@ -237,7 +239,7 @@ def main() -> None:
     given = parser.parse_args()
     numbers, started = list(range(-(-given.variants // SIZE))), time.perf_counter()
     if given.fixed:  # the others take most of the time
-        numbers = [number for number in numbers if not _is_open(draw(given.seed, number, 1e-3))]
+        numbers = [number for number in numbers if not is_open(draw(given.seed, number, 1e-3))]
     with get_context("spawn").Pool(given.processes) as pool:
         for tolerance in given.tolerances:
             work = partial(judged, given.seed, tolerance)

@@ -1,6 +1,7 @@
 """Studies of bodies whose frames move: from the study file to the dataset and its sentences."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,14 @@ from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from results_schema.store.archive import open_archive
 from studies.commands.catalogue import built_in
 from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
+from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
 from studies.results.results import Results
+from studies.runs.runner import run_to_archive
 from tests.floating.scenes import ARM, PAPER_BEAM, sliding_mass
 
 SWEPT = {
@@ -83,6 +87,19 @@ def test_a_mass_that_lifts_off_is_marked() -> None:
     assert status.sel(mass=50.0, damping=0.02) == Status.OK
 
 
+@pytest.mark.parametrize("histories", ["all", "none"])
+def test_a_mass_that_slides_over_an_end_is_archived(histories: str, tmp_path: Path) -> None:
+    """Its histories end there, of places with three numbers too; and where no variant has a history."""
+    study = paper(3.0, output={"histories": histories}).with_values({"carriage.load.motion.speed": 6.0})
+    outcome = run_to_archive(study, tmp_path / "off.nc", RunOptions())
+    found = open_archive(outcome.archive).root
+    assert (found["status"] == Status.SEPARATED).all() and (found["duration"] < 2.5).all()
+    assert ("end_place" in found) == (histories == "all")
+    if histories == "all":
+        gone = np.isnan(found["end_place"]).all(dim=("frame", "component"))
+        assert not gone.isel(station=0).any() and gone.isel(station=-1).all()
+
+
 def test_open_modes_are_as_many_as_pilots_find_enough() -> None:
     """What these leave out is told, beside the same with eight modes; a tighter tolerance takes more of them."""
     paper_of = {"body.beam.modes": "auto", "solver.tolerance": 1e-2}
@@ -116,7 +133,7 @@ def test_what_fixed_modes_across_the_track_leave_out_is_told_beside_open_ones() 
     one = choose(study, VariantValues(study, {}, 1), np.full(1, 5.0), 5.0)
     flat = study.with_values({"frame.hull.lateral_modes": 0})
     none = choose(flat, VariantValues(flat, {}, 1), np.full(1, 5.0), 5.0)
-    assert np.nanmax(one.by_fixed) > 1e-6 and not none.by_fixed.any()
+    assert np.nanmax(one.by_fixed.error) > 1e-6 and not none.by_fixed.error.any()
 
 
 def test_every_kind_that_keeps_bodies_still_refuses_frames() -> None:

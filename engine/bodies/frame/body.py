@@ -89,7 +89,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     assembly, track, statics = whole.assembly, whole.track, whole.statics
     omega, moved, shapes = _kept(frame, whole)
     masses, gravity = MASSES[frame.mass_matrix](track.beams), unit(frame.gravity)
-    forces = mode_forces(track, moved, omega, masses)
+    forces = mode_forces(track, moved, omega**2 * moved, masses)
     sections = TrackSections(statics, forces)
     pushes = {direction: partial(_push_statics, content, direction) for direction in whole.sides}
     read = Read(frame, assembly, whole.flexibility, statics, pushes, whole.ends, omega, shapes)
@@ -130,7 +130,8 @@ def _kept(frame: Frame, whole: _Whole) -> tuple[Array, Array, Array]:
     assembly, track = whole.assembly, whole.track
     omega, shapes = frame_modes(frame, assembly, whole.flexibility)
     moved = whole.ends.of(assembly.whole(shapes))
-    along = track_shapes(track, moved, mode_forces(track, moved, omega, MASSES[frame.mass_matrix](track.beams)))
+    forces = mode_forces(track, moved, omega**2 * moved, MASSES[frame.mass_matrix](track.beams))
+    along = track_shapes(track, moved, forces)
     turn = settled(omega, along, whole.statics.length, shapes)
     kept = kept_modes(frame, omega)
     return frozen(omega[kept]), without_rounding(moved @ turn, (0, 1))[:, :, kept], (shapes @ turn)[:, kept]

@@ -121,7 +121,7 @@ class FrameSpot:
             return np.asarray(self.row @ shapes)
         beams, ends = self.line
         moved = without_rounding(ends.of(self.assembly.whole(shapes)), (0, 1))
-        forces = mode_forces(beams, moved, omega, MASSES[self.frame.mass_matrix](beams.beams))
+        forces = mode_forces(beams, moved, omega**2 * moved, MASSES[self.frame.mass_matrix](beams.beams))
         return np.asarray(track_shapes(beams, moved, forces).derivatives([self.spot.at], (0,))[0, 0])
 
 

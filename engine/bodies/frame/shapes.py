@@ -90,19 +90,19 @@ class ModeForces:
     changes: Array
 
 
-def mode_forces(track: TrackBeams, moved: Array, omega: Array, masses: Array) -> ModeForces:
-    """From displacements and rotations (E + 1, 6, N) of the track's points; masses (E, 12, 12) in local axes."""
-    beams, square = track.beams, omega**2
-    local = _local(track, np.concatenate([moved[:-1], moved[1:]], axis=1))
-    ends = stiffness(beams) @ local - (masses @ local) * square
+def mode_forces(track: TrackBeams, moved: Array, inertia: Array, masses: Array) -> ModeForces:
+    """From displacements and rotations (E + 1, 6, N) of the track's points, and the accelerations, times -1, under
+    which these are in balance: of modes omega^2 times as much; masses (E, 12, 12) in local axes."""
+    beams = track.beams
+    local, driven = (_local(track, np.concatenate([one[:-1], one[1:]], axis=1)) for one in (moved, inertia))
+    ends = stiffness(beams) @ local - masses @ driven
     forces = np.stack([-ends[:, :6], ends[:, 6:]], axis=1)
-    at = np.stack([local[:, :6], local[:, 6:]], axis=1)
-    line = square * beams.mass[:, None, None]
+    at = np.stack([driven[:, :6], driven[:, 6:]], axis=1)
     changes = np.zeros_like(forces)
-    changes[:, :, :3] = -line[:, :, None] * at[:, :, :3]
-    changes[:, :, 3] = -square * beams.twist_inertia[:, None, None] * at[:, :, 3]
-    changes[:, :, 4] = forces[:, :, 2] - square * beams.turn_inertia_z[:, None, None] * at[:, :, 4]
-    changes[:, :, 5] = -forces[:, :, 1] - square * beams.turn_inertia_y[:, None, None] * at[:, :, 5]
+    changes[:, :, :3] = -beams.mass[:, None, None, None] * at[:, :, :3]
+    changes[:, :, 3] = -beams.twist_inertia[:, None, None] * at[:, :, 3]
+    changes[:, :, 4] = forces[:, :, 2] - beams.turn_inertia_z[:, None, None] * at[:, :, 4]
+    changes[:, :, 5] = -forces[:, :, 1] - beams.turn_inertia_y[:, None, None] * at[:, :, 5]
     return ModeForces(forces, changes)
 
 

@@ -130,7 +130,7 @@ class _Pushes:
         sides, (names, loads) = side_rows(body, held), _point_loads(body, held)
         tracks = {"load": track_rows(body, held), **sides}
         gauges = [_node_load(body, held, spot.node, spot.direction)[:, None] for _, spot in self.spots]
-        told = [_told(body, held).T] if body.recovered else []
+        told = [told_along(body, held).T] if body.recovered else []
         parts = [*(rows for rows, _ in tracks.values()), *map(sparse.csc_array, (loads, *gauges, *told))]
         ends, found = np.cumsum([part.shape[1] for part in parts])[:-1], {}
         for direction, (rows, slopes) in sides.items():
@@ -291,7 +291,7 @@ def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Par
     shapes, rows, slopes, pull, loads = parts
     if not body.recovered:
         return NoSections(), np.zeros((0, loads.shape[1]))
-    told = _told(body, held)
+    told = told_along(body, held)
     moved = held.flexibility.solve(np.ascontiguousarray(told.T))
     sections = LineRecovered(
         statics=statics,
@@ -303,7 +303,7 @@ def _sections(body: Imported, held: HeldModel, statics: LineStatics, parts: _Par
     return sections, moved.T @ loads
 
 
-def _told(body: Imported, held: HeldModel) -> Array:
+def told_along(body: Imported, held: HeldModel) -> Array:
     """(K P, n) what its recovery matrix tells at the track's nodes, one quantity after the other."""
     units = {"stress": 1.0, "strain": held.pressure}
     means = [

@@ -9,7 +9,7 @@ import studies
 from engine.bodies.beam.beam import Beam
 from engine.floating.bodies import elastic_body
 from engine.floating.elastic import ABOUT_Y, Z
-from engine.floating.static_shapes import FORCE, MOMENT, deflections
+from engine.floating.static_shapes import BENDING, FORCE, MOMENT, deflections
 from engine.scene.frames import Frame
 from engine.scene.study import load
 from studies.commands.catalogue import built_in
@@ -29,7 +29,7 @@ PARTS = (0.0, 0.3), (0.3, 0.8), (0.8, 1.0)
 
 def under(ends: str, place: float, kind: int) -> np.ndarray:
     near, far = ends.split("-")
-    found = deflections((near, far), [place])
+    found = deflections(BENDING, (near, far), [place])
     return found.derivatives(X, 0)[:, list(found.kinds).index(kind)]
 
 
