@@ -31,8 +31,9 @@ class Quantity:
     factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
     of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
-    carries; turns: its moment about a direction. told: its error makes no status, as forces that enter excite every
-    mode. meant: other words for it.
+    carries; turns: its moment about a direction. of_arm: no deflection of its body, but how far a point is from where
+    the rigid arm would have it, whose joints are where their motions say. told: its error makes no status, as forces
+    that enter excite every mode. meant: other words for it.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Quantity:
     of_contact: bool = False
     of_support: bool = False
     turns: bool = False
+    of_arm: bool = False
     told: bool = False
     meant: tuple[str, ...] = ()
 
@@ -70,6 +72,7 @@ def _stress(section: UniformSection) -> float:
 
 _ROWS = (
     Quantity("displacement", "m", of_mass=True, meant=("deflection",)),
+    Quantity("position_error", "m", of_arm=True, meant=("tip-error", "path-error", "deviation", "tracking-error")),
     Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
     Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
     Quantity("bending_moment", "N m", 2, factor=_bending, of_section=True, meant=("moment",)),
@@ -84,11 +87,13 @@ _ROWS = (
 
 
 def _missing(piece: Any) -> list[str]:
-    """What bodies and carriages tell by name is the program's own."""
-    own = ("of_section", "of_contact", "of_support")
+    """What bodies, carriages and arms tell by name is the program's own."""
+    own = ("of_section", "of_contact", "of_support", "of_arm")
     return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
 
 
+#: After the name of a sensor of an arm: what it reads from then on where the joints that carry it stand still.
+AFTER_STOP = "_after_stop"
 QUANTITIES = Pieces(
     group="wanderlast.quantities",
     noun="quantity",

@@ -1,4 +1,5 @@
-"""Places of bodies at which loads act and springs hold, as the tables that kernels take."""
+"""Places of bodies at which loads act and springs hold, and tips that the rigid arm would have elsewhere, as the tables
+that kernels take."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.floating.elastic import ElasticBody
+    from engine.floating.model import FloatingModel
     from engine.scene.loads import SpringEnd
     from engine.scene.study import Study
 
@@ -37,6 +39,14 @@ class GripTables(NamedTuple):
     grips: Array
     modes: Array
     shorter: Array
+
+
+class TipTables(NamedTuple):
+    """tips (T, 2): sensors and bodies; places (T, 6 + 3 n); carrying (L): the bodies of these arms."""
+
+    tips: Counts
+    places: Array
+    carrying: Counts
 
 
 class LoadAt(NamedTuple):
@@ -114,6 +124,25 @@ def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int) ->
             pairs[p, :N, :N] = np.einsum("s,sij->ij", grip.weights, shorter_at(body, grip.x))
     gripped = np.array([grip.body for grip in grips], dtype=np.int64)
     return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs.reshape(len(grips), n * n))
+
+
+def tip_tables(model: FloatingModel, n: int) -> TipTables:
+    """The tables of `engine.kernels.floating.layout.System` of places whose distance from the rigid arm is read."""
+    names, sensors = list(model.bodies), list(model.study.sensor)
+    places = np.zeros((len(model.tips), columns.TIP_SHAPES + 3 * n))
+    tips, carrying = [], set[str]()
+    for row, (name, sensor) in zip(places, model.tips.items(), strict=True):
+        on, x = str(sensor.body), float(sensor.at or 0.0)
+        body = model.bodies[on]
+        row[columns.TIP_PLACE] = x
+        row[columns.TIP_WAY : columns.TIP_SHAPES] = sensor.way
+        if N := body.omega.size:
+            fields = body.fields(np.array([x]), (0,))[0, 0, :3]
+            row[columns.TIP_SHAPES : columns.TIP_SHAPES + 3 * N] = fields.T.reshape(-1)
+        tips.append((sensors.index(name), names.index(on)))
+        carrying.update(model.carriers(on))
+    rows = np.array(tips, dtype=np.int64).reshape(-1, 2)
+    return TipTables(rows, places, np.array(sorted(map(names.index, carrying)), dtype=np.int64))
 
 
 def shorter_at(body: ElasticBody, x: Array) -> Array:

@@ -14,7 +14,7 @@ from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import Lane
 from engine.kernels.layout import LANES
 from engine.scene.frames import AxisJoint, Free, Spherical
-from engine.scene.motions.of_joints import START
+from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, START
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
@@ -60,8 +60,8 @@ def lanes(model: FloatingModel, values: VariantValues, step: Array) -> Lane:
         _carriage(model, numbers, name, start, carriages[:, c])
     motions = _motions(model, numbers)
     loads, links = _loads(model, numbers), _links(model, numbers)
-    events, damping = _events(motions), _damping(model, values)
-    return Lane(gravity, damping, joints, carriages, motions, events, start, loads, links, step[:, None])
+    events, damping, stops = _events(motions), _damping(model, values), _stops(model, motions)
+    return Lane(gravity, damping, joints, carriages, motions, events, start, loads, links, stops, step[:, None])
 
 
 def in_blocks(table: Array) -> Array:
@@ -156,6 +156,19 @@ def _events(motions: Array) -> Array:
     starts = np.sort(motions[:, :, 1:, START].reshape(len(motions), -1), axis=1)
     again = np.concatenate([np.zeros((len(motions), 1), dtype=bool), starts[:, 1:] == starts[:, :-1]], axis=1)
     return np.sort(np.where(again[:, : starts.shape[1]], np.inf, starts), axis=1)
+
+
+def _stops(model: FloatingModel, motions: Array) -> Array:
+    """(V, T) times at which the last joint that carries a tip comes to its end; infinite where one never does."""
+    found = np.zeros((len(motions), len(model.tips)))
+    moving = np.any(motions[..., CONSTANT + 1 : AMPLITUDE] != 0.0, axis=-1) | (motions[..., AMPLITUDE] != 0.0)
+    after = np.concatenate([motions[:, :, 1:, START], np.full((*motions.shape[:2], 1), np.inf)], axis=2)
+    ends = np.where(moving & np.isfinite(motions[..., START]), after, 0.0).max(axis=2, initial=0.0)
+    for t, sensor in enumerate(model.tips.values()):
+        carriers = model.carriers(str(sensor.body))
+        own = [joint.motion for joint in model.joints if joint.body in carriers]
+        found[:, t] = ends[:, own].max(axis=1, initial=0.0)
+    return found
 
 
 def _pieces(model: FloatingModel, numbers: Numbers, key: str) -> Array:

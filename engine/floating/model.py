@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine.floating.attachments import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of
+from engine.floating.attachments import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of, tip_tables
 from engine.floating.bodies import elastic_body
 from engine.floating.elastic import CELLS, ElasticBody, Y, Z
 from engine.floating.refusals import refuse_model, refuse_scene
@@ -20,6 +20,7 @@ from engine.scene.frames import GROUND, AxisJoint, Frame, Free, Joint, Prismatic
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
+    from engine.scene.sensors import Sensor
     from engine.scene.study import Study
 
 OF_DEPTH = 4  # signals of a body
@@ -92,21 +93,34 @@ class FloatingModel:
     def signals(self) -> int:
         """How many signals kernels observe."""
         bodies = len(self.bodies)
-        carriages = OF_CARRIAGE * len(self.study.carriage)
-        return len(self.study.sensor) + OF_DEPTH * bodies + carriages + (OF_POINT + OF_BODY) * bodies + OF_WHOLE
+        sensors, carriages = len(self.study.sensor) + len(self.tips), OF_CARRIAGE * len(self.study.carriage)
+        return sensors + OF_DEPTH * bodies + carriages + (OF_POINT + OF_BODY) * bodies + OF_WHOLE
 
     def signal_of(self, group: str) -> int:
-        """Number of the first signal of the sensors, depths, carriages, ends, frames, or of the whole."""
+        """Number of the first signal of the sensors, depths, carriages, ends, stops, frames, or of the whole."""
         counts = {
             "sensors": len(self.study.sensor),
             "depths": OF_DEPTH * len(self.bodies),
             "carriages": OF_CARRIAGE * len(self.study.carriage),
             "ends": OF_POINT * len(self.bodies),
+            "stops": len(self.tips),
             "frames": OF_BODY * len(self.bodies),
             "whole": OF_WHOLE,
         }
         names = list(counts)
         return sum(counts[name] for name in names[: names.index(group)])
+
+    @property
+    def tips(self) -> dict[str, Sensor]:
+        """The sensors that tell how far a place is from where the rigid arm would have it."""
+        return {name: sensor for name, sensor in self.study.sensor.items() if sensor.reads.of_arm}
+
+    def carriers(self, name: str) -> list[str]:
+        """A body and all that carry it, from the ground on."""
+        found = [name]
+        while (on := self.frame(found[0]).on) != GROUND:
+            found.insert(0, on)
+        return found
 
     @property
     def depths(self) -> dict[str, slice]:
@@ -224,7 +238,7 @@ def _system(model: FloatingModel) -> System:
         if N:
             track[b, ..., :N] = body.track()
             shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
-    loads = list(enumerate(model.loads))
+    loads, tips = list(enumerate(model.loads)), tip_tables(model, n)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
     return System(
         tree,
@@ -247,6 +261,9 @@ def _system(model: FloatingModel) -> System:
         _ends(model, n),
         *_readings(model),
         _smooth(model),
+        tips.tips,
+        tips.places,
+        tips.carrying,
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
         np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
         False,
@@ -332,7 +349,7 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
         name = str(sensor.body)
         body, quantity = model.bodies[name], sensor.reads
         under.append((-1, Z, quantity.rate))
-        if body.omega.size:
+        if body.omega.size and not quantity.of_arm:
             first = model.first[name]
             row[first : first + body.omega.size] = body.reading(quantity, sensor.at)
     depths = _depths(model)
@@ -341,10 +358,13 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 
 
 def _smooth(model: FloatingModel) -> Counts:
-    """Signals that go on as smoothly as coordinates do: what sensors read of these, and places along tracks."""
+    """Signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places along
+    tracks."""
     sensors = [number for number, sensor in enumerate(model.study.sensor.values()) if not sensor.reads.rate]
     first = model.signal_of("carriages")
-    return np.array([*sensors, *(first + OF_CARRIAGE * c for c in range(len(model.study.carriage)))], dtype=np.int64)
+    places = [first + OF_CARRIAGE * c for c in range(len(model.study.carriage))]
+    stops = [model.signal_of("stops") + t for t in range(len(model.tips))]
+    return np.array([*sensors, *places, *stops], dtype=np.int64)
 
 
 def _depths(model: FloatingModel) -> Array:

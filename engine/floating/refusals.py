@@ -66,9 +66,11 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
 
 
 def refuse_model(model: FloatingModel) -> None:
-    """Raise BadInput for a body that its joints cannot hold, or on which nothing can turn."""
+    """Raise BadInput for a body that its joints cannot hold, or on which nothing can turn, and for a sensor of an arm
+    without a rigid one to compare it with."""
     _check_held(model)
     _check_rolling(model)
+    _check_arms(model)
 
 
 def _check_held(model: FloatingModel) -> None:
@@ -107,3 +109,16 @@ def _check_rolling(model: FloatingModel) -> None:
             what = "a solid model's rotation about its track is not known: nothing hangs on it"
             expected = "a beam, a frame of beams, or a rigid body"
             raise fault(f"frame.{name}.on", what, expected=expected, received=on)
+
+
+def _check_arms(model: FloatingModel) -> None:
+    """The rigid arm is known where motions tell all joints that carry a tip."""
+    for sensor, spec in model.tips.items():
+        carriers = {name: model.frame(name).joints for name in model.carriers(str(spec.body))}
+        untold = [(name, k) for name, own in carriers.items() for k, joint in enumerate(own) if not joint.is_told]
+        for name, number in untold[:1]:
+            what = f"no motion tells frame.{name}.joints.{number}, and so not where the rigid arm would be"
+            expected = f"a motion of every joint that carries {spec.body}, which drives or steers it"
+            remedy = 'a motion of this joint, or quantity = "displacement", which counts from the frame of its body'
+            here = f"sensor.{sensor}.quantity"
+            raise model.study.source.fault(here, what, expected=expected, received=spec.quantity, remedy=remedy)

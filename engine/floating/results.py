@@ -12,7 +12,7 @@ from engine.floating.theory import bent_times, unstiffened_times
 from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
 from results_schema.arrays import Array, Counts
-from results_schema.quantities import QUANTITIES
+from results_schema.quantities import AFTER_STOP, QUANTITIES
 from results_schema.status import Status
 from results_schema.statuses import gravest, lost
 
@@ -38,13 +38,16 @@ ROUNDING = 1e-9  # of a time
 
 class Signal(NamedTuple):
     """A signal that is reported: name, its number, the tolerance that it is held to (NaN: told), and whether it is
-    measured by the length of a track, in place of its own largest value."""
+    measured by the length of a track, in place of the largest value of a signal, its own or another; least: what it is
+    never below."""
 
     name: str
     number: int
     tolerance: float
     follows: bool
     along: float
+    over: str
+    least: float = -np.inf
 
 
 class Result(NamedTuple):
@@ -75,13 +78,14 @@ class Outcome:
 
 
 def signals(model: FloatingModel) -> Iterator[Signal]:
-    """The signals of sensors and carriages that are reported."""
+    """The signals of sensors and carriages that are reported, with histories."""
     tolerance = model.study.solver.tolerance
     for number, (name, sensor) in enumerate(model.study.sensor.items()):
         own = sensor.tolerance
         told = own == "told" or (own is None and QUANTITIES[sensor.quantity].told)
         held = tolerance if own is None else np.nan if told else float(own)
-        yield Signal(name, number, np.nan if told else held, own is None and not told, np.nan)
+        least = 0.0 if sensor.reads.of_arm and sensor.direction is None else -np.inf  # of parabolas through lengths
+        yield Signal(name, number, np.nan if told else held, own is None and not told, np.nan, name, least)
     first = model.signal_of("carriages")
     for c, (name, carriage) in enumerate(model.study.carriage.items()):
         length = model.bodies[carriage.on].length
@@ -89,7 +93,17 @@ def signals(model: FloatingModel) -> Iterator[Signal]:
             held = how == "held" and name in model.places
             along = length if end == "position" else np.nan
             number = first + OF_CARRIAGE * c + offset
-            yield Signal(f"{name}_{end}", number, tolerance if held else np.nan, held, along)
+            yield Signal(f"{name}_{end}", number, tolerance if held else np.nan, held, along, f"{name}_{end}")
+
+
+def extremes(model: FloatingModel) -> Iterator[Signal]:
+    """The signals whose extremes are reported: these, and what is left of position errors after stops, as a part of
+    what these are in the whole time."""
+    found, first = list(signals(model)), model.signal_of("stops")
+    yield from found
+    for t, name in enumerate(model.tips):
+        whole = next(signal for signal in found if signal.name == name)
+        yield whole._replace(name=f"{name}{AFTER_STOP}", number=first + t)
 
 
 def ends(model: FloatingModel) -> slice:
@@ -101,7 +115,7 @@ def ends(model: FloatingModel) -> slice:
 def results_of(model: FloatingModel) -> tuple[Result, ...]:
     """All results whose error is measured, in the order of `differences`."""
     found = []
-    for signal in signals(model):
+    for signal in extremes(model):
         found += [Result(f"{signal.name}_{end}", signal.tolerance, signal.follows) for end in ENDS]
     tolerance = model.study.solver.tolerance
     moves = any(model.frame(name).joints for name in model.bodies)
@@ -113,11 +127,13 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
     found: dict[str, Array] = {}
     statistics, step = marched.statistics, marched.step
     duration = np.maximum(marched.last * step, np.finfo(np.float64).tiny)
-    for signal in signals(model):
+    for signal in extremes(model):
         own = statistics[:, signal.number]
-        found[f"{signal.name}_max"], found[f"{signal.name}_min"] = own[:, LARGEST], own[:, SMALLEST]
-        found[f"{signal.name}_max_time"] = own[:, LARGEST_AT] * step
-        found[f"{signal.name}_min_time"] = own[:, SMALLEST_AT] * step
+        read = np.isfinite(own[:, LARGEST])  # not where no stop is within the time
+        largest, smallest = own[:, LARGEST], np.maximum(own[:, SMALLEST], signal.least)
+        times = {"max_time": own[:, LARGEST_AT] * step, "min_time": own[:, SMALLEST_AT] * step}
+        for end, values in {"max": largest, "min": smallest, **times}.items():
+            found[f"{signal.name}_{end}"] = np.where(read, values, np.nan)
         if signal.number < len(model.study.sensor):
             found[f"{signal.name}_rms"] = np.sqrt(own[:, SQUARES] * step / duration)
     shape = (len(step), len(model.bodies), 3)
@@ -146,12 +162,14 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
     gone = known | (other.times[:, :, None] >= ended * (1.0 - ROUNDING))  # one has slid over an end before the other
     gaps = np.where(np.isnan(gaps), np.where(gone, 0.0, np.inf), gaps).max(axis=1)
     found = []
-    for signal in signals(model):
-        largest = np.maximum(*(np.abs(other.numbers[f"{signal.name}_{end}"]) for end in ENDS))
+    for signal in extremes(model):
+        largest = np.maximum(*(np.abs(other.numbers[f"{signal.over}_{end}"]) for end in ENDS))
         scale = np.full_like(largest, signal.along) if signal.along > 0.0 else largest
         for end in ENDS:
             name = f"{signal.name}_{end}"
-            gap = np.maximum(np.abs(one.numbers[name] - other.numbers[name]), gaps[:, signal.number])
+            neither = np.isnan(one.numbers[name]) & np.isnan(other.numbers[name])
+            gap = np.where(neither, 0.0, np.abs(one.numbers[name] - other.numbers[name]))
+            gap = np.maximum(gap, gaps[:, signal.number])
             found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
     found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]

@@ -19,6 +19,11 @@ def check_stands(study: Study) -> None:
     if movers:
         what = f"in studies of the kind {study.kind} bodies stand, and carriages go where they are told"
         raise study.source.fault(movers[0], what, expected='kind = "moving-frames"')
+    for name, sensor in study.sensor.items():
+        if sensor.reads.of_arm:
+            what = f"in studies of the kind {study.kind} bodies stand: no joints carry an arm"
+            expected = 'kind = "moving-frames", or quantity = "displacement"'
+            raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)
 
 
 def check_moves(study: Study) -> None:

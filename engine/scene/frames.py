@@ -44,6 +44,11 @@ class Joint(SpecOfKind):
     turns: ClassVar[bool] = True
 
     @property
+    def is_told(self) -> bool:
+        """Whether a motion says where it is, or what a controller steers towards."""
+        return False
+
+    @property
     def turned_about(self) -> Vector | None:
         """The axis about which a motion turns what it holds, if there is one."""
         return None
@@ -68,6 +73,10 @@ class AxisJoint(Joint):
     stiffness: float = 0.0
     damping: float = 0.0
     motion: TimeMotion | None = None
+
+    @property
+    def is_told(self) -> bool:
+        return self.motion is not None
 
     @property
     def is_driven(self) -> bool:

@@ -21,14 +21,13 @@ EXPECTED = 'at = metres, node, member or point = "its name", under = "a carriage
 
 
 def _along_a_body(word: str) -> str:
-    if word in QUANTITIES and not (QUANTITIES[word].of_contact or QUANTITIES[word].of_support):
-        return word
-    return one_of(*(name for name in quantities_of_a_body() if not QUANTITIES[name].of_support), meant=MEANT)(word)
+    known = [name for name in quantities_of_a_body() if not QUANTITIES[name].of_support]
+    return word if word in known else one_of(*known, meant=MEANT)(word)
 
 
 def quantities_of_a_body() -> list[str]:
-    """The quantities that can be read of bodies."""
-    return [name for name, quantity in QUANTITIES.items() if not quantity.of_contact]
+    """The quantities that can be read of bodies, whether their frames move or not."""
+    return [name for name, quantity in QUANTITIES.items() if not (quantity.of_contact or quantity.of_arm)]
 
 
 OwnTolerance = Annotated[
@@ -53,7 +52,7 @@ def _check_limit(limit: float | None, reads: Quantity) -> None:
 
 
 def _check_band(sensor: Sensor) -> None:
-    if sensor.settling_band is not None and sensor.reads.unit != "m":
+    if sensor.settling_band is not None and (sensor.reads.of_arm or sensor.reads.unit != "m"):
         raise fault("a settling_band is one of displacements", expected='quantity = "displacement"')
 
 
@@ -67,11 +66,18 @@ def _check_moment(sensor: Sensor) -> None:
         raise fault(what, expected=expected, remedy=remedy)
 
 
+def _check_error(sensor: Sensor) -> None:
+    if sensor.reads.of_arm and sensor.fixed_place is None:
+        what = f"a {sensor.quantity} is that of a place of a body's track"
+        raise fault(what, expected='body = "a body" and at = metres along its track')
+
+
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
     m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
     of a carriage's own sprung mass (`carriage`), the contact force of a carriage (of a body that rides, that at one
-    `contact`), or what a support at a place of a beam or at a node carries (its moment at a node alone).
+    `contact`), what a support at a place of a beam or at a node carries (its moment at a node alone), or how far a
+    place of a track is from where the rigid arm would have it (the length of that, or in a direction over the ground).
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -107,7 +113,8 @@ class Sensor(Spec):
             raise fault("a support is a place of a beam, or a node", expected="at = metres, or node = its name")
         _check_moment(self)
         _check_band(self)
-        if self.direction is not None and self.node is None and self.member is None:
+        _check_error(self)
+        if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
             raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
             known = ", ".join(name for name in quantities_of_a_body() if not QUANTITIES[name].derivative)
@@ -145,10 +152,22 @@ class Sensor(Spec):
         """The place that it reads off its body's track, or its support, if it does."""
         if (self.node, self.member, self.point) == (None, None, None) and not self.reads.of_support:
             return None
-        way = self.direction
-        if isinstance(way, str):
-            way = (float(way == "x"), float(way == "y"), float(way == "z"))
+        way = self._along
         return Spot(self.node, self.member, self.at or 0.0, self.point, way, self.reads.of_support, self.reads.turns)
+
+    @property
+    def way(self) -> Vector:
+        """The unit vector of its direction; zero where it has none."""
+        way = np.array(self._along or (0.0, 0.0, 0.0))
+        x, y, z = (way / (np.linalg.norm(way) or 1.0)).tolist()
+        return x, y, z
+
+    @property
+    def _along(self) -> Vector | None:
+        """Its direction as a vector of any length."""
+        if isinstance(self.direction, str):
+            return float(self.direction == "x"), float(self.direction == "y"), float(self.direction == "z")
+        return self.direction
 
 
 class Envelope(Spec):

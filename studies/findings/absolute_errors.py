@@ -8,6 +8,7 @@ import numpy as np
 
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
+from results_schema.quantities import AFTER_STOP
 from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
 from studies.results.formatting import quantity
@@ -70,6 +71,9 @@ def _scale_of_ends(results: Results, stem: str, own: xr.DataArray) -> Any:
         if any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values()):
             return np.maximum(static.fillna(0.0), own)
         return static.where(np.isfinite(static), own)
+    whole = stem.removesuffix(AFTER_STOP)
+    if whole != stem and whole in results.sensors:
+        return _largest([results.dataset[f"{whole}_max"], results.dataset[f"{whole}_min"]])
     carriage = next((one for one in results.study.carriage if stem.startswith(f"{one}_")), "")
     what = stem.removeprefix(f"{carriage}_")
     if what == "contact_force" and not moves:

@@ -1,6 +1,9 @@
 """What studies of bodies in moving frames report, declared once."""
 
+from dataclasses import replace
+
 from engine.floating.results import ENDS, OF_CARRIAGES
+from results_schema.quantities import AFTER_STOP
 from results_schema.variable import outputs
 from results_schema.variables import Variable
 
@@ -22,6 +25,10 @@ MEANT = {
 } | {f"acceleration_{axis}": TOUCHED for axis in "xyz"}
 WORD_OF = {"max": "largest", "min": "smallest"}
 AT_STATIONS, BETWEEN = "over all stations", "over all stations and, by parabolas, between them"
+OF_STOPS = (
+    "of a position error, from then on where all joints that carry it have come to their ends; NaN where that is not "
+    "within the time"
+)
 OF_SENSORS = f"{BETWEEN} (of velocities and accelerations at stations alone)"
 
 
@@ -78,8 +85,8 @@ RESULTS = (
         ("result",),
         "float32",
         long_name="estimated error of every reported number",
-        meaning="of a signal over its own largest value; of places over the length of the track; NaN where no estimate "
-        "exists",
+        meaning="of a signal over its own largest value, also of what it is after a stop; of places over the length of "
+        "the track; NaN where no estimate exists",
         required=False,
         nan_allowed=True,
     ),
@@ -87,6 +94,10 @@ RESULTS = (
     *_ends("{sensor}", "{sensor}", "value of {sensor}", OF_SENSORS),
     Variable("{sensor}_rms", units="{sensor}", long_name="root mean square of {sensor}", meaning="over the whole time"),
     _history("{sensor}", (), "{sensor}", "history of {sensor}"),
+    *(
+        replace(variable, required=False, nan_allowed=True)
+        for variable in _ends(f"{{sensor}}{AFTER_STOP}", "{sensor}", "value of {sensor} after the stop", OF_STOPS)
+    ),
     *_of_carriages(),
     *(
         Variable(

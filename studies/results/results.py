@@ -185,7 +185,7 @@ class Results:
         """Whether it reads a displacement along gravity, which points down as the body hangs."""
         own, body = self.study.sensor[sensor], self.study.body[self.study.body_of(sensor)]
         along_gravity = own.node is not None or own.member is not None or body.deflects_down(own.point)
-        return self.sensors[sensor] == "m" and own.direction is None and along_gravity
+        return self.sensors[sensor] == "m" and own.direction is None and along_gravity and not own.reads.of_arm
 
     def hangs_along(self, envelope: str) -> bool:
         """The same of an envelope."""

@@ -1,4 +1,5 @@
-"""Frames, followed from the ground outward: (1)-(5) of Hartweg and Heckmann (2012), through joints."""
+"""Frames, followed from the ground outward: (1)-(5) of Hartweg and Heckmann (2012), through joints; and those of
+the rigid arm, where no body bends."""
 
 from engine.kernels.floating.layout import (
     COORDINATE,
@@ -141,6 +142,30 @@ def follow_joint(system, j, b, x, work):
         E = rotation(times(value, axis))
         keep_matrix(work.joints, j, JOINT_TURNED, E)
         turn(work.frames, b, E, times(rate, axis), times(change, axis))
+
+
+@called
+def follow_rigid(system, b, work):
+    """Attitude and position of a frame of the rigid arm, from those of its parent: bodies as if they did not bend, and
+    all joints where their motions are, also those that only steer towards them."""
+    p, rigid = system.tree[b, PARENT], work.rigid
+    if p < 0:
+        one, zero = all_lanes(1.0), all_lanes(0.0)
+        E, r = ((one, zero, zero), (zero, one, zero), (zero, zero, one)), no_vector()
+    else:
+        E, r = matrix(rigid, p, ATTITUDE), vector(rigid, p, POSITION)
+    r = add(r, turned_out(E, shared_vector(system.bodies, b, PLACE)))
+    E = after(E, shared_matrix(system.bodies, b, TURNED))
+    for j in range(system.tree[b, FIRST_JOINT], system.tree[b, END_JOINT]):
+        along = times(lanes_at(work.motions, (system.joint_table[j, MOTION], 0)), shared_vector(system.axes, j, 0))
+        if system.joint_table[j, KIND] == PRISMATIC:
+            r = add(r, turned_out(E, along))
+        elif system.joint_table[j, COORDINATE] < 0:  # driven: its frame is turned alike
+            E = after(E, matrix(work.joints, j, JOINT_TURNED))
+        else:
+            E = after(E, rotation(along))
+    keep_matrix(rigid, b, ATTITUDE, E)
+    keep_vector(rigid, b, POSITION, r)
 
 
 @called

@@ -45,6 +45,11 @@ OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB,
 WEIGHT, ARM, GRIPS = 0, 1, 4
 PUSHED, TWISTED, GRIP_MODE = 0, 3, 6
 GRIP, IN_BODY, COURSE = 0, 1, 2
+# columns of System.tips: the sensor, and the body; of System.tip_places: the undeformed place in the frame, the
+# direction over the ground in which it is read, zero where the length is, and displacements by the modes, one after the
+# other
+TIP_SENSOR, TIP_BODY = 0, 1
+TIP_PLACE, TIP_WAY, TIP_SHAPES = 0, 3, 6
 # columns of a piece of a motion: its start (s), a polynomial of degree 5, and amplitude, rate and phase of a sine
 PIECE = 10
 
@@ -63,6 +68,8 @@ class System(NamedTuple):
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that
     have extremes between stations.
+    tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; carrying (L): the bodies of
+    these arms, each after its parent.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
     iteration.
@@ -89,6 +96,9 @@ class System(NamedTuple):
     readings: FloatArray
     read_under: IntArray
     smooth: IntArray
+    tips: IntArray
+    tip_places: FloatArray
+    carrying: IntArray
     leans: BoolArray
     pairing: IntArray
     given: bool
@@ -108,7 +118,8 @@ class Lane(NamedTuple):
     gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or about
     the given motion. carriages (C, CARRIAGE). motions (M, pieces, PIECE). events (E): ascending times (s) at which a
     motion goes on as another piece, infinite from the last on. start (2, N): coordinates and velocities. loads (Q, 6):
-    forces and torques. links (K, 3): stiffness, damping, free length. step: s.
+    forces and torques. links (K, 3): stiffness, damping, free length. stops (T): times (s) at which the joints that
+    carry a tip have come to their ends, infinite where they never do. step: s.
     """
 
     gravity: FloatArray
@@ -120,6 +131,7 @@ class Lane(NamedTuple):
     start: FloatArray
     loads: FloatArray
     links: FloatArray
+    stops: FloatArray
     step: FloatArray
 
 

@@ -229,7 +229,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
         if everywhere(of(memory, CODE) > SOUND + 0.5):
             break
         note_last(memory, number, block, record.last)
-        watched = observe(system, lane, state.now, work, signals)
+        watched = observe(system, lane, state.now, work, of(memory, TIME) + near_of(lane), signals)
         count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
         count_between(goes, system.smooth, signals, past, number, record.statistics, block)
         if kept < record.stations.size and record.stations[kept] == number:
@@ -318,6 +318,7 @@ def march(system, lanes, scheme, steps, record):
             lanes.start[block],
             lanes.loads[block],
             lanes.links[block],
+            lanes.stops[block],
             lanes.step[block],
         )
         march_block(system, lane, scheme, steps, block, room_to_march(system, lane, record), record)

@@ -1,8 +1,11 @@
 """What is observed of a block of lanes at a station: readings of sensors, carriages, points, frames, energy and
 momentum."""
 
+import numpy as np
+
 from engine.kernels.floating.bodies import second_moments
 from engine.kernels.floating.carriages import carried, has_attitude, inertia_times, ridden
+from engine.kernels.floating.following import follow_rigid
 from engine.kernels.floating.layout import (
     COORDINATE,
     FIRST,
@@ -19,6 +22,11 @@ from engine.kernels.floating.layout import (
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
     STIFFNESS,
+    TIP_BODY,
+    TIP_PLACE,
+    TIP_SENSOR,
+    TIP_SHAPES,
+    TIP_WAY,
     TRANSLATION,
 )
 from engine.kernels.floating.loads import between
@@ -41,7 +49,7 @@ from engine.kernels.floating.vectors import (
 )
 from engine.kernels.floating.work import ATTITUDE, CONTACT, POSITION, SPIN, TOUCHED, VELOCITY, add_to, three_at
 from engine.kernels.jit import called
-from engine.kernels.vector import all_lanes, lanes_at, put_lanes, root
+from engine.kernels.vector import all_lanes, choose, lanes_at, put_lanes, root
 
 #: Signals of a carriage: place, speed and acceleration along its track; its acceleration resolved in the frame of its
 #: body (3); the contact force, positive where it presses along z; place of its sprung mass. Of a point: place (3). Of a
@@ -53,9 +61,9 @@ CONTACT_FORCE = 6  # of a carriage's
 
 
 @called
-def observe(system, lane, x, work, out):
-    """Signals of lanes whose frames are followed and whose contact forces are known: of sensors, carriages and points.
-    Returns how many."""
+def observe(system, lane, x, work, by, out):
+    """Signals of lanes whose frames are followed and whose contact forces are known: of sensors, carriages, points, and
+    after stops; by: the times (s) by which motions have ended. Returns how many."""
     first = system.read_under.shape[0]
     for r in range(first):
         read(system, r, x, work, out)
@@ -70,6 +78,13 @@ def observe(system, lane, x, work, out):
             d = add(d, times(moved, shared_vector(system.points, p, 3 + 3 * i)))
         keep(out, first, over_ground(work.frames, b, d))
         first += OF_POINT
+    for k in range(system.carrying.size):
+        follow_rigid(system, system.carrying[k], work)
+    for t in range(system.tips.shape[0]):
+        error = position_error(system, t, x, work)
+        put_lanes(out, (system.tips[t, TIP_SENSOR],), error)
+        put_lanes(out, (first,), choose(by >= lanes_at(lane.stops, (t,)), error, np.nan))
+        first += 1
     return first
 
 
@@ -99,6 +114,21 @@ def keep(out, k, a):
 def over_ground(frames, b, d):
     """Where a place of a frame is."""
     return add(vector(frames, b, POSITION), turned_out(matrix(frames, b, ATTITUDE), d))
+
+
+@called
+def position_error(system, t, x, work):
+    """How far a place is from where the rigid arm would have it: the length of that, or along a direction."""
+    b, way = system.tips[t, TIP_BODY], shared_vector(system.tip_places, t, TIP_WAY)
+    d = add(no_vector(), shared_vector(system.tip_places, t, TIP_PLACE))
+    told = over_ground(work.rigid, b, d)
+    for i in range(system.tree[b, MODES]):
+        moved = lanes_at(x.y, (system.tree[b, FIRST] + i,))
+        d = add(d, times(moved, shared_vector(system.tip_places, t, TIP_SHAPES + 3 * i)))
+    apart = add(over_ground(work.frames, b, d), times(-1.0, told))
+    if dot(way, way) > 0.0:
+        return dot(apart, way)
+    return root(dot(apart, apart))
 
 
 @called

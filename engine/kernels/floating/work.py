@@ -15,6 +15,7 @@ from engine.kernels.vector import lanes_at, put_lanes
 # it hangs on its parent, the rotation vector there and its matrix
 ATTITUDE, POSITION, VELOCITY, SPIN, ACCELERATION, ANGULAR, FORCE, TORQUE = 0, 9, 12, 15, 18, 21, 24, 27
 HANGING_PLACE, HANGING, HANGING_TURNED, FRAME = 30, 33, 36, 45
+RIGID = 12  # of Work.rigid: attitude and position alone
 # columns of Work.joints: its rotation, or its shift
 JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
 # columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
@@ -29,7 +30,8 @@ class Work(NamedTuple):
     CONTACTS), modes at a place (n, AT_PLACE) and first moments of a body's modes (n, 9); the motions (M, 3) as given
     now: value, rate and acceleration; base (J, 9): attitudes of spherical joints at the start of the step; cells, and
     gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion; turning (B, TURNING), and
-    implied (C (n + 1), 3): what each mode and the sprung mass add to the acceleration at a contact."""
+    implied (C (n + 1), 3): what each mode and the sprung mass add to the acceleration at a contact; rigid (B, RIGID):
+    attitudes and positions of the frames of the rigid arm, as in frames."""
 
     frames: FloatArray
     joints: FloatArray
@@ -43,6 +45,7 @@ class Work(NamedTuple):
     piece: FloatArray
     turning: FloatArray
     implied: FloatArray
+    rigid: FloatArray
 
 
 @piece
@@ -64,6 +67,7 @@ def room(system, lane):
         np.zeros((PIECE + 1, LANES)),
         np.zeros((system.tree.shape[0], TURNING, LANES)),
         np.zeros((system.riders.shape[0] * (widest + 1), 3, LANES)),
+        np.zeros((system.tree.shape[0], RIGID, LANES)),
     )
 
 
