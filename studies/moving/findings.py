@@ -82,7 +82,9 @@ def _position_error(results: Results, sensor: str) -> Iterator[str]:
 def along_way(results: Results, sensor: str) -> str:
     """In which direction a position error is read, in words; "" where it is its length."""
     direction = results.study.sensor[sensor].direction
-    return "" if direction is None else f" along {direction}"
+    if direction is None:
+        return ""
+    return f" along {direction if isinstance(direction, str) else [float(f'{part:.4g}') for part in direction]}"
 
 
 def _most_and_least(results: Results, name: str) -> str:
