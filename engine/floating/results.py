@@ -167,9 +167,11 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
         scale = np.full_like(largest, signal.along) if signal.along > 0.0 else largest
         for end in ENDS:
             name = f"{signal.name}_{end}"
-            neither = np.isnan(one.numbers[name]) & np.isnan(other.numbers[name])
-            gap = np.where(neither, 0.0, np.abs(one.numbers[name] - other.numbers[name]))
-            gap = np.maximum(gap, gaps[:, signal.number])
+            values = one.numbers[name], other.numbers[name]
+            gap = np.maximum(np.abs(values[0] - values[1]), gaps[:, signal.number])
+            neither = np.isnan(values[0]) & np.isnan(values[1])
+            least = (values[0] == signal.least) & (values[1] == signal.least)  # what nothing is below is known
+            gap = np.where(neither | least, 0.0, gap)
             found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
     found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from results_schema.quantities import AFTER_STOP
+from studies.findings.amplification import sizes
 from studies.findings.beyond import of_every_quantity
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
@@ -58,11 +60,43 @@ def _sensors(results: Results) -> Iterator[str]:
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
             continue
+        if results.study.sensor[sensor].reads.of_arm:
+            yield from _position_error(results, sensor)
+            continue
         largest = np.maximum(np.abs(low), np.abs(high))
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
         yield f"{sensor}: from {span}{in_words(results, index)}."
+
+
+def _position_error(results: Results, sensor: str) -> Iterator[str]:
+    """How far a tip is from where the rigid arm would have it, in the whole time and after the stop."""
+    after = _most_and_least(results, f"{sensor}{AFTER_STOP}")
+    where, most = f"{along_way(results, sensor)} {results.place(sensor)}", _most_and_least(results, sensor)
+    yield f"{sensor}: the largest position error{where}, from where the rigid arm would have it, is {most}."
+    if after:
+        yield f"After the stop it is still up to {after}."
+
+
+def along_way(results: Results, sensor: str) -> str:
+    """In which direction a position error is read, in words; "" where it is its length."""
+    direction = results.study.sensor[sensor].direction
+    if direction is None:
+        return ""
+    return f" along {direction if isinstance(direction, str) else [float(f'{part:.4g}') for part in direction]}"
+
+
+def _most_and_least(results: Results, name: str) -> str:
+    """The largest and the smallest over the sweep of the largest absolute value of a result; "" where there is none."""
+    found = sizes(results, name)
+    most, least = extreme(found), extreme(found, np.nanargmin)
+    if most is None or least is None:
+        return ""
+    said = f"{quantity(float(found[most]), 'm')}{in_words(results, most)}"
+    if found[least] < found[most]:
+        said += f"; of all variants least, {quantity(float(found[least]), 'm')},{in_words(results, least)}"
+    return said
 
 
 def _ends(results: Results) -> Iterator[str]:

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.quantities import AFTER_STOP
 from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import of_every_quantity
 from studies.findings.effects import unchanged
+from studies.moving.findings import along_way
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
 from studies.pictures.common.sizes import sizes_of
-from studies.pictures.common.sweep_view import view
+from studies.pictures.common.sweep_view import View, along_axis, draw_curves, one_legend, view
 from studies.pictures.trajectory import histories, ranging
-from studies.results.formatting import ALIKE, quantity
+from studies.results.findings_common import in_words
+from studies.results.formatting import ALIKE, quantity, scale_for
 from studies.results.places import Index, chosen
 from studies.results.results import Results
 
-MOST_ROWS, MOST_CURVES = 5, 4
+MOST_ROWS, MOST_CURVES, MOST_TIPS = 5, 4, 3
 
 
 def pictures(results: Results) -> list[Figure]:
@@ -51,11 +55,39 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
     sensors = [name for name in ordered if np.isfinite(sizes(results, name)).any()]
     for noun in dict.fromkeys(map(results.noun, sensors)):
         own = [name for name in sensors if results.noun(name) == noun]
+        tips = [name for name in own if results.study.sensor[name].reads.of_arm]
         top = largest(results, sizes(results, own[0]))
         assert top is not None
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
-            yield sizes_of(seen, own, None, top)
+            yield _of_tips(seen, tips[:MOST_TIPS], top) if tips else sizes_of(seen, own, None, top)
+
+
+def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
+    """How far tips are from where the rigid arm would have them, at all and after the stop; top: where most."""
+    results = seen.results
+    most = f"{quantity(float(sizes(results, tips[0])[top]), 'm')},{in_words(results, top)}"
+    title = f"The largest position error{along_way(results, tips[0])} {results.place(tips[0])} is {most}"
+    caption = seen.caption(
+        "Largest distance from where the rigid arm would have it, in the whole time and from the stop of its joints on."
+    )
+    return draw("position-errors", title, caption, 0.9 + 2.1 * len(tips), partial(_draw_tips, seen, tips))
+
+
+def _draw_tips(seen: View, tips: list[str], drawing: Drawing) -> None:
+    grid = drawing.subplots(len(tips), 2, squeeze=False, sharex=True, sharey="row")
+    for row, tip in zip(grid, tips, strict=True):
+        scale = scale_for(float(np.nanmax(sizes(seen.results, tip))), "m")
+        for axes, name, when in ((row[0], tip, "in the whole time"), (row[1], f"{tip}{AFTER_STOP}", "after the stop")):
+            values = seen.results.dataset["status"].copy(data=sizes(seen.results, name) * scale.factor)
+            draw_curves(axes, seen, seen.curves(values))
+            axes.set_title(f"{tip.replace('_', ' ')} {when}")
+            axes.set_ylim(0.0, None)
+        row[0].set_ylabel(seen.results.label(tip, scale.unit, "largest"))
+    one_legend([axes for row in grid for axes in row[::-1]])
+    for axes in grid[-1]:
+        along_axis(axes, seen)
+    drawing.align_ylabels()
 
 
 def _own(results: Results, traced: list[Index]) -> Index:

@@ -9,6 +9,7 @@ import numpy as np
 from engine.scene.carriages import Carriage
 from engine.scene.study import Study
 from results_schema.arrays import Array
+from results_schema.quantities import AFTER_STOP
 from results_schema.status import Status, label
 from studies.results.formatting import counted, listed, percent, quantity, scientific
 from studies.results.places import Index
@@ -133,7 +134,8 @@ def remedy(results: Results) -> str:
     if Status.TOLERANCE_MISSED not in results.status_counts or label(Status.TOLERANCE_MISSED) in results.study.expected:
         return ""
     missed = [name.rpartition(" ")[2] for name in _missed(results)]
-    read = {end: name for name in results.sensors for end in (name, f"{name}_max", f"{name}_min", f"{name}_residual")}
+    ends = ("", "_max", "_min", "_residual", f"{AFTER_STOP}_max", f"{AFTER_STOP}_min")
+    read = {f"{name}{end}": name for name in results.sensors for end in ends}
     sensors = list(dict.fromkeys(read[name] for name in missed if name in read))
     if missed and not sensors:
         return " What helps: a larger `solver.tolerance`."

@@ -12,7 +12,9 @@ from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.findings.absolute_errors import absolute_errors
+from studies.kinds.moving_frames import KIND
 from studies.protocol.study import kind_of
+from studies.results.formatting import quantity
 from studies.results.results import Results
 
 LINK = {
@@ -199,6 +201,36 @@ def test_after_the_stop_is_the_end_of_the_history(coarse: xr.Dataset) -> None:
             assert (abs(value - found) < 2e-3 * scale).all()
             assert (coarse[f"{name}_after_stop_{end}_time"] >= 0.5 - 2e-3).all()
     assert (coarse["tip_after_stop_max"] <= coarse["tip_max"]).all()
+
+
+def test_the_answer_tells_how_far_the_tip_strays(coarse: xr.Dataset) -> None:
+    said = KIND.findings(Results.of(coarse))
+    whole, after = (next(i for i, one in enumerate(said) if word in one) for word in ("tip: the", "After the stop"))
+    most, rest = (quantity(float(coarse[name].max()), "m") for name in ("tip_max", "tip_after_stop_max"))
+    assert (
+        f"position error at 200 mm of tool, from where the rigid arm would have it, is {most} at mass 0.6 kg"
+        in said[whole]
+    )
+    assert after == whole + 1 and f"up to {rest} at mass 0.6 kg; of all variants least, " in said[after]
+    assert any("down: the largest position error along z at 200 mm of tool" in one for one in said)
+
+
+def test_the_answer_of_one_variant_and_without_a_stop() -> None:
+    sensors = {"tip": reads("upper", 1.5, direction=[0, 0, 1])}
+    frames = {"upper": {"joints": [HINGE | {"motion": {"kind": "steady", "rate": 0.1}}]}}
+    found = studies.run(arm({"upper": LINK}, frames, sensor=sensors, question={"duration": 0.2}))
+    most = quantity(max(float(found["tip_max"]), -float(found["tip_min"])), "m")
+    said = KIND.findings(Results.of(found))
+    assert any("along [0.0, 0.0, 1.0] at 1.5 m of upper" in one for one in said)
+    assert any(one.startswith("tip: ") and one.endswith(f"would have it, is {most}.") for one in said)
+    assert not any("After the stop" in one for one in said)
+
+
+def test_the_figure_has_both_panels(coarse: xr.Dataset) -> None:
+    (figure,) = (one for one in studies.figures(coarse) if one.name == "position-errors")
+    assert figure.title.startswith("The largest position error at 200 mm of tool is")
+    titles = [axes.get_title(loc="left") for axes in figure.drawing.axes]
+    assert titles == [f"{tip} {when}" for tip in ("tip", "down") for when in ("in the whole time", "after the stop")]
 
 
 @pytest.mark.parametrize("motion", [{"kind": "swing", "amplitude": 0.2, "frequency": 2.0}, MOVE["motion"]])
