@@ -22,7 +22,7 @@ MOST_NAMED = 4
 
 
 def answer(results: Results) -> list[str]:
-    """Where limits hold, what falls over, what missed its tolerance, the front, errors, deflections, what causes errors,
+    """Where limits hold, what falls over, what missed its tolerance, the front, errors, deflections, causes of errors,
     statuses."""
     missed = list(told_missed(results))
     others = {status for status, count in results.status_counts.items() if count and status != Status.OK}
@@ -72,7 +72,7 @@ def _falls(results: Results) -> Iterator[str]:
     if len(fallen):
         yield (
             f"In {len(fallen):,} of {counted(results.size, 'variant')} a joint cannot hold up what stands on it and "
-            f"falls over, as{in_words(results, tuple(fallen[0].tolist())) or ' here'}. What helps: a `stiffness` of "
+            f"falls over{', as' if results.size > 1 else ''}{in_words(results, tuple(fallen[0].tolist()))}. What helps: a `stiffness` of "
             "that joint above mass times gravity times height of what it carries."
         )
 
