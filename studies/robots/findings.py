@@ -70,9 +70,10 @@ def _falls(results: Results) -> Iterator[str]:
     """Variants in which nothing rests."""
     fallen = np.argwhere(results.dataset["status"].values == int(Status.FALLS_OVER))
     if len(fallen):
+        where = in_words(results, tuple(fallen[0].tolist()))
         yield (
             f"In {len(fallen):,} of {counted(results.size, 'variant')} a joint cannot hold up what stands on it and "
-            f"falls over{', as' if results.size > 1 else ''}{in_words(results, tuple(fallen[0].tolist()))}. What helps: a `stiffness` of "
+            f"falls over{', as' if where else ''}{where}. What helps: a `stiffness` of "
             "that joint above mass times gravity times height of what it carries."
         )
 
