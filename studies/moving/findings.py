@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.findings.beyond import of_every_quantity
+from studies.findings.beyond import limits_of, ranked, told_limit
+from studies.findings.effects import by_effect
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
@@ -22,6 +23,7 @@ def others(results: Results) -> Iterator[str]:
     """All but carriages that slide."""
     yield from _sensors(results)
     yield from _ends(results)
+    yield from _energy(results)
     yield from _beyond_theory(results)
     yield from told_statuses(results)
 
@@ -53,7 +55,8 @@ def sliding(results: Results) -> Iterator[str]:
 
 
 def _sensors(results: Results) -> Iterator[str]:
-    for sensor in of_every_quantity(results, MOST_SENSORS):
+    limits = limits_of(results.study)
+    for sensor in ranked(results, limits)[:MOST_SENSORS]:
         low, high = (results.dataset[f"{sensor}_{end}"] for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
@@ -62,7 +65,11 @@ def _sensors(results: Results) -> Iterator[str]:
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
-        yield f"{sensor}: from {span}{in_words(results, index)}."
+        limit, beyond = limits.limit(results.study.sensor[sensor].quantity), ""
+        if limit is not None:
+            axis = next(iter(by_effect(results, largest)), None)
+            beyond = told_limit(results, np.asarray(largest), limit, results.sensors[sensor], axis)
+        yield f"{sensor}: from {span}{in_words(results, index)}.{beyond}"
 
 
 def _ends(results: Results) -> Iterator[str]:
@@ -74,6 +81,18 @@ def _ends(results: Results) -> Iterator[str]:
             continue
         widest = [quantity(float(np.nanmax(spans.sel(component=axis))), "m") for axis in ("x", "y", "z")]
         yield f"The far end of {name} moves over {widest[0]}, {widest[1]} and {widest[2]} along x, y and z."
+
+
+def _energy(results: Results) -> Iterator[str]:
+    """By how much the energy of everything changes."""
+    change = results.dataset["energy_change"]
+    index = extreme(change)
+    if index is not None and float(change.values[index]) > 0.0:
+        most = quantity(float(change.values[index]), "J")
+        yield (
+            f"The energy of everything (motion, bending, springs and height) changes by up to {most}"
+            f"{in_words(results, index)}: by what is driven, by damping and friction, and else by the steps."
+        )
 
 
 def _beyond_theory(results: Results) -> Iterator[str]:

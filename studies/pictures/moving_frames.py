@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import largest, sizes
-from studies.findings.beyond import of_every_quantity
+from studies.findings.beyond import limits_of, of_every_quantity, ranked
 from studies.findings.effects import unchanged
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
 from studies.pictures.common.sizes import sizes_of
@@ -47,7 +47,8 @@ def pictures(results: Results) -> list[Figure]:
 
 def _over_sweep(results: Results) -> Iterator[Figure]:
     """The largest values of sensors over the sweep, one figure for each quantity that changes."""
-    ordered = of_every_quantity(results, len(results.sensors))
+    limits = limits_of(results.study)
+    ordered = ranked(results, limits)
     sensors = [name for name in ordered if np.isfinite(sizes(results, name)).any()]
     for noun in dict.fromkeys(map(results.noun, sensors)):
         own = [name for name in sensors if results.noun(name) == noun]
@@ -55,7 +56,8 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         assert top is not None
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
-            yield sizes_of(seen, own, None, top)
+            limit = limits.limit(results.study.sensor[own[0]].quantity)
+            yield sizes_of(seen, own, limit, top)
 
 
 def _own(results: Results, traced: list[Index]) -> Index:
