@@ -11,6 +11,7 @@ _MESSAGES = (
     "the march left the finite numbers; no values",
     "the worker died in this variant; no values",
     "a body turns too fast without stiffening by its rotation, or bends too far for small deflections; values kept",
+    "a joint of a robot is softer than the weight that it has to hold up, and falls over; no values",
 )
 
 
@@ -29,6 +30,7 @@ class Status(IntEnum):
     DIVERGED = 5
     CRASHED = 6
     BEYOND_THEORY = 7
+    FALLS_OVER = 8
 
     @property
     def message(self) -> str:
@@ -45,6 +47,7 @@ class Status(IntEnum):
 GRAVEST = (
     Status.CRASHED,
     Status.DIVERGED,
+    Status.FALLS_OVER,
     Status.NOT_CONVERGED,
     Status.TOLERANCE_MISSED,
     Status.UNRESOLVED,
@@ -53,7 +56,7 @@ GRAVEST = (
     Status.OK,
 )
 #: Those of variants whose results are NaN.
-LOST = GRAVEST[:3]
+LOST = GRAVEST[:4]
 
 
 class Fidelity(IntEnum):

@@ -119,7 +119,7 @@ def results_of(model: FloatingModel) -> tuple[Result, ...]:
         found += [Result(f"{signal.name}_{end}", signal.tolerance, signal.follows) for end in ENDS]
     tolerance = model.study.solver.tolerance
     moves = any(model.frame(name).joints for name in model.bodies)
-    return (*found, *(Result(f"end {name}", tolerance if moves else np.nan, moves) for name in model.bodies))
+    return (*found, *(Result(f"far end of {name}", tolerance if moves else np.nan, moves) for name in model.bodies))
 
 
 def outcome(model: FloatingModel, marched: Marched) -> Outcome:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.kernels.layout import SOUND, Newmark
-from engine.kernels.robots.layout import OBSERVED, OF_GRIP, PASSED, START, WHOLE, Record, Stretch
+from engine.kernels.robots.layout import FALLS_OVER, OBSERVED, OF_GRIP, PASSED, START, WHOLE, Record, Stretch
 from engine.kernels.robots.march import march as march_kernel
 from engine.kernels.robots.march import rest as rest_kernel
 from results_schema.status import Status
@@ -56,4 +56,6 @@ def _empty(model: RobotModel, times: Stretch, passed: int) -> Record:
 
 
 def _status(code: int) -> Status:
+    if code == FALLS_OVER:
+        return Status.FALLS_OVER
     return Status.OK if code == SOUND else Status.NOT_CONVERGED

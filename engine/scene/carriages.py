@@ -11,10 +11,14 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from engine.bodies.modal.modal_body import Direction
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import NUMBER, WORD, KindOf, Noun, Spec, SpecOfKind, Three, form_of_amount, kinds
+from engine.study_file.spec import NUMBER, ROPE, WORD, KindOf, Noun, Spec, SpecOfKind, Three, form_of_amount, kinds
 from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
+POINT = (
+    "a carriage touches its track at one point: axles at distances are a table [train.NAME], a body on shoes or wheels "
+    'is kind = "body", with the length of that body'
+)
 
 
 class Suspension(NamedTuple):
@@ -38,6 +42,12 @@ class Carriage(SpecOfKind):
     touching: ClassVar[tuple[str, ...]] = ()
     forces: ClassVar[tuple[str, ...]] = ()
     may_push: ClassVar[tuple[Direction, ...]] = ()
+    looked_for: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(
+            ("length", "width", "wheelbase", "wheel_base", "spacing", "spacings", "axles", "wheels"), POINT
+        ),
+        **dict.fromkeys(("rope", "rope_length", "cable", "pendulum"), ROPE),
+    }
 
     on: Annotated[str, Noun("the name of a body")]
     motion: AnyMotion

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,7 +27,11 @@ from engine.study_file.units import (
 )
 from results_schema.arrays import Array
 
+if TYPE_CHECKING:
+    from engine.bodies.modal.description import Body
+
 GROUND = "ground"
+NOTHING = "> 0; 0 stands for nothing where a table [frame.NAME] moves or holds it"
 MOST_JOINTS = 6
 
 RotationVector = Three[Angle]
@@ -38,10 +42,17 @@ Inertias = Three[Annotated[Inertia, Field(gt=0)]]
 
 
 class Joint(SpecOfKind):
-    """Base of all joints. freedoms: how many coordinates it has; turns: whether it turns what it holds."""
+    """Base of all joints. freedoms: how many coordinates it has; turns: whether it turns what it holds; slides:
+    whether it moves that as a whole."""
 
     freedoms: ClassVar[int] = 1
     turns: ClassVar[bool] = True
+    slides: ClassVar[bool] = False
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether its motion is given, whatever force that takes."""
+        return False
 
     @property
     def is_told(self) -> bool:
@@ -80,7 +91,6 @@ class AxisJoint(Joint):
 
     @property
     def is_driven(self) -> bool:
-        """Whether its motion is given, whatever force that takes."""
         return self.motion is not None and self.stiffness == 0.0 and self.damping == 0.0
 
     @property
@@ -115,6 +125,7 @@ class Prismatic(AxisJoint):
     """Slides along an axis."""
 
     turns: ClassVar[bool] = False
+    slides: ClassVar[bool] = True
     kind: Literal["prismatic"]
     start: Length | None = None
     rate: Speed | None = None
@@ -136,6 +147,7 @@ class Free(Joint):
     """Moves freely in space. velocity: over the ground, at time 0; rate: in the frame of its body."""
 
     freedoms: ClassVar[int] = 6
+    slides: ClassVar[bool] = True
     kind: Literal["free"]
     velocity: Velocity = (0.0, 0.0, 0.0)
     rate: Spin = (0.0, 0.0, 0.0)
@@ -188,3 +200,37 @@ class Frame(Spec):
         if self.at is not None:
             here = f"frame.{name}.at"
             yield on_body(here, (here, f"body.{self.on}.length"), "a place off the track of the body that holds it")
+
+
+def inertia_checks(frames: Mapping[str, Frame], bodies: Mapping[str, Body]) -> Iterator[Check]:
+    """That what moves freely has a mass, and an inertia of its own where it turns, and what has no frame both."""
+    for name, body in bodies.items():
+        keys = [f"body.{name}.{key}" for key in body.may_be_nothing]
+        if name not in frames:
+            for key in keys:
+                yield Check(
+                    key, (key,), lambda own: own > 0.0, "a body without a frame has a mass and an inertia", NOTHING
+                )
+            continue
+        loose = [joint for joint in frames[name].joints if not joint.is_driven]
+        held = "> 0, or a joint with a motion, or none"
+        carried = [other for other in bodies if other in frames and name in (other, *_holders(frames, other))]
+        masses = [f"body.{other}.mass" for other in carried if bodies[other].may_be_nothing]
+        if keys and any(joint.slides for joint in loose) and len(masses) == len(carried):
+            yield Check(keys[0], tuple(masses), _some, "this joint moves nothing that has a mass", held)
+        if keys and any(joint.turns for joint in loose) and frames[name].inertia is None:
+            what = "this joint turns freely what has no inertia"
+            yield Check(keys[1], (keys[1],), lambda own: own > 0.0, what, held)
+
+
+def _some(*masses: Any) -> Any:
+    return sum(masses) > 0.0
+
+
+def _holders(frames: Mapping[str, Frame], name: str) -> list[str]:
+    """What a body hangs on, inward."""
+    found: list[str] = []
+    while name in frames and frames[name].on not in (GROUND, *found):
+        name = frames[name].on
+        found.append(name)
+    return found

@@ -148,6 +148,16 @@ class Sensor(Spec):
         return self.carriage if self.under is None else self.under
 
     @property
+    def way_in_words(self) -> str:
+        """The direction that it names, to stand behind its place: " along y"; "" where it names none."""
+        if self.direction is None:
+            return ""
+        named = (
+            self.direction if isinstance(self.direction, str) else f"({', '.join(map('{:g}'.format, self.direction))})"
+        )
+        return f" {'about' if self.reads.turns else 'along'} {named}"
+
+    @property
     def spot(self) -> Spot | None:
         """The place that it reads off its body's track, or its support, if it does."""
         if (self.node, self.member, self.point) == (None, None, None) and not self.reads.of_support:

@@ -16,7 +16,7 @@ from engine.bodies.modal.description import Recorded, Spots
 from engine.bodies.modal.section_doubts import Doubt, damping_doubt
 from engine.scene.carriages import AnyCarriage
 from engine.scene.dotted_keys import numbers_in, value_in, with_value
-from engine.scene.frames import Frame
+from engine.scene.frames import Frame, inertia_checks
 from engine.scene.loads import Load, Spring
 from engine.scene.references import check_names, check_references
 from engine.scene.robots import Arm, Robot
@@ -344,6 +344,7 @@ def checks(study: Study) -> Iterator[Check]:
     """All conditions between numbers of a study, in the order in which they make sense."""
     for name, body in study.body.items():
         yield from body.checks(f"body.{name}")
+    yield from inertia_checks(study.frame, study.body)
     for name, frame in study.frame.items():
         yield from frame.checks(name)
     for table in (study.load, study.spring):

@@ -112,7 +112,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
         return BadInput(context["what"], where=where, **said, remedy=context["remedy"] or _misplaced(model, data, keys))
     if detail["type"] == "extra_forbidden":
         names = keys_at(model, data, keys[:-1])
-        remedy = synonym(keys[-1], names) or _misplaced(model, data, keys) or nearest(keys[-1], names)
+        looked_for = _looked_for(model, data, keys)
+        remedy = synonym(keys[-1], names) or looked_for or _misplaced(model, data, keys) or nearest(keys[-1], names)
         return BadInput("unknown key", where=where, expected=f"one of {', '.join(names)}", remedy=remedy)
     place = field_at(model, data, keys)
     expected = place.describe() if place else ""
@@ -127,6 +128,13 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     remedy = remedy or _misplaced(model, data, keys)
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
+
+
+def _looked_for(model: type[Spec], data: Any, keys: Keys) -> str:
+    """What there is of a key that others look for in the table at this place, or ""."""
+    place = field_at(model, data, keys[:-1])
+    cls = _class_of(place, value_at(data, keys[:-1])) if place is not None else None
+    return cls.looked_for.get(str(keys[-1]), "") if cls is not None else ""
 
 
 def _misplaced(model: type[Spec], data: Any, keys: Keys) -> str:
@@ -159,8 +167,12 @@ def _where_else(model: type[Spec], data: Any, around: FieldType | None, keys: Ke
     if isinstance(value_at(data, keys), list):  # the same word may well be the name of an axis
         return ""
     whole: dict[str, Any] = {name: {} for name in keys_at(model, data, ())} | data
-    tables = (path for path in _tables_in((), whole) if path != tuple(here) and key in keys_at(model, whole, path))
-    return next((f"{key} is a key of [{'.'.join(path)}]: write it below that header" for path in tables), "")
+    tables = [path for path in _tables_in((), whole) if path != tuple(here) and key in keys_at(model, whole, path)]
+    if not tables:
+        return ""
+    without = next((path for path in tables if key not in value_at(whole, path)), None)
+    then = ", which has one" if without is None else ": write it below that header"
+    return f"{key} is a key of [{'.'.join(without or tables[0])}]{then}"
 
 
 def _tables_in(here: tuple[str, ...], data: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:

@@ -36,6 +36,7 @@ class Spec(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
     derived: ClassVar[tuple[str, ...]] = ()  # numbers that follow from others and can be asked for by their key
     entry_class: ClassVar[Any] = None  # class of the tables under names of the user's choice, if there are such
+    looked_for: ClassVar[Mapping[str, str]] = {}  # keys that others look for -> what there is of them
 
 
 class SpecOfKind(Spec):
@@ -161,9 +162,10 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return values
 
 
+ROPE = 'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is not built'
 # kinds that others look for -> what there is of them
 _OTHER_KINDS = {
-    "pendulum": 'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is not built',
+    "pendulum": ROPE,
     "train": "a train is a table of its own: [train.NAME] (docs/study-file.md)",
 }
 

@@ -73,7 +73,7 @@ def check(study: str) -> None:
 
     path = catalogue.find_study(study)
     loaded = engine.load(path)
-    with told_of_compiling(partial(console.say_stage, path.stem)):
+    with told_of_compiling(partial(console.say_compiling, path.stem)):
         seen = preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0)))
     screens.show_preview(seen)
 

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from engine.kernels.compiling import WORDS as COMPILING
 from results_schema.errors import printable
 from studies.commands.error_exit import drop_stdout
 from studies.results.formatting import duration
@@ -174,10 +175,15 @@ def _progress_lines(label: str, seconds: float) -> Iterator[Bar]:
         resumed = finished if now["resumed"] is None else now["resumed"]
         now.update(resumed=resumed, finished=finished, total=total)
 
+    def say(words: str) -> None:
+        now.update(words=words)
+        if words == COMPILING:  # what else comes before the first line would be silence
+            say_compiling(label, words)
+
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     try:
-        yield Bar(show, lambda words: now.update(words=words))
+        yield Bar(show, say)
     finally:
         ended.set()
         teller.join()
@@ -193,6 +199,14 @@ def progress_line(label: str, seconds: float, *, words: str, resumed: int | None
     done = finished - (resumed or 0)
     left = f", about {duration(seconds * (total - finished) / done)} left" if done and finished < total else ""
     return f"{doing}{finished:,} of {total:,} after {duration(seconds)}{left}"
+
+
+def say_compiling(label: str, words: str) -> None:
+    """Tell on standard error that kernels are compiled, on a terminal or not: nothing else comes for a while."""
+    if Console(stderr=True).is_terminal:
+        say_stage(label, words)
+    else:
+        warn(f"{label}: {words}")
 
 
 def say_stage(label: str, words: str, console: Console | None = None) -> None:

@@ -176,6 +176,9 @@ def _bodies(base: SceneModel) -> TextTable:
         ratios = rates[elastic] / (2.0 * omega[elastic])
         shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
         more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
+        if not elastic.any():
+            rows.append((part.name, f"{number(part.modal.mass, 5)} kg", "rigid", "does not bend", "none"))
+            continue
         damping = f"{spanned(ratios)}{' without its dampers' * has_dampers(base.study, part.name)}"
         rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, damping))
     return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)

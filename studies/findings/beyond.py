@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +22,7 @@ MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
 LIMIT = " Its absolute value exceeds "
-LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
+LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress", "position_error")
 
 
 class Limits(Spec):
@@ -36,7 +36,7 @@ class Limits(Spec):
 
     def limit(self, name: str) -> float | None:
         """What is named for a quantity."""
-        return getattr(self, name) if name in LIMITED else None
+        return getattr(self, name, None) if name in LIMITED else None
 
 
 class AskedOfPassages(Limits):
@@ -50,12 +50,16 @@ class AskedOfPassages(Limits):
 
 def limits_of(study: Study) -> Limits:
     """The limits that a study's table [question] names; none where its kind knows none of readings."""
-    return question_of(study, AskedOfPassages) if kind_named(study.kind).names_limits else Limits()
+    kind = kind_named(study.kind)
+    if not kind.names_limits or kind.settings is None:
+        return Limits()
+    return cast(Limits, question_of(study, kind.settings))
 
 
-def told_limit(results: Results, values: Array, limit: float, units: str) -> str:
-    """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another."""
-    said = where_beyond(results, values, limit, results.axis(*PACES))
+def told_limit(results: Results, values: Array, limit: float, units: str, axis: Axis | None = None) -> str:
+    """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another;
+    along a swept number, the pace if none is given."""
+    said = where_beyond(results, values, limit, axis or results.axis(*PACES))
     return f"{LIMIT}{quantity(limit, units)} {said}."
 
 

@@ -34,7 +34,7 @@ def decay_rates(results: Results) -> Array:
     Without dampers zeta_1 omega_1/(1 + m phi_1^2), phi_1 at the place of the way where it is largest.
     """
     zeta, first = (results.everywhere(v) for v in (theory.damping_ratio(results), theory.first_omega(results)))
-    mass, dampers = _mass(results), _dampers(results)
+    mass, dampers = _mass(results), [(at, results.everywhere(rate)) for at, rate in theory.dampers(results)]
     omega, shapes = theory.elastic_modes(results, results.carriage.motion.path(np.linspace(0.0, 1.0, PLACES)).S)
     heaviest = shapes[np.abs(shapes[:, 0]).argmax(), :BASIS]
     alone = zeta * first / (1.0 + mass * heaviest[0] ** 2)
@@ -74,13 +74,6 @@ def _mass(results: Results) -> Array:
     name, parts = results.carriage_name, results.carriage.touching
     found = (results.everywhere(results.parameter(f"carriage.{name}.{part}")) for part in parts)
     return sum(found, np.zeros(results.shape))
-
-
-def _dampers(results: Results) -> list[tuple[float | str, Array]]:
-    """Places of the dampers under the first carriage's body, and their coefficients (N s/m) for every variant."""
-    name = results.carriage.on
-    found = results.study.body[name].dampers()
-    return [(at, results.everywhere(results.parameter(f"body.{name}.{key}"))) for key, at, _ in found]
 
 
 class Asked(Spec):

@@ -61,8 +61,34 @@ def lag(results: Results, sensor: str) -> Any:
     odd part -(2 zeta v/omega_1) phi phi' q_0 is half as much of dw_s/ds.
     """
     speed = results.parameter(f"carriage.{results.carriage_name}.motion.speed")
-    told = -lag_factor(results, sensor) * damping_ratio(results) * speed / first_omega(results)
-    return told if first_mode_bears(results) else np.nan * told
+    damping = damping_ratio(results) + dampers_ratio(results)
+    told = -lag_factor(results, sensor) * damping * speed / first_omega(results)
+    return told if lag_is_known(results) else np.nan * told
+
+
+def lag_is_known(results: Results) -> bool:
+    """Whether the first elastic mode alone tells what is late, and what its dampers do to it."""
+    damped = [at for at, rate in dampers(results) if np.any(rate > 0.0)]
+    unknown = any(isinstance(at, str) for at in damped)
+    swept = any(_changes_modes(results, path) and not path.endswith(".damping") for path in _swept(results))
+    return first_mode_bears(results) and not unknown and not (damped and swept)
+
+
+def dampers_ratio(results: Results) -> Any:
+    """What dampers at places of the track add to the damping ratio of the first mode, sum c phi_1^2/(2 omega_1)."""
+    held = [(at, rate) for at, rate in dampers(results) if not isinstance(at, str) and np.any(rate > 0.0)]
+    if not held:
+        return 0.0
+    first = elastic_modes(results, np.array([at for at, _ in held]))[1][:, 0]
+    added = [rate * shape**2 for (_, rate), shape in zip(held, first, strict=True)]
+    return sum(added) / (2.0 * first_omega(results))
+
+
+def dampers(results: Results) -> list[tuple[float | str, Any]]:
+    """Places of the dampers under the first carriage's body, and their coefficients, N s/m."""
+    name = results.carriage.on
+    found = results.study.body[name].dampers()
+    return [(at, results.parameter(f"body.{name}.{key}")) for key, at, _ in found]
 
 
 def first_mode_bears(results: Results) -> bool:
@@ -89,7 +115,8 @@ def lag_factor(results: Results, sensor: str) -> int:
 def lag_formula(results: Results, sensor: str) -> str:
     """The formula in words."""
     twice = "2 × " if lag_factor(results, sensor) == 2 else ""
-    return f"what damping alone gives ({twice}damping ratio × speed / first circular frequency)"
+    more = ", of the first mode with its dampers" if any(np.any(rate > 0.0) for _, rate in dampers(results)) else ""
+    return f"what damping alone gives ({twice}damping ratio × speed / first circular frequency{more})"
 
 
 def frequency_ratio(results: Results) -> Any:
@@ -175,7 +202,7 @@ def shuttle_amplification(results: Results, sensor: str) -> Array | None:
     beam from one end to the other and the sensor is at midspan."""
     body, motion = results.study.body[results.carriage.on], results.carriage.motion
     ratio = results.dataset.coords.get("mass_ratio")
-    swept = {path for axis in results.axes for path in axis.paths}
+    swept = _swept(results)
     fixed = {f"body.{results.carriage.on}.length", *(f"carriage.{results.carriage_name}.motion.{k}" for k in _PLACES)}
     if ratio is None or swept & fixed or not motion.is_harmonic:
         return None
@@ -211,8 +238,12 @@ def end_spring_difference(results: Results, sensor: str) -> Array | None:
     return results.everywhere(bending / body.length**3 * abs(1.0 / first - 1.0 / second))
 
 
+def _swept(results: Results) -> set[str]:
+    return {path for axis in results.axes for path in axis.paths}
+
+
 def _is_swept(results: Results, key: str) -> bool:
-    return any(key in axis.paths for axis in results.axes)
+    return key in _swept(results)
 
 
 def _changes_modes(results: Results, path: str) -> bool:

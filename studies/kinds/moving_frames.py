@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from engine.scene.study import Study
-from engine.study_file.spec import Spec
-from engine.study_file.units import Time
+from engine.study_file.units import Length, Time
 from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.variables import declare
+from studies.findings.beyond import Limits
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather
 from studies.moving.variables import RESULTS
@@ -23,10 +24,12 @@ from studies.results.results import Results
 declare("moving-frames", *RESULTS)
 
 
-class Question(Spec):
-    """The table [question]. duration: s, of the march."""
+class Question(Limits):
+    """The table [question]. duration: s, of the march. The limits: of absolute values, of which is told for every
+    sensor of that quantity from which swept value on they are exceeded."""
 
     duration: Time = Field(gt=0)
+    position_error: Annotated[Length, Field(gt=0)] | None = None
 
 
 def _duration(study: Study) -> Callable[[Mapping[str, Array], int], Array]:
@@ -42,6 +45,7 @@ class MovingFrames(PiecedKind):
     summary = "bodies on joints or free in space, and carriages that slide by themselves: motions, forces, energies"
     question = "How do the bodies and their carriages move, and what do they feel?"
     settings = Question
+    names_limits = True
     sweeps = True
     audit_seconds = AUDIT_SECONDS
     moves_frames = True

@@ -6,7 +6,8 @@ import numpy as np
 
 from results_schema.quantities import AFTER_STOP
 from studies.findings.amplification import sizes
-from studies.findings.beyond import of_every_quantity
+from studies.findings.beyond import limits_of, ranked, told_limit
+from studies.findings.effects import by_effect
 from studies.results.findings_common import in_words, told_statuses
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
@@ -24,6 +25,7 @@ def others(results: Results) -> Iterator[str]:
     """All but carriages that slide."""
     yield from _sensors(results)
     yield from _ends(results)
+    yield from _energy(results)
     yield from _beyond_theory(results)
     yield from told_statuses(results)
 
@@ -55,26 +57,32 @@ def sliding(results: Results) -> Iterator[str]:
 
 
 def _sensors(results: Results) -> Iterator[str]:
-    for sensor in of_every_quantity(results, MOST_SENSORS):
+    limits = limits_of(results.study)
+    for sensor in ranked(results, limits)[:MOST_SENSORS]:
         low, high = (results.dataset[f"{sensor}_{end}"] for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
             continue
-        if results.study.sensor[sensor].reads.of_arm:
-            yield from _position_error(results, sensor)
-            continue
         largest = np.maximum(np.abs(low), np.abs(high))
+        limit, beyond = limits.limit(results.study.sensor[sensor].quantity), ""
+        if limit is not None:
+            axis = next(iter(by_effect(results, largest)), None)
+            beyond = told_limit(results, np.asarray(largest), limit, results.sensors[sensor], axis)
+        if results.study.sensor[sensor].reads.of_arm:
+            yield from _position_error(results, sensor, beyond)
+            continue
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
-        yield f"{sensor}: from {span}{in_words(results, index)}."
+        yield f"{sensor}: from {span}{in_words(results, index)}.{beyond}"
 
 
-def _position_error(results: Results, sensor: str) -> Iterator[str]:
-    """How far a tip is from where the rigid arm would have it, in the whole time and after the stop."""
+def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]:
+    """How far a tip is from where the rigid arm would have it, in the whole time and after the stop; beyond: what is
+    said of a limit."""
     after = _most_and_least(results, f"{sensor}{AFTER_STOP}")
     where, most = f"{along_way(results, sensor)} {results.place(sensor)}", _most_and_least(results, sensor)
-    yield f"{sensor}: the largest position error{where}, from where the rigid arm would have it, is {most}."
+    yield f"{sensor}: the largest position error{where}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
         yield f"After the stop it is still up to {after}."
 
@@ -108,6 +116,18 @@ def _ends(results: Results) -> Iterator[str]:
             continue
         widest = [quantity(float(np.nanmax(spans.sel(component=axis))), "m") for axis in ("x", "y", "z")]
         yield f"The far end of {name} moves over {widest[0]}, {widest[1]} and {widest[2]} along x, y and z."
+
+
+def _energy(results: Results) -> Iterator[str]:
+    """By how much the energy of everything changes."""
+    change = results.dataset["energy_change"]
+    index = extreme(change)
+    if index is not None and float(change.values[index]) > 0.0:
+        most = quantity(float(change.values[index]), "J")
+        yield (
+            f"The energy of everything (motion, bending, springs and height) changes by up to {most}"
+            f"{in_words(results, index)}: by what is driven, by damping and friction, and else by the steps."
+        )
 
 
 def _beyond_theory(results: Results) -> Iterator[str]:

@@ -139,7 +139,7 @@ def _lag(seen: View, sensors: list[str], more: str) -> Figure:
     half = ", half as much under the carriage, where the place of reading moves too" if halves else ""
     caption = seen.caption(
         "Lag of the response at equal position; negative: it trails.",
-        f"Dashed: what damping alone gives at low speed{half}." if theory.first_mode_bears(results) else "",
+        f"Dashed: what damping alone gives at low speed{half}." if theory.lag_is_known(results) else "",
         f"Lags beyond {LAGS_SHOWN:g} times that are cut off: there vibration left over from the turns decides."
         if cut
         else "",
@@ -191,7 +191,7 @@ def _draw_lag(seen: View, sensors: list[str], drawing: Drawing) -> None:
         axes.set_ylabel(seen.results.label(sensor, scale.unit, "lag of"))
         if axes is not rows[0] and axes.get_legend() is not None:
             axes.get_legend().remove()
-        if colours and axes is rows[0] and theory.first_mode_bears(seen.results):
+        if colours and axes is rows[0] and theory.lag_is_known(seen.results):
             _name_theory(axes, theory.lag_formula(seen.results, sensor), seen)
     assert seen.x is not None
     rows[-1].set_xlabel(seen.x.title)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from results_schema.quantities import AFTER_STOP
 from studies.findings.amplification import largest, sizes
-from studies.findings.beyond import of_every_quantity
+from studies.findings.beyond import limits_of, of_every_quantity, ranked
 from studies.findings.effects import unchanged
 from studies.moving.findings import along_way
 from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
@@ -51,7 +51,8 @@ def pictures(results: Results) -> list[Figure]:
 
 def _over_sweep(results: Results) -> Iterator[Figure]:
     """The largest values of sensors over the sweep, one figure for each quantity that changes."""
-    ordered = of_every_quantity(results, len(results.sensors))
+    limits = limits_of(results.study)
+    ordered = ranked(results, limits)
     sensors = [name for name in ordered if np.isfinite(sizes(results, name)).any()]
     for noun in dict.fromkeys(map(results.noun, sensors)):
         own = [name for name in sensors if results.noun(name) == noun]
@@ -60,7 +61,8 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         assert top is not None
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
-            yield _of_tips(seen, tips[:MOST_TIPS], top) if tips else sizes_of(seen, own, None, top)
+            limit = limits.limit(results.study.sensor[own[0]].quantity)
+            yield _of_tips(seen, tips[:MOST_TIPS], top) if tips else sizes_of(seen, own, limit, top)
 
 
 def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:

@@ -44,12 +44,12 @@ class Kind:
     `studies/kinds` has one as its attribute KIND, and declares its results; another package names its own by an entry
     point.
 
-    name: as in the study file. summary: one line. question: what its report says was asked, one sentence.
-    settings: the class of its table [question], None where it has none. names_limits: whether that has the limits of
-    passages. sweeps: whether it takes a [sweep], whose grid is then that of its results; else it measures, and a method
-    that fails, by blowing up say, is an answer and no failure of the run. moves_frames: whether frames of bodies may
-    move, and carriages slide by themselves. moves_robots: whether robots move. drawn_by: the module whose `pictures`
-    makes its figures of the results. start: a study file to start from, of a kind of another package.
+    name: as in the study file. summary: one line. question: what its report says was asked, one sentence. settings: the
+    class of its table [question], None where it has none. names_limits: whether that has limits of what sensors read.
+    sweeps: whether it takes a [sweep], whose grid is then that of its results; else it measures, and a method that
+    fails, by blowing up say, is an answer and no failure of the run. moves_frames: whether frames of bodies may move,
+    and carriages slide by themselves. moves_robots: whether robots move. drawn_by: the module whose `pictures` makes
+    its figures of the results. start: a study file to start from, of a kind of another package.
     """
 
     name: str

@@ -160,6 +160,8 @@ def _bodies(scene: Layout) -> Table:
         stiffness = quantity(modal.bending_stiffness, "N m2") if np.isfinite(modal.bending_stiffness) else ""
         made = ", ".join(f"{what}: {count:,}" for what, count in body.outline.counts.items())
         first = ", ".join(number(float(f)) for f in modal.omega[:SHOWN] / (2.0 * np.pi))
+        if not modal.omega.any():
+            first = "rigid: does not bend"
         kind = scene.model.study.body[name].kind
         rows.append(
             (

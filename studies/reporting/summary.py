@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from studies.runs.runner import Outcome
 
 SOME_NOT_OK = 3
+ENERGY = "energy_change"  # of frames that move
 
 
 @dataclass(frozen=True)
@@ -183,8 +184,8 @@ def shown(study_results: Results) -> list[Range]:
 
 def asked(study_results: Results) -> list[Range]:
     """The ranges that answer: what has a limit, the results of the kind of study, extremes and contact forces, last the
-    times of these; without means of squares, estimated errors and work."""
-    beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK}
+    times of these; without means of squares, estimated errors, work and the energy, which answers tell in words."""
+    beside = {f"{sensor}_rms" for sensor in study_results.sensors} | {ERROR, WORK, ENERGY}
     first = tuple(f"{name}_" for name in _limited(study_results))
     found = [one for one in shown(study_results) if one.name not in beside]
     return sorted(

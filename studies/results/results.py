@@ -172,14 +172,15 @@ class Results:
         return own.quantity.replace("_", " "), counted
 
     def place(self, sensor: str) -> str:
-        """Where a sensor reads, in words."""
+        """Where a sensor reads, and in which direction where it names one, in words."""
         own = self.study.sensor[sensor]
         if own.rides is not None:
             return f"{'under' if own.under else 'of'} {own.rides}"
         if own.at is None:
-            return f"at {own.node or own.point}"
+            return f"at {own.node or own.point}{own.way_in_words}"
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)
-        return f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
+        where = f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
+        return f"{where}{own.way_in_words}"
 
     def hangs(self, sensor: str) -> bool:
         """Whether it reads a displacement along gravity, which points down as the body hangs."""

@@ -10,7 +10,7 @@ import numpy as np
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Status
 from studies.results.findings_common import in_words, told_statuses
-from studies.results.formatting import listed, percent, quantity, spanned
+from studies.results.formatting import counted, listed, percent, quantity, spanned
 from studies.results.places import extreme
 from studies.robots.limits import DOING, told_limits
 from studies.robots.tolerance_missed import model_of, told_missed
@@ -22,11 +22,13 @@ MOST_NAMED = 4
 
 
 def answer(results: Results) -> list[str]:
-    """Where limits hold, what missed its tolerance, the front, errors, deflections, what causes errors, statuses."""
+    """Where limits hold, what falls over, what missed its tolerance, the front, errors, deflections, causes of errors,
+    statuses."""
     missed = list(told_missed(results))
     others = {status for status, count in results.status_counts.items() if count and status != Status.OK}
     return [
         *told_limits(results),
+        *_falls(results),
         *missed,
         *_front(results),
         *_errors(results),
@@ -62,6 +64,18 @@ def of_front(results: Results) -> Counts:
     chosen = chosen[np.lexsort((error[chosen], cycle[chosen]))]
     points = np.round(np.stack([cycle[chosen], error[chosen]], axis=1), 12)
     return np.asarray(chosen[np.sort(np.unique(points, axis=0, return_index=True)[1])], dtype=np.int64)
+
+
+def _falls(results: Results) -> Iterator[str]:
+    """Variants in which nothing rests."""
+    fallen = np.argwhere(results.dataset["status"].values == int(Status.FALLS_OVER))
+    if len(fallen):
+        where = in_words(results, tuple(fallen[0].tolist()))
+        yield (
+            f"In {len(fallen):,} of {counted(results.size, 'variant')} a joint cannot hold up what stands on it and "
+            f"falls over{', as' if where else ''}{where}. What helps: a `stiffness` of "
+            "that joint above mass times gravity times height of what it carries."
+        )
 
 
 def _errors(results: Results) -> Iterator[str]:

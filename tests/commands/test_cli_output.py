@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from studies.commands.console import progress_bar
+from engine.kernels.compiling import WORDS
+from studies.commands.console import progress_bar, say_compiling
 from tests.studies.small import ROOT, SEPARATED, command, finish, write
 
 
@@ -69,6 +70,16 @@ def test_too_little_memory_is_code_70(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
 
 
+def test_compiling_is_told_at_once_where_no_terminal_shows_a_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    """The other stages wait for the next line."""
+    with progress_bar("small") as bar:
+        bar.say("marching")
+        bar.say(WORDS)
+        assert capsys.readouterr().err == f"small: {WORDS}\n"
+    say_compiling("other", WORDS)
+    assert capsys.readouterr().err == f"other: {WORDS}\n"
+
+
 @pytest.mark.fault(45)
 def test_warnings_of_libraries_stay_away_from_the_screen(tmp_path: Path) -> None:
     """One is made on purpose: which of ours may make one is not known."""
@@ -90,7 +101,7 @@ def test_a_long_run_tells_how_far_it_is_where_no_terminal_shows_a_bar(capsys: py
 
 def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:
     write(tmp_path)
-    assert finish(tmp_path, "run", "small.toml", "-o", "quiet.nc").stderr == ""
+    assert finish(tmp_path, "run", "small.toml", "-o", "quiet.nc").stderr in ("", f"small: {WORDS}\n")
     master, terminal = pty.openpty()
     process = subprocess.Popen(
         command("run", "small.toml"),

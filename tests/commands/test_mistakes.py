@@ -131,6 +131,22 @@ def test_a_kind_that_is_not_built_says_what_there_is(capsys: pytest.CaptureFixtu
     assert 'is kind = "oscillator"' in message and "swings on a rope is not built" in message
 
 
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("length", "touches its track at one point: axles at distances are a table [train.NAME], a body on shoes"),
+        ("axles", "touches its track at one point"),
+        ("rope", 'a hanging mass that goes up and down is kind = "oscillator"'),
+        ("speed", "[carriage.trolley.motion]"),
+    ],
+)
+def test_a_carriage_with_a_key_of_something_else(key: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The beam has its length: nobody is to write it there once more."""
+    Path("study.toml").write_text(SMALL.replace("mass = 1.0", f"mass = 1.0\n{key} = 2.0"))
+    message = told(capsys, 2, "check", "study.toml")
+    assert f"carriage.trolley.{key}: unknown key" in message and words in message and "of [body" not in message
+
+
 def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture[str]) -> None:
     Path("study.toml").write_text(
         SMALL.replace("= 1000.0", "= 7.85").replace("modes = 4", "modes = 4\nown_weight = true")

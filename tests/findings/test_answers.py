@@ -66,6 +66,28 @@ def test_lag_under_the_carriage_is_half_of_that_at_a_fixed_place() -> None:
     assert theory.lag_factor(results, "under") * 2 == theory.lag_factor(results, "midspan")
 
 
+def test_dampers_under_a_bed_make_it_lag_by_what_they_add_to_its_first_mode() -> None:
+    """A damper in the middle of a bed on two hard springs, c phi_1^2/(2 omega_1) of 0 to 0.08."""
+    ends = [{"at": at, "stiffness": 1e9} for at in (0.0, 10.0)]
+    middle = {"at": 5.0, "stiffness": 1.0, "damping": 100.0}
+    bed = beam(length=10.0, area=0.01, second_moment=8e-6, youngs_modulus=210e9, density=7850.0, modes=6)
+    bed |= {"supports": [*ends, middle], "damping_ratio": 0.02}
+    way = {"kind": "out-and-back", "start": 5.0, "end": 9.6, "speed": 0.2, "turn": 0.1, "cycles": 2}
+    table, sensor = {"on": "bed", "kind": "mass", "mass": 100.0, "motion": way}, {"middle": {"body": "bed", "at": 5.0}}
+    swept = {"damping": {"of": "body.bed.supports.2.damping", "values": [0.0, 500.0, 1000.0, 2000.0]}}
+    found = studies.run(
+        engine.Study(kind="asymmetry", body={"bed": bed}, carriage={"table": table}, sensor=sensor, sweep=swept)
+    )
+    results = Results.of(found)
+    expected = results.everywhere(theory.lag(results, "middle"))
+    assert expected[-1] < 3.0 * expected[0] < 0.0
+    np.testing.assert_allclose(results.of_sensor("lag", "middle").values, expected, rtol=0.03)
+    assert "of the first mode with its dampers" in theory.lag_formula(results, "middle")
+    stiffer = {"stiffness": {"of": "body.bed.youngs_modulus", "values": [2e11, 2.1e11]}}
+    other = engine.Study(kind="asymmetry", body={"bed": bed}, carriage={"table": table}, sensor=sensor, sweep=stiffer)
+    assert not theory.lag_is_known(Results.of(studies.run(other)))
+
+
 def test_stations_of_an_asymmetry_are_enough_for_tight_tolerances() -> None:
     """Under a force between springs the static response has a sharp peak, whose range 400 stations miss by 3e-4."""
     springs = [{"at": 0.2954, "stiffness": 135.5}, {"at": 0.8428, "stiffness": 106.9}]

@@ -18,8 +18,10 @@ from results_schema.store.archive import open_archive
 from studies.commands.catalogue import built_in
 from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
+from studies.pictures.moving_frames import pictures
 from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.runs.runner import run_to_archive
 from tests.floating.scenes import ARM, PAPER_BEAM, sliding_mass
@@ -336,3 +338,34 @@ def test_numbers_of_loads_and_springs_may_be_swept() -> None:
             Study(kind="moving-frames", gravity=0.0, question={"duration": 4.0}, **tables).with_values(own)
         )
         assert found["tip_max"].values[place] == pytest.approx(float(alone["tip_max"]), rel=1e-9)
+
+
+def test_a_limit_is_told_with_where_it_is_exceeded() -> None:
+    """In words and in the figure, of the quantity that has one; the energy in words too."""
+    joint = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 1.0, "time": 1.0}}
+    moment = {"body": "arm", "at": 0.0, "quantity": "bending_moment"}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": ARM | {"modes": 2}},
+        frame={"arm": {"joints": [joint], "stiffening": True}},
+        sensor={"root": moment, "tip": {"body": "arm", "at": 10.0}},
+        sweep={"rate": {"of": "frame.arm.joints.0.motion.rate", "values": [0.25, 0.5, 1.0]}},
+        question={"duration": 1.5, "displacement": 10.0},
+        solver={"tolerance": 0.05},
+    )
+    found = studies.run(study)
+    most = np.maximum(abs(found["tip_max"]), abs(found["tip_min"])).values
+    assert (np.diff(most) > 0.0).all()
+    assert "tip: from " in kind_of(study).findings(Results.of(found))[0]
+    assert "exceeds 10 m nowhere from 0.25 rad/s to 1 rad/s" in kind_of(study).findings(Results.of(found))[0]
+    limit = float(np.round(0.5 * (most[0] + most[1]), 3))
+    found = studies.run(study.with_values({"question.displacement": limit}))
+    told = kind_of(study).findings(Results.of(found))
+    assert f"exceeds {quantity(limit, 'm')} from 0.5 rad/s to the end of the sweep, 1 rad/s" in told[0]
+    assert told[1].startswith("root: from ") and "exceeds" not in told[1]
+    assert any(text.startswith("The energy of everything (motion, bending") for text in told)
+    sizes = next(one for one in pictures(Results.of(found)) if one.name == "largest-displacement")
+    assert "beyond the limit" in sizes.title and "Red: limits" in sizes.caption
+    with pytest.raises(BadInput, match=r"question\.displacement: must be > 0"):
+        kind_of(study).check_tables(study.with_values({"question.displacement": 0.0}))

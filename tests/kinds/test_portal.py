@@ -55,11 +55,11 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
 
 
 @pytest.mark.fault(22)
-def test_a_variant_that_does_not_converge_has_no_values(found: Any) -> None:
-    """A payload of a million times its mass; the results and histories of the others stay."""
+def test_a_variant_that_falls_over_has_no_values(found: Any) -> None:
+    """By a million times its payload, which no joint holds up; results and histories of the others stay."""
     swept = {"payload": {"of": ["robot.portal.payload_scale"], "values": [0.0, 1e6, 2.0]}}
     own = studies.run(scene(solver={"tolerance": 1e-2}, sweep=swept, question={"after": 0.5}))
-    assert own["status"].values.tolist() == [Status.OK, Status.NOT_CONVERGED, Status.OK]
+    assert own["status"].values.tolist() == [Status.OK, Status.FALLS_OVER, Status.OK]
     for name in ("cycle_time", "error_largest", "at_rest", "tool_centre_point_error", "rail_deflection"):
         values, others = own[name].values, found[name].sel(acceleration=1.0).values
         assert np.isnan(values[1]).all() and np.isfinite(others).any(), name

@@ -15,7 +15,7 @@ from studies.pictures.common import figures
 from studies.pictures.common import sweep_view as views
 from studies.reporting import answers
 from studies.results.results import Results
-from tests.studies import scenes
+from tests.studies import at_rest, scenes
 
 KINDS = tuple(scenes.MOTIONS)
 MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
@@ -211,3 +211,31 @@ def test_histories_with_too_few_instants_for_the_vibration_say_so(times: str, co
     text = scenes.text_of("trajectory").replace("times = [0, 1, 3]", f"times = {times}")
     sensors, *_ = answers.figures(studies.run(engine.load(text)))
     assert ("between two of them it does what is not drawn" in sensors.caption) == coarse
+
+
+def test_directions_of_sensors_stand_on_axes_and_in_titles() -> None:
+    """Named axes and vectors; moments are about them; what names none is along gravity."""
+    way = {"kind": "cruise", "start": 0.0, "end": 4.0, "speed": 1.0}
+    sensor = {
+        "sway": {"body": "portal", "node": "left", "direction": "x"},
+        "skew": {"body": "portal", "member": "column", "at": 1.0, "direction": [1, 0, -0.5]},
+        "middle": {"body": "portal", "at": 2.0},
+        "clamping": {"body": "portal", "node": "foot", "direction": "y", "quantity": "support_moment"},
+    }
+    dataset = studies.run(
+        engine.Study(
+            kind="passage",
+            body={"portal": at_rest.PORTAL | {"damping_ratio": 0.02}},
+            carriage={"car": {"on": "portal", "kind": "mass", "mass": 100.0, "motion": way}},
+            sensor=sensor,
+            sweep={"speed": {"of": "carriage.car.motion.speed", "values": [1.0, 2.0, 4.0]}},
+            solver={"steps": 400, "audit": 0},
+        )
+    )
+    results = Results.of(dataset)
+    places = {"sway": "at left along x", "skew": "at 1 m of column along (1, 0, -0.5)", "middle": "at 2 m of portal"}
+    assert {name: results.place(name) for name in sensor} == places | {"clamping": "at foot about y"}
+    shown = next(one for one in answers.figures(dataset) if one.name == "largest-displacement")
+    labels = {axes.get_ylabel().replace("\n", " ") for axes in shown.drawing.axes}
+    assert any(label.startswith("largest displacement at 1 m of column along (1, 0, -0.5) (") for label in labels)
+    assert results.label("sway", "mm", "largest").replace("\n", " ") == "largest displacement at left along x (mm)"

@@ -25,6 +25,7 @@ def test_status_and_fidelity_are_the_contract():
         (5, "diverged"),
         (6, "crashed"),
         (7, "beyond-theory"),
+        (8, "falls-over"),
     ]
     assert [s for s in Status if s.values_kept] == [*list(Status)[:4], Status.BEYOND_THEORY]
     models = ["static", "force", "mass-without-convective", "mass", "tied", "frame", "given-frame"]
@@ -35,7 +36,7 @@ def test_status_and_fidelity_are_the_contract():
 def test_of_several_statuses_the_most_serious_counts():
     """In the contract's order: what is beyond the theory comes last."""
     of_values = ["tolerance-missed", "unresolved", "separated", "beyond-theory", "ok"]
-    assert [label(status) for status in GRAVEST] == ["crashed", "diverged", "not-converged", *of_values]
+    assert [label(status) for status in GRAVEST] == ["crashed", "diverged", "falls-over", "not-converged", *of_values]
     for place, status in enumerate(GRAVEST):
         for other in GRAVEST[place:]:
             assert gravest(np.array([status]), np.array([other])) == gravest(np.array([other]), status) == status
@@ -43,7 +44,7 @@ def test_of_several_statuses_the_most_serious_counts():
 
 
 def test_flags_are_cf():
-    assert flag_values(Status) == list(range(8))
+    assert flag_values(Status) == list(range(9))
     assert flag_meanings(Status).split()[3] == "tolerance_missed"
     assert len(flag_meanings(Fidelity).split()) == len(flag_values(Fidelity))
 
@@ -59,7 +60,7 @@ def test_expand_fills_names_units_and_texts():
 
 def test_attributes_are_cf():
     found = expand("march", {"midspan": "m"}, ["table"])
-    assert found["status"].attributes()["flag_values"] == [0, 1, 2, 3, 4, 5, 6, 7]
+    assert found["status"].attributes()["flag_values"] == [0, 1, 2, 3, 4, 5, 6, 7, 8]
     assert "units" not in found["status"].attributes()
     assert found["error_estimate"].attributes()["units"] == "1"
 

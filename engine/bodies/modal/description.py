@@ -110,6 +110,11 @@ class Body(SpecOfKind):
     own_weight: bool = False
 
     @property
+    def may_be_nothing(self) -> tuple[str, ...]:
+        """Keys of its mass and its inertia, where these may be 0 in a frame that moves."""
+        return ()
+
+    @property
     def recorded(self) -> Recorded | None:
         """What an archive tells of it, where it comes from one: then there are no files to read."""
         return self._recorded

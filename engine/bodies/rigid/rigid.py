@@ -27,19 +27,23 @@ BOX = 0.1  # height over length, as it is drawn
 class Rigid(Body):
     """A rigid body: a vehicle or a table on its contacts.
 
-    length: of its track, m. mass: kg. inertia: kg m2, of pitch about its centre of mass. centre: m along its track,
-    the middle if not given.
+    length: of its track, m. mass: kg. inertia: kg m2, of pitch about its centre of mass; both may be 0 in a frame that
+    moves, as of a payload that is not there. centre: m along its track, the middle if not given.
     """
 
     kind: Literal["rigid"]
     length: Length = Field(gt=0)
-    mass: Mass = Field(gt=0)
-    inertia: Inertia = Field(gt=0)
+    mass: Mass = Field(ge=0)
+    inertia: Inertia = Field(ge=0)
     centre: Length | None = None
 
     @property
     def untold(self) -> tuple[str, ...]:
         return OF_SECTION
+
+    @property
+    def may_be_nothing(self) -> tuple[str, ...]:
+        return ("mass", "inertia")
 
     @property
     def centre_of_mass(self) -> float:
@@ -87,7 +91,7 @@ class RigidShapes:
         arm = np.asarray(s, dtype=np.float64) - self.body.centre_of_mass
         none = np.zeros_like(arm)
         shapes = {0: (none + 1.0, arm), 1: (none, none + 1.0)}
-        sizes = np.sqrt([self.body.mass, self.body.inertia])
+        sizes = np.sqrt([self.body.mass or 1.0, self.body.inertia or 1.0])  # of what is nothing they are drawn alone
         return np.stack([np.stack(shapes.get(order, (none, none)), axis=1) / sizes for order in orders])
 
 

@@ -79,6 +79,7 @@ def room(system):
         np.zeros(6 * R),
         np.zeros((6 * R, 6 * R)),
         np.zeros((6 + J, 6 + J)),
+        np.zeros((system.springs.shape[0], system.springs.shape[0])),
     )
 
 

@@ -50,14 +50,17 @@ MISSED_THERE, SOLID, SIXES = 0, 1, 3
 # rows of Work.motions: six of the axis of a track, and what becomes of them at the base
 MOVED = 6
 # rows of Work.vectors: of a correction; momenta, and a vector to begin with; inertia by which the scheme has no
-# limit of its step, and that of coordinates which go without; accelerations of the step before
-CHANGE, MOMENTUM, EXTRA, SOFT, BEFORE, VECTORS = 0, 1, 2, 3, 4, 5
+# limit of its step, and that of coordinates which go without; accelerations of the step before; the direction in which
+# weight is the stiffest beside springs
+CHANGE, MOMENTUM, EXTRA, SOFT, BEFORE, LIKELY, VECTORS = 0, 1, 2, 3, 4, 5, 6
 # rows of Work.cubics: sums of modes' cubics times y, y' and y''; a load for such cubics
 CUBIC, LOADED, CUBICS = 0, 6, 8
 SECOND_HALF = LANES // 2  # of a row of cubics: what is there belongs to the power above that in the first half
 
 # what a robot does at a time: moves, holds, works
 MOVES, HOLDS, WORKS = range(3)
+
+FALLS_OVER = 3  # beside the codes of `kernels.layout`: a joint is softer than the weight that it has to hold up
 
 
 class System(NamedTuple):
@@ -97,7 +100,7 @@ class Work(NamedTuple):
     factor the work of corrections falls. Of the matrix: lower (R, J, J + 6), of joints, and across to the base; bases
     (R, 2, n, LANES): motion of bases per mode, six in units in which their inertia is 1; inverse (n of all): one over
     what modes have without robots; pushed (6 R) and between (6 R, 6 R): of all bases; inertia (6 + J, 6 + J) of a
-    robot."""
+    robot. tangent (N, N): factors of the stiffness of springs and weight."""
 
     links: FloatArray
     robots: FloatArray
@@ -114,6 +117,7 @@ class Work(NamedTuple):
     pushed: FloatArray
     between: FloatArray
     inertia: FloatArray
+    tangent: FloatArray
 
 
 class Stretch(NamedTuple):

@@ -7,6 +7,7 @@ from engine.kernels.floating.vectors import add, cross, shared_vector, times
 from engine.kernels.jit import called, kernel
 from engine.kernels.layout import NOT_CONVERGED, SOUND
 from engine.kernels.robots.dynamics import evaluate, plan_at, prepare, room, solve
+from engine.kernels.robots.equilibrium import settle
 from engine.kernels.robots.layout import (
     ACTUAL_TOOL,
     ALONG,
@@ -16,6 +17,7 @@ from engine.kernels.robots.layout import (
     DRIVE,
     ELEMENT,
     EXTRA,
+    FALLS_OVER,
     GRIP,
     INTO,
     JOINTS,
@@ -50,7 +52,7 @@ from engine.kernels.robots.timing import number_of
 from engine.kernels.robots.tracks import give
 
 RESTING = 1e-20  # of the largest elastic energy of a coordinate: what a correction may still do before the march
-MOST_CORRECTIONS, MOST_SETTLING, STARTING = 12, 200, 3
+MOST_CORRECTIONS, STARTING = 12, 3
 GROWS = 2.0  # from step to step, by which corrections may fall less than those last seen
 #: Of the limit of a scheme's step: the inertia of robots changes while they move. With 0.6 no march of the portal grew;
 #: where joints and modes were judged one by one one did, at 12 steps a period. Powers are taken after the last to go.
@@ -68,6 +70,8 @@ def march(system, stretches, newmark, record):
     plan_at(system, stretches.start[0], work)
     code, station, passed = np.int64(settle(system, RESTING, state, work, left)), np.int64(0), np.int64(0)
     energy = elastic_energy(system, state)
+    if code == FALLS_OVER:
+        return code
     for p in range(stretches.start.shape[0]):
         start, h = stretches.start[p], stretches.step[p]
         until = h * stretches.steps[p]
@@ -92,7 +96,8 @@ def march(system, stretches, newmark, record):
 
 @kernel
 def rest(system, stretches, record):
-    """Where everything would rest with joints held where they are told to be, at the stations of `march`; a code."""
+    """Where everything would rest with joints held where they are told to be, at the stations of `march`, up to one at
+    which nothing does as a joint falls over; a code."""
     work, N = room(system), system.springs.shape[0]
     state, left = np.zeros((N, 3)), np.zeros(N)
     code, station = np.int64(SOUND), np.int64(0)
@@ -104,6 +109,8 @@ def rest(system, stretches, record):
             if plan_at(system, t, work):
                 hold(work)
                 code = max(code, np.int64(settle(system, stretches.close, state, work, left)))
+                if code == FALLS_OVER:
+                    return code
                 observe(system, t, state, work, left, record, station)
             else:
                 record.coordinates[station, :, :3], record.coordinates[station, :, 3] = state, t
@@ -143,22 +150,6 @@ def load_at(system, t, work):
         work.doing[r, BEGUN] = number_of(system, r, t)
         work.robots[r, PAYLOAD] = payload_of(system, r, work.doing[r, BEGUN])
         work.doing[r, PHASE] = -1
-
-
-@called
-def settle(system, close, state, work, left):
-    """Static equilibrium of what is planned, which stands still."""
-    for _ in range(MOST_SETTLING):
-        evaluate(system, state, work, left)
-        change, largest = 0.0, 0.0
-        for k in range(state.shape[0]):
-            by = left[k] / system.springs[k, 0]
-            state[k, 0] -= by
-            change = max(change, by**2 * system.springs[k, 0])
-            largest = max(largest, state[k, 0] ** 2 * system.springs[k, 0])
-        if change <= close * largest:
-            return SOUND
-    return NOT_CONVERGED
 
 
 @called

@@ -226,6 +226,14 @@ def test_the_answer_of_one_variant_and_without_a_stop() -> None:
     assert not any("After the stop" in one for one in said)
 
 
+def test_a_limit_of_position_errors_is_told(coarse: xr.Dataset) -> None:
+    most = float(coarse["tip_max"].max())
+    for limit, expected in ((0.5 * most, "exceeds"), (2.0 * most, "nowhere")):
+        given = Results.of(coarse).study.with_values({"question.position_error": limit})
+        said = next(one for one in kind_of(given).findings(Results(coarse, given)) if one.startswith("tip: "))
+        assert "Its absolute value exceeds" in said and expected in said
+
+
 def test_the_figure_has_both_panels(coarse: xr.Dataset) -> None:
     (figure,) = (one for one in studies.figures(coarse) if one.name == "position-errors")
     assert figure.title.startswith("The largest position error at 200 mm of tool is")
