@@ -19,6 +19,7 @@ from results_schema.statuses import gravest, lost
 if TYPE_CHECKING:
     from engine.floating.march import Marched
     from engine.floating.model import FloatingModel
+    from engine.scene.sensors import Sensor
 
 #: Signals of a carriage that are reported, by the ends of their names, and what comes of each: its error is held
 #: to the tolerance, or only told, as forces that enter excite every mode.
@@ -34,12 +35,13 @@ OF_CARRIAGES = (
 ENDS = ("max", "min")
 KINETIC, POTENTIAL = 0, 1  # signals of the whole
 ROUNDING = 1e-9  # of a time
+ROUNDED = 1e-12  # of places of an arm, over how far it reaches
 
 
 class Signal(NamedTuple):
     """A signal that is reported: name, its number, the tolerance that it is held to (NaN: told), and whether it is
     measured by the length of a track, in place of the largest value of a signal, its own or another; least: what it is
-    never below."""
+    never below; noise: differences below are rounding."""
 
     name: str
     number: int
@@ -48,6 +50,7 @@ class Signal(NamedTuple):
     along: float
     over: str
     least: float = -np.inf
+    noise: float = 0.0
 
 
 class Result(NamedTuple):
@@ -84,8 +87,8 @@ def signals(model: FloatingModel) -> Iterator[Signal]:
         own = sensor.tolerance
         told = own == "told" or (own is None and QUANTITIES[sensor.quantity].told)
         held = tolerance if own is None else np.nan if told else float(own)
-        least = 0.0 if sensor.reads.of_arm and sensor.direction is None else -np.inf  # of parabolas through lengths
-        yield Signal(name, number, np.nan if told else held, own is None and not told, np.nan, name, least)
+        found = Signal(name, number, np.nan if told else held, own is None and not told, np.nan, name)
+        yield _of_arm(model, sensor, found) if sensor.reads.of_arm else found
     first = model.signal_of("carriages")
     for c, (name, carriage) in enumerate(model.study.carriage.items()):
         length = model.bodies[carriage.on].length
@@ -94,6 +97,14 @@ def signals(model: FloatingModel) -> Iterator[Signal]:
             along = length if end == "position" else np.nan
             number = first + OF_CARRIAGE * c + offset
             yield Signal(f"{name}_{end}", number, tolerance if held else np.nan, held, along, f"{name}_{end}")
+
+
+def _of_arm(model: FloatingModel, sensor: Sensor, signal: Signal) -> Signal:
+    """The same of a position error, which is a difference of two places, and whose length is not negative, though a
+    parabola through three may be."""
+    carriers = model.carriers(str(sensor.body))
+    far = np.linalg.norm(model.frame(carriers[0]).position) + sum(model.bodies[name].length for name in carriers)
+    return signal._replace(least=0.0 if sensor.direction is None else -np.inf, noise=ROUNDED * float(far))
 
 
 def extremes(model: FloatingModel) -> Iterator[Signal]:
@@ -171,7 +182,7 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
             gap = np.maximum(np.abs(values[0] - values[1]), gaps[:, signal.number])
             neither = np.isnan(values[0]) & np.isnan(values[1])
             least = (values[0] == signal.least) & (values[1] == signal.least)  # what nothing is below is known
-            gap = np.where(neither | least, 0.0, gap)
+            gap = np.where(neither | least | (gap <= signal.noise), 0.0, gap)
             found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
     found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]

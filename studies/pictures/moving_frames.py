@@ -18,7 +18,7 @@ from studies.pictures.common.sizes import sizes_of
 from studies.pictures.common.sweep_view import View, along_axis, draw_curves, one_legend, view
 from studies.pictures.trajectory import histories, ranging
 from studies.results.findings_common import in_words
-from studies.results.formatting import ALIKE, quantity, scale_for
+from studies.results.formatting import ALIKE, counted, quantity, scale_for
 from studies.results.places import Index, chosen
 from studies.results.results import Results
 
@@ -62,7 +62,7 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
             limit = limits.limit(results.study.sensor[own[0]].quantity)
-            yield _of_tips(seen, tips[:MOST_TIPS], top) if tips else sizes_of(seen, own, limit, top)
+            yield _of_tips(seen, tips, top) if tips else sizes_of(seen, own, limit, top)
 
 
 def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
@@ -71,19 +71,23 @@ def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
     most = f"{quantity(float(sizes(results, tips[0])[top]), 'm')},{in_words(results, top)}"
     title = f"The largest position error{along_way(results, tips[0])} {results.place(tips[0])} is {most}"
     caption = seen.caption(
-        "Largest distance from where the rigid arm would have it, in the whole time and from the stop of its joints on."
+        "Largest distances from where the rigid arm would have them, in the whole time and from where its joints stop.",
+        f"{counted(len(tips) - MOST_TIPS, 'more sensor')} in the archive." if len(tips) > MOST_TIPS else "",
     )
-    return draw("position-errors", title, caption, 0.9 + 2.1 * len(tips), partial(_draw_tips, seen, tips))
+    shown = tips
+    return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown))
 
 
 def _draw_tips(seen: View, tips: list[str], drawing: Drawing) -> None:
-    grid = drawing.subplots(len(tips), 2, squeeze=False, sharex=True, sharey="row")
+    stops = any(np.isfinite(sizes(seen.results, f"{tip}{AFTER_STOP}")).any() for tip in tips)
+    columns = [("", "in the whole time"), (AFTER_STOP, "after the stop")][: 1 + stops]
+    grid = drawing.subplots(len(tips), len(columns), squeeze=False, sharex=True, sharey="row")
     for row, tip in zip(grid, tips, strict=True):
         scale = scale_for(float(np.nanmax(sizes(seen.results, tip))), "m")
-        for axes, name, when in ((row[0], tip, "in the whole time"), (row[1], f"{tip}{AFTER_STOP}", "after the stop")):
-            values = seen.results.dataset["status"].copy(data=sizes(seen.results, name) * scale.factor)
+        for axes, (end, when) in zip(row, columns, strict=True):
+            values = seen.results.dataset["status"].copy(data=sizes(seen.results, f"{tip}{end}") * scale.factor)
             draw_curves(axes, seen, seen.curves(values))
-            axes.set_title(f"{tip.replace('_', ' ')} {when}")
+            axes.set_title(f"{tip.replace('_', ' ')}{along_way(seen.results, tip)} {when}")
             axes.set_ylim(0.0, None)
         row[0].set_ylabel(seen.results.label(tip, scale.unit, "largest"))
     one_legend([axes for row in grid for axes in row[::-1]])
