@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from studies.runs.runner import Outcome
 
 SOME_NOT_OK = 3
+LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits of it
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,9 @@ class Range:
         return quantity(value, self.units, digits, beside=max(abs(self.extreme.value), self.beside))
 
     def said(self, end: Extreme, digits: int = 3) -> str:
-        """One of its ends with the unit, and what that may be off where that is known."""
-        off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > 0.0 else ""
+        """One of its ends with the unit, and what that may be off where that is known and not beneath its digits."""
+        beneath = LEAST_TOLD * abs(end.value)
+        off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > beneath else ""
         return f"{self.value(end.value, digits)}{off}"
 
 
