@@ -206,9 +206,8 @@ def _answer(results: Results, sensor: str) -> str:
     place = first_break(results, sensor)
     if place is None:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
-    below = (
-        f"{peaks_in_words(pattern(results, sensor))} per cycle below {_pace_and_ratio(results, float(ratio[place]))}"
-    )
+    usual = peaks_in_words(pattern(results, sensor))
+    below = f"{usual} per cycle below {_pace_and_ratio(results, float(ratio[place]))}"
     else_varied = ", whatever else is varied" if len(_varied(results)) > 1 else ""
     return (
         f"{sensor}: {below}{else_varied}; there "
@@ -359,4 +358,5 @@ def _from_where(results: Results, odd: Array) -> str:
     unlike, known = odd > UNLIKE, np.isfinite(odd)
     if not unlike.any() or not (known & (ratio < ratio[unlike].min())).any():
         return ""
-    return f" by more than {percent(UNLIKE)} of the even harmonics from {_pace_and_ratio(results, float(ratio[unlike].min()))} on"
+    first = _pace_and_ratio(results, float(ratio[unlike].min()))
+    return f" by more than {percent(UNLIKE)} of the even harmonics from {first} on"

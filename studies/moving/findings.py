@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from studies.findings.beyond import of_every_quantity
-from studies.results.findings_common import in_words, told_statuses
+from studies.results.findings_common import in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -21,6 +21,7 @@ def answer(results: Results) -> list[str]:
 def others(results: Results) -> Iterator[str]:
     """All but carriages that slide."""
     yield from _sensors(results)
+    yield from _driven(results)
     yield from _ends(results)
     yield from _beyond_theory(results)
     yield from told_statuses(results)
@@ -40,7 +41,7 @@ def sliding(results: Results) -> Iterator[str]:
         over = " over all variants" if results.size > 1 else ""
         way = _span(dataset[f"{name}_position_min"].values, dataset[f"{name}_position_max"].values, "m")
         swings = dataset[f"{name}_period"].values
-        said = f"{name} slides over {way}{over}"
+        said = f"{name} slides from {way}{over}"
         if np.isfinite(swings).any():
             many = results.size > 1
             said += f", with a period of {_span(swings, swings, 's') if many else quantity(float(swings), 's', 4)}"
@@ -54,7 +55,7 @@ def sliding(results: Results) -> Iterator[str]:
 
 def _sensors(results: Results) -> Iterator[str]:
     for sensor in of_every_quantity(results, MOST_SENSORS):
-        low, high = (results.dataset[f"{sensor}_{end}"] for end in ("min", "max"))
+        low, high = (results.dataset[f"{sensor}_{end}"].where(results.with_values) for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
             continue
@@ -62,7 +63,21 @@ def _sensors(results: Results) -> Iterator[str]:
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
-        yield f"{sensor}: from {span}{in_words(results, index)}."
+        yield f"{sensor}: the {results.noun(sensor)} goes from {span}{in_words(results, index)}."
+
+
+def _driven(results: Results) -> Iterator[str]:
+    """How hard carriages press that are driven along their tracks."""
+    for name, carriage in results.study.carriage.items():
+        if carriage.motion.slides:
+            continue
+        ends = (results.dataset[f"{name}_contact_force_{end}"] for end in ("min", "max"))
+        low, high = (one.where(results.with_values) for one in ends)
+        index = extreme(np.maximum(np.abs(low), np.abs(high)))
+        if index is not None:
+            span = _span(low.values[index], high.values[index], "N")
+            loosely = uncertainty(results, f"{name}_contact_force_max", index)
+            yield f"{name}: the contact force goes from {span}{loosely}{in_words(results, index)}."
 
 
 def _ends(results: Results) -> Iterator[str]:

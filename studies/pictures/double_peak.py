@@ -87,11 +87,10 @@ def _odd_view(results: Results, sensors: list[str]) -> View:
         return seen
     other = view(results, axis.paths, SPEEDS, top)
     assert other.x is not None
-    if other.y is not None and other.most_along(other.y, ratios[best]) < LITTLE * other.most_along(
-        other.x, ratios[best]
-    ):
-        other = alone(other)
-    return max((seen, seen.x), (other, other.x), key=lambda one: one[0].most_along(one[1], ratios[best]))[0]
+    most = other.most_along(other.x, ratios[best])
+    if most < seen.most_along(seen.x, ratios[best]):
+        return seen
+    return alone(other) if other.y is not None and other.most_along(other.y, ratios[best]) < LITTLE * most else other
 
 
 def _is_map(seen: View, sensor: str) -> bool:
